@@ -1,6 +1,6 @@
-//! FFT-MA texture of 2048^2 and 4096^2 cells beside the transform it cannot do without, and beside numpy.
+//! FFT-MA texture of 2048^2 and 4096^2 cells, compared with the transform that it needs at least, and with numpy.
 //!
-//! The target, at 4096^2, is 0.35 times numpy's rfft2 FFT-MA. Where `python3` with numpy is there, its time is
+//! The target, at 4096^2, is 0.35 times numpy's rfft2 FFT-MA. If `python3` with numpy is available, its time is
 //! measured in the same run (`floors/fft_ma.py`, fastest of five) and printed before the table; another floor, in the
 //! same process, is one real transform (`sastrugi_numeric`, same bits on every CPU). Run one-threaded:
 //! `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench fft_ma`.
@@ -19,7 +19,7 @@ fn main() {
     for n in SIZES {
         match floor("fft_ma.py", &[&n.to_string()]).as_deref() {
             Some(&[whole, alone]) => println!(
-                "numpy rfft2 FFT-MA {n}: {:.0} ms, the field alone from amplitudes at hand {:.0} ms",
+                "numpy rfft2 FFT-MA {n}: {:.0} ms, the field alone from precomputed amplitudes {:.0} ms",
                 1e3 * whole,
                 1e3 * alone
             ),
@@ -42,7 +42,7 @@ fn unit_phases(bencher: Bencher, n: usize) {
     texture(bencher, n, 0.28, &json!({ "phase": "unit" }));
 }
 
-/// A covariance that reaches from edge to edge, so that none of its values is taken as nothing.
+/// A covariance that reaches from edge to edge, so that none of its values is treated as zero.
 #[divan::bench(sample_count = 5, args = SIZES)]
 fn unit_phases_wide(bencher: Bencher, n: usize) {
     texture(bencher, n, 0.005 * n as f64, &json!({ "phase": "unit" }));
@@ -53,7 +53,7 @@ fn gaussian_phases(bencher: Bencher, n: usize) {
     texture(bencher, n, 0.28, &json!({ "phase": "gaussian" }));
 }
 
-/// The axes of anisotropy across the grid's: no quarter of the spectrum mirrors the others.
+/// Axes of anisotropy oblique to the grid: no quadrant of the spectrum mirrors another.
 #[divan::bench(sample_count = 5, args = [2048])]
 fn oblique_axis(bencher: Bencher, n: usize) {
     texture(bencher, n, 0.28, &json!({ "ratio": 0.5, "azimuth_deg": 30.0 }));

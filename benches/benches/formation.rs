@@ -1,6 +1,6 @@
 //! Steps of teams over very rough hills, on one core.
 //!
-//! Before the table: time of a step over whole runs, by members, and as a multiple of that of four. Targets: four members 50 us, 100 members 2 ms.
+//! Before the table: time per step over complete runs by number of members, and relative to four members. Targets: four members 50 us, 100 members 2 ms.
 //! Run: `cargo bench -p sastrugi-benches --bench formation`.
 
 use divan::Bencher;
@@ -12,13 +12,13 @@ use serde_json::json;
 use std::time::Instant;
 
 const MEMBERS: [u32; 5] = [4, 10, 30, 100, 300];
-/// Steps of a run that are timed, at most.
+/// Largest number of steps of a run that are timed.
 const STEPS: u32 = 10_000;
 
 fn main() {
     let course = Course::new();
     let on = TeamGround::new(course.ground());
-    println!("members  steps  us a step  over that of four");
+    println!("members  steps  us per step  relative to four");
     let mut four = f64::NAN;
     for members in MEMBERS {
         let mut team = course.team(&on, members);
@@ -57,7 +57,7 @@ impl Course {
         Ground { map: &self.map, costs: &self.costs, clearance: None }
     }
 
-    /// A wedge with the spacing that fits its members onto the map.
+    /// A wedge with a spacing at which its members fit on the map.
     fn team<'a>(&self, on: &'a TeamGround<'_>, members: u32) -> Team<'a> {
         let parameters = TeamParameters {
             formation: Shape::Wedge,

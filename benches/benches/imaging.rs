@@ -1,6 +1,6 @@
-//! Images of a planetary surface of 1024 x 1024 cells, beside the floor: one pass of shading.
+//! Images of a planetary surface of 1024 x 1024 cells, compared with a floor: one pass of shading.
 //!
-//! The floor reads three heights of a cell and computes its brightness: what no image can do without. A nadir image adds a ray and a march to the
+//! The floor reads three heights per cell and computes its brightness, which every image needs. A nadir image adds a ray and a march to the
 //! sun for every sample; oblique and pinhole views march along the ray too. Run one-threaded:
 //! `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench imaging`.
 

@@ -1,9 +1,9 @@
-//! Masked moving average and masked covariance of 2048^2 and 4096^2 cells, and the whole fit, each beside its floor.
+//! Masked moving average and masked covariance of 2048^2 and 4096^2 cells, and the complete fit, each compared with its floor.
 //!
 //! Floors in the same process: copying the raster (moving average), and four real transforms of it, two of the data and two
 //! of the mask (covariance to 33 lags). Floors in the same run, printed before the table: numpy's summed-area tables and
 //! scipy's FFT (`floors/masked_covariance.py`, fastest of three). The targets, at 4096^2, are 0.35 times the
-//! former and 0.5 times the latter, and 1.5 s for the whole fit from a file. Run one-threaded:
+//! former and 0.5 times the latter, and 1.5 s for the complete fit from a file. Run one-threaded:
 //! `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench masked_covariance`.
 
 use divan::Bencher;
@@ -31,7 +31,7 @@ fn main() {
     divan::main();
 }
 
-/// A rough surface, a twentieth of it without data.
+/// A rough surface with a twentieth of its cells without data.
 fn raster(n: usize) -> Vec<f64> {
     let mut stream = Streams::for_seed(1, "bench").stream("raster");
     let mut walk = 0.0;
@@ -53,7 +53,7 @@ fn copy(bencher: Bencher, n: usize) {
     });
 }
 
-/// The background of a whole raster: windows are partial at its border only.
+/// The background of a raster without holes: windows are partial only at its border.
 #[divan::bench(sample_count = 10, args = SIZES)]
 fn background_33_cells(bencher: Bencher, n: usize) {
     let values: Vec<f64> = raster(n).into_iter().map(|z| if z.is_nan() { 0.0 } else { z }).collect();

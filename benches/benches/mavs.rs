@@ -1,8 +1,8 @@
-//! Ground at the scale of vehicles, 1000 x 1000 cells, each generator beside a floor of the same run.
+//! Ground at the scale of vehicles, 1000 x 1000 cells, with each generator compared with a floor of the same run.
 //!
 //! Targets on one core: seven octaves of Perlin noise within 150 ms, a separable field within 30 ms, an isotropic one within
 //! 300 ms. Floors: seven passes over the heights that add a cubic of the column (`seven_cubics`: what the octaves cost without
-//! their lattice), as many normal numbers (`normals`), and the inverse transform of the isotropic field's torus
+//! their lattice), one normal number per cell (`normals`), and the inverse transform of the isotropic field's torus
 //! (`inverse_transform`). Run one-threaded: `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench mavs`.
 
 use divan::counter::ItemsCount;

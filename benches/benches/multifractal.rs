@@ -1,6 +1,6 @@
-//! Multifractal terrain at the published size, beside the bare transform that its targets are ratios to.
+//! Multifractal terrain at the published size, compared with the bare transform to which its targets refer.
 //!
-//! Targets: a layer (M = 64, 1009^2, either mode) within 2.5 times `complex_fft_2048`; a whole three-layer DEM within
+//! Targets: a layer (M = 64, 1009^2, either mode) within 2.5 times `complex_fft_2048`; a complete three-layer heightfield within
 //! 0.4 s on one core. Run one-threaded: `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench multifractal`.
 
 use divan::Bencher;
@@ -39,7 +39,7 @@ fn complex_fft_2048(bencher: Bencher) {
         transform.process_with_scratch(&mut field, &mut scratch);
         transpose(&field, &mut turned, N);
         transform.process_with_scratch(&mut turned, &mut scratch);
-        // A sample must not feed ever larger numbers to the next.
+        // A sample must not pass ever larger numbers to the next.
         field.copy_from_slice(&turned);
         field.iter_mut().for_each(|v| *v /= (N * N) as f64);
     });

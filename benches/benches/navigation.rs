@@ -1,8 +1,8 @@
 //! Routes over the hills of the published maps, on one core.
 //!
-//! Before the table, in processor time: for each preset on 1000 x 1000 nodes the share of vertices, how much faster the search over the roadmap is than the
-//! one over the grid (medians of 5), and smoothed costs over that of the grid, all by the fine integral; how both grow with the map; on 2000 x 2000 nodes our A* over
-//! the grid beside those of the crates `pathfinding` and `petgraph` on the same steps, costs and bound, and the memory of the process.
+//! Before the table, in CPU time: for each preset on 1000 x 1000 nodes, the share of vertices, the speed-up of the roadmap search over the grid search
+//! (medians of 5), and smoothed costs relative to the grid, all by the fine integral; how both grow with the map; on 2000 x 2000 nodes, our A* over the
+//! grid compared with those of the crates `pathfinding` and `petgraph` with the same steps, costs and bound, and the memory of the process.
 //! Targets: roadmap at least 10 times faster, smoothed cost at most 1.05 (threshold 2 m) and 1.4 (without); 2000 x 2000 nodes: vertices
 //! and edges 1.5 s, roadmap search 30 ms, grid search 4 s, 1000 searches of a prepared roadmap 2 s, 600 MB.
 //! Run: `cargo bench -p sastrugi-benches --bench navigation`.
@@ -30,7 +30,7 @@ fn main() {
     divan::main();
 }
 
-/// Hills with the thesis' costs.
+/// Hills with the costs of the thesis.
 struct Course {
     map: TravelMap,
     costs: CostModel,
@@ -77,20 +77,20 @@ impl Course {
     }
 }
 
-/// Processor time of this thread, s: other work on the machine does not count.
+/// CPU time of this thread, s, which excludes other work on the machine.
 fn processor_s() -> f64 {
     let text = std::fs::read_to_string("/proc/thread-self/schedstat").unwrap_or_default();
     text.split_whitespace().next().and_then(|word| word.parse().ok()).map_or(f64::NAN, |ns: f64| 1e-9 * ns)
 }
 
-/// Processor time of a call, s.
+/// CPU time of a call, s.
 fn timed<T>(run: impl FnOnce() -> T) -> (f64, T) {
     let start = processor_s();
     let result = black_box(run());
     (processor_s() - start, result)
 }
 
-/// Median of five samples of a call, s; the clock of the processor ticks in some ms, so that each sample repeats short calls.
+/// Median of five samples of a call, s; the CPU clock has a resolution of some ms, so each sample repeats short calls.
 fn median_s<T>(mut run: impl FnMut() -> T) -> f64 {
     const SAMPLE_S: f64 = 0.1;
     let sample = |_| {
@@ -128,7 +128,7 @@ fn compare_methods(preset: &str) {
     );
 }
 
-/// What the targets for 2000 x 2000 nodes ask for.
+/// Measures the targets for 2000 x 2000 nodes.
 fn time_large(preset: &str) {
     let course = Course::new(2000, preset);
     let (read_s, _) = timed(|| TravelMap::new(course.map.heights().clone(), course.map.limits()));
@@ -137,7 +137,7 @@ fn time_large(preset: &str) {
     let found = astar::search(&roadmap, ends[0], ends[1]).expect("a path");
     println!(
         "{preset}, 2000: map {read_s:.2} s, vertices and edges {build_s:.2} s, roadmap of {} vertices searched in {:.1} ms \
-         ({} expansions), most memory {} MB",
+         ({} expansions), peak memory {} MB",
         roadmap.len(),
         1e3 * median_s(|| astar::search(&roadmap, ends[0], ends[1])),
         found.expansions,
@@ -145,7 +145,7 @@ fn time_large(preset: &str) {
     );
 }
 
-/// How the work grows with the side of the map, on very rough hills.
+/// Growth of the work with the side of the map, on very rough hills.
 fn time_growth(size: usize) {
     let course = Course::new(size, "very_rough");
     let (build_s, roadmap) = timed(|| course.roadmap(None));
@@ -159,7 +159,7 @@ fn time_growth(size: usize) {
     );
 }
 
-/// A cost that can be ordered, as `pathfinding` asks.
+/// A cost that can be ordered, as `pathfinding` requires.
 #[derive(Clone, Copy, PartialEq)]
 struct Cost(f64);
 
@@ -203,7 +203,7 @@ fn compare_crates() {
         println!("2000, very_rough, grid by {name}: {seconds:.2} s, cost {cost:.6}");
     };
     report("ours", &|| astar::search(&grid, start, goal).expect("a path").cost);
-    println!("most memory of the process so far: {} MB", peak_mb().unwrap_or(0));
+    println!("peak memory of the process so far: {} MB", peak_mb().unwrap_or(0));
     report("pathfinding", &|| {
         let successors = |node: &Node| {
             let mut next = Vec::with_capacity(4);
@@ -223,7 +223,7 @@ fn compare_crates() {
     });
 }
 
-/// Most memory that the process has held.
+/// Peak memory of the process.
 fn peak_mb() -> Option<u64> {
     let status = std::fs::read_to_string("/proc/self/status").ok()?;
     let line = status.lines().find(|line| line.starts_with("VmHWM:"))?;
@@ -260,7 +260,7 @@ fn thousand_searches_2000(bencher: Bencher, landmarks: u32) {
     bencher.bench_local(|| (0..1000).filter(|k| planner.search([node(2 * k), node(2 * k + 1)]).is_ok()).count());
 }
 
-/// The table of steps that a map makes when it is read.
+/// The table of steps that is built when a map is read.
 #[divan::bench(sample_count = 5, sample_size = 1)]
 fn read_map_2000(bencher: Bencher) {
     let course = Course::new(2000, "rough");

@@ -1,7 +1,7 @@
-//! Heights from three images of 1024 x 1024 pixels, beside two floors: one solution of Poisson's equation by cosine transforms, and one pass of
+//! Heights from three images of 1024 x 1024 pixels, compared with two floors: one solution of Poisson's equation by cosine transforms, and one pass of
 //! shading (brightness and derivatives of every cell in three images). An inversion takes two rounds (from above the second only confirms the
-//! first), each with about four steps of least squares a cell and some 20 iterations of conjugate gradients, each of which has one such solution.
-//! Without uncertainties: these add `samples` solutions of some 10 iterations.
+//! first), each with about four least-squares steps per cell and about 20 iterations of conjugate gradients, each of which needs one such solution.
+//! Uncertainties are excluded: they add `samples` solutions of about 10 iterations.
 //!
 //!     cargo bench -p sastrugi-benches --bench photoclinometry
 

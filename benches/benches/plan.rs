@@ -1,6 +1,6 @@
-//! Planning of studies with many small terrains: text to graph, keys included, and a look at an empty work area.
+//! Planning of studies with many small terrains: from text to graph, including keys and a scan of an empty work area.
 //!
-//! Items per second; a terrain is four items (made, described, missions drawn, driven). The target is
+//! Items per second; a terrain has four items (generate, describe, draw missions, drive). The target is
 //! 100 000 missions in 5 s: 5 000 terrains of 20 missions, or at worst 100 000 terrains of one, the largest size here.
 
 use divan::Bencher;

@@ -1,7 +1,7 @@
-//! Planetary patches, beside the draws that a patch of texture alone cannot do without.
+//! Planetary patches, compared with the random draws that a patch of texture alone needs.
 //!
-//! Target: 256 x 256 samples 2 cm apart with all processes within 60 ms on one core; the floor is one counter and one normal number a
-//! sample. `patch_of_world` shows that time goes with the samples of a patch, not with the world. Run one-threaded:
+//! Target: 256 x 256 samples 2 cm apart with all processes within 60 ms on one core; the floor is one counter and one normal number per
+//! sample. `patch_of_world` shows that time is proportional to the samples of a patch, not to the size of the world. Run one-threaded:
 //! `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench planetary`.
 
 use divan::Bencher;
@@ -46,7 +46,7 @@ fn bench_planetary(bencher: Bencher, side: u32, cell_m: f64, processes: &Value) 
     bench_kind(bencher, "planetary", &params, &[]);
 }
 
-/// The floor: as many counters and normal numbers as the patch has samples.
+/// The floor: one counter and one normal number per sample of the patch.
 #[divan::bench(sample_count = 50)]
 fn counters_and_normals_256(bencher: Bencher) {
     let root = Counter::new(&mut streams().stream("floor"));
@@ -77,7 +77,7 @@ fn all_processes_256(bencher: Bencher) {
     bench_planetary(bencher, SIDE, 0.02, &all_processes());
 }
 
-/// Samples of one world, from a rover's glance to a field.
+/// Patches of one world, from a rover's field of view to a field.
 #[divan::bench(sample_count = 10, args = [3, 16, 64, 256, 1024])]
 fn patch_of_world(bencher: Bencher, side: u32) {
     bench_planetary(bencher, side, 0.02, &all_processes());

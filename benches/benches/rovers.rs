@@ -1,6 +1,6 @@
-//! Cycles of rovers on a world with 17.6 % rocks at 2 cm, beside the look-ups of the ground that they cannot do without.
+//! Cycles of rovers on a world with 17.6 % rocks at 2 cm, compared with the look-ups of the ground that they need.
 //!
-//! A cycle of rays asks for about 700 points of the ground, one of rectangles for 5000: the floors ask for as many points of one tile row,
+//! A cycle of rays looks up about 700 points of the ground, one of rectangles 5000; the floors look up as many points of one tile row,
 //! in order. Run one-threaded: `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench rovers`.
 
 use divan::Bencher;
@@ -12,7 +12,7 @@ use serde_json::json;
 
 /// Cycles of a run.
 const CYCLES: u32 = 500;
-/// Points that a cycle asks for.
+/// Points that a cycle looks up.
 const RAYS: u32 = 700;
 const RECTANGLES: u32 = 5000;
 
@@ -34,7 +34,7 @@ fn ground() -> WorldGround {
     world.ground(&Streams::for_seed(1, "terrain"), 0.02, &[], 400).expect("2 cm are twice the basic spacing")
 }
 
-/// Cycles of one rover; its tiles are made before.
+/// Cycles of one rover, with its tiles generated in advance.
 fn bench_cycles(bencher: Bencher, navigator: &Navigator) {
     let ground = ground();
     let task = navigator.task(&RoverParameters::default());
@@ -55,7 +55,7 @@ fn schoppers_like(bencher: Bencher) {
     bench_cycles(bencher, &Navigator::Schoppers(SchoppersParameters { cycle_limit: CYCLES, ..Default::default() }));
 }
 
-/// The floors: as many look-ups as so many cycles ask for, over a square of 1 m.
+/// The floors: the look-ups of the same number of cycles, over a square of 1 m.
 fn bench_lookups(bencher: Bencher, points: u32) {
     let ground = ground();
     let look = || {

@@ -1,12 +1,12 @@
-//! The terrain server under load, beside what it cannot do without.
+//! The terrain server under load, compared with floors.
 //!
-//! * A patch of 512 x 512 samples (1 MB) that was asked for before, by 1, 8 and 64 clients that keep their connections: as fast as it goes, and
-//!   at a steady 320 requests per second of all clients together. The floor is a thread for each connection that sends the same bytes.
-//! * A patch of 256 x 256 samples 2 cm apart that is new, beside the same kernel in this process.
+//! * A patch of 512 x 512 samples (1 MB) that was requested before, by 1, 8 and 64 clients with persistent connections: as fast as possible, and
+//!   at a constant 320 requests per second over all clients. The floor is a thread for each connection that sends the same bytes.
+//! * A new patch of 256 x 256 samples 2 cm apart, compared with the same kernel in this process.
 //! * A session of 500 map tiles from the whole planet down to the ground, over the 6 connections of a browser.
-//! * Tiles of a DEM of a release by 8 clients, beside titiler, with 2 workers, which serves the same heights as a COG on the same grid.
+//! * Tiles of a DEM of a release by 8 clients, compared with titiler, with 2 workers, which serves the same heights as a COG on the same grid.
 //! * Memory with 1000 connections.
-//! * From the end of the last client of a coarse window, which takes seconds, to the end of the work on it.
+//! * Time from the disconnection of the last client of a coarse window, which takes seconds, to the end of the work on it.
 //!
 //! Targets: 64 clients: median 2 ms, p99 10 ms; new patch: 60 ms of one core, and 5 ms beyond the kernel; session: 20 s cold, 2 s warm; 5 times
 //! the tiles of titiler; work ends 50 ms after its last client. It takes 2 minutes of two cores that do nothing else, and measures the program that was built before:
@@ -33,9 +33,9 @@ use std::time::{Duration, Instant};
 mod server;
 
 const WORLD: &str = "/v1/collections/planet";
-/// How long clients ask as fast as it goes, and at a steady rate.
+/// How long clients send requests as fast as possible, and at a constant rate.
 const SPELL: Duration = Duration::from_secs(2);
-/// Requests per second of all clients together at the steady rate.
+/// Requests per second over all clients at the constant rate.
 const STEADY: f64 = 320.0;
 /// Connections of a browser.
 const CONNECTIONS: usize = 6;
@@ -54,13 +54,13 @@ fn main() {
     stopping(folder.path());
 }
 
-/// The program that was built beside this bench.
+/// The program that was built with this bench.
 fn program() -> PathBuf {
     let own = std::env::current_exe().expect("the bench has a path");
     own.ancestors().nth(2).expect("benches lie in target/<profile>/deps").join("sastrugi")
 }
 
-/// The value below which that share of them lies.
+/// The quantile of sorted values.
 fn part(sorted: &[f64], share: f64) -> f64 {
     sorted.get(((sorted.len().max(1) - 1) as f64 * share) as usize).copied().unwrap_or(f64::NAN)
 }
@@ -74,7 +74,7 @@ fn milliseconds(since: Instant) -> f64 {
     1e3 * since.elapsed().as_secs_f64()
 }
 
-/// What clients measured.
+/// Measurements of the clients.
 struct Load {
     /// Milliseconds of all answers, sorted.
     times: Vec<f64>,
@@ -83,7 +83,7 @@ struct Load {
 }
 
 impl Load {
-    /// Clients that ask for the same bytes: as fast as it goes, or each at its turn of a steady rate, when waiting counts from that turn.
+    /// Clients that request the same bytes: as fast as possible, or at a constant rate, where times count from the scheduled start.
     fn of(address: &str, path: &str, clients: usize, steady: Option<f64>) -> Self {
         let start = Instant::now();
         let one = |client: usize| {
@@ -151,7 +151,7 @@ fn cached(folder: &Path) {
     let path = format!("{WORLD}/patch?origin=0,0&size=512,512&resolution_m=0.02&format=raw");
     assert_eq!(server.get(&path).status, 200);
     for clients in [1, 8, 64] {
-        for (way, steady) in [("as fast as it goes", None), ("320/s", Some(STEADY))] {
+        for (way, steady) in [("as fast as possible", None), ("320/s", Some(STEADY))] {
             Load::of(&floor, &path, clients, steady).print(&format!("floor 1 MB, {way}"), clients, None);
             let before = server.processor_s();
             let load = Load::of(&server.address, &path, clients, steady);
@@ -161,7 +161,7 @@ fn cached(folder: &Path) {
     }
 }
 
-/// Places that nobody asked for, beside the kernel in this process.
+/// Places that were not requested before, compared with the kernel in this process.
 fn fresh(folder: &Path) {
     let server = Server::start(folder, &["planet.toml", "--threads", "1"], &[("RAYON_NUM_THREADS", "1")]);
     let mut client = server.client().expect("it listens");
@@ -207,7 +207,7 @@ fn fresh(folder: &Path) {
     );
 }
 
-/// Addresses of the tiles that a map of 5 x 4 tiles shows on its way from everything down to the ground, with two pans at each level.
+/// Addresses of the tiles that a map of 5 x 4 tiles shows while zooming from the complete extent down to the ground, with two pans per level.
 fn walk(server: &Server) -> Vec<String> {
     let grid = server.get(WORLD).json()["tile_grid"].clone();
     let number = |value: &serde_json::Value| value.as_f64().expect("a number");
@@ -232,7 +232,7 @@ fn walk(server: &Server) -> Vec<String> {
     paths
 }
 
-/// Seconds until all paths are answered by so many clients, each asking for the next, and milliseconds of each answer.
+/// Seconds until all paths are answered to `clients` clients, each requesting the next, and milliseconds of each answer.
 fn ask_all(address: &str, paths: &[String], clients: usize) -> (f64, Vec<f64>) {
     let (next, start) = (AtomicUsize::new(0), Instant::now());
     let times = Mutex::new(vec![0.0; paths.len()]);
@@ -286,7 +286,7 @@ fn session(folder: &Path) {
         let part = format!("/planet/{level}/");
         let own: Vec<f64> =
             paths.iter().zip(&times).filter(|(path, _)| path.contains(&part)).map(|(_, t)| *t).collect();
-        // What it waited for others is theirs.
+        // Time spent waiting for others is counted there.
         line += &format!(" {level}: {:.0}", own.iter().sum::<f64>() / (own.len() * CONNECTIONS) as f64);
     }
     println!("{line}");
@@ -304,7 +304,7 @@ impl Titiler {
         let port = TcpListener::bind("127.0.0.1:0").ok()?.local_addr().ok()?.port();
         let mut command = Command::new(python);
         command.arg(script_of("server.py")).arg(file).args([port.to_string(), "4".to_owned()]);
-        // GDAL as titiler's own guide tunes it for files at hand.
+        // GDAL as tuned in titiler's guide for local files.
         command
             .env("PYTHONDONTWRITEBYTECODE", "1")
             .env("GDAL_CACHEMAX", "200")
@@ -315,7 +315,7 @@ impl Titiler {
         let start = Instant::now();
         while start.elapsed() < Duration::from_secs(60) {
             if Client::connect(&made.address).is_ok() {
-                // The second worker may still be on its way.
+                // The second worker may still be starting.
                 std::thread::sleep(Duration::from_secs(3));
                 return Some(made);
             }
@@ -327,7 +327,7 @@ impl Titiler {
 
 impl Drop for Titiler {
     fn drop(&mut self) {
-        // Its workers end with it when it is asked, not when it is killed.
+        // Its workers exit with it on SIGTERM, not on SIGKILL.
         drop(Command::new("kill").arg(self.process.id().to_string()).status());
         drop(self.process.wait());
     }
@@ -362,7 +362,7 @@ fn tiles(folder: &Path) {
         (0..4).flat_map(|z| (0..1 << z).flat_map(move |y| (0..1 << z).map(move |x| [z, y, x]))).collect();
     let titiler = Titiler::start(&file);
     if titiler.is_none() {
-        println!("titiler: not installed (benches/floors/set_up does it)");
+        println!("titiler: not installed (benches/floors/set_up installs it)");
     }
     for (layer, own, theirs) in [
         ("hillshade", "hillshade", "algorithm=hillshade&buffer=3"),
@@ -370,7 +370,7 @@ fn tiles(folder: &Path) {
     ] {
         let ours: Vec<String> =
             all.iter().map(|[z, y, x]| format!("{hills}/styles/{own}/map/tiles/load.hills/{z}/{y}/{x}")).collect();
-        // A server that has just been started, with the file read once.
+        // A new server, with the file read once.
         let server = Server::start(folder, &["release"], &[]);
         ask_all(&server.address, &[format!("{hills}/styles/relief/map/tiles/load.hills/0/0/0")], 1);
         let rate = |address: &str, paths: &[String]| paths.len() as f64 / ask_all(address, paths, 8).0;
@@ -414,7 +414,7 @@ fn memory(folder: &Path) {
         })
         .collect();
     println!(
-        "most memory: {before:.1} MB before, {with_idle:.1} MB with {} idle connections, {:.1} MB with as many that asked for a tile",
+        "peak memory: {before:.1} MB before, {with_idle:.1} MB with {} idle connections, {:.1} MB with as many that requested a tile",
         asked.len(),
         most()
     );
@@ -437,7 +437,7 @@ fn stopping(folder: &Path) {
             assert!(asked.elapsed() < Duration::from_secs(10), "the window was refused, or done at once");
             std::thread::sleep(Duration::from_millis(1));
         }
-        // Anywhere in the work.
+        // At any point of the work.
         std::thread::sleep(Duration::from_millis(5 + 37 * k % 400));
         drop(client);
         let left = Instant::now();

@@ -1,5 +1,5 @@
-//! Writing of artifacts, each beside its floor: MCAP and Parquet beside a plain write of the bytes they put on disk,
-//! GeoTIFF beside bare deflate of the same samples on one thread. Throughput counts bytes before compression.
+//! Writing of artifacts, each compared with its floor: MCAP and Parquet with a plain write of the bytes that they put on disk,
+//! GeoTIFF with bare deflate of the same samples on one thread. Throughput counts bytes before compression.
 
 use divan::Bencher;
 use divan::counter::BytesCount;

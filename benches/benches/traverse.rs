@@ -1,11 +1,11 @@
-//! The Husky over the published terrains (1009^2 cells of 5 cm), on one core, beside the floor: the height lookups of its
+//! The Husky over the published terrains (1009^2 cells of 5 cm), on one core, compared with a floor: the height lookups of its
 //! wheel rays alone.
 //!
 //! Items are time steps of 1/500 s, settling included: the real-time factor is items per second over 500. Targets: 500 000
 //! steps per second and core; 40 times the real-time factor of MuJoCo, which drives the same missions on the same terrains in
 //! the same run (`floors/traverse.py`, printed before the table with ours; its processor time is set against our elapsed
 //! time, the fastest of three, so other work on the machine only lowers the ratio). It needs the environment that
-//! `./test --full` or `tests/readers/set_up peer` makes. Run: `cargo bench -p sastrugi-benches --bench traverse`.
+//! `./test --full` or `tests/readers/set_up peer` installs. Run: `cargo bench -p sastrugi-benches --bench traverse`.
 
 use divan::counter::ItemsCount;
 use divan::{Bencher, black_box};
@@ -138,7 +138,7 @@ fn floor_heights_of_all_rays(bencher: Bencher) {
     });
 }
 
-/// Heights, culling bound included, made ready for a vehicle: once per terrain.
+/// Preparation of heights, including the culling bound, for a vehicle: once per terrain.
 #[divan::bench(sample_count = 10)]
 fn prepare_ground_1009(bencher: Bencher) {
     let course = Course::new(2.45);

@@ -1,6 +1,6 @@
-"""FFT-MA as one writes it with numpy: the floor of the bench `fft_ma`.
+"""FFT-MA written with numpy: the floor of the bench `fft_ma`.
 
-Prints the fastest of five runs in seconds: the whole field, and the field alone where its amplitudes are at hand.
+Prints the fastest of five runs in seconds: everything, and the field alone from precomputed amplitudes.
 """
 
 import sys

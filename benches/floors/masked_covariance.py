@@ -1,4 +1,4 @@
-"""Masked moving average and masked covariance as one writes them with numpy and scipy: floors of the bench `masked_covariance`.
+"""Masked moving average and masked covariance written with numpy and scipy: floors of the bench `masked_covariance`.
 
 Prints the fastest of three runs in seconds: summed-area tables (cumsum) for a window of 33 cells, and the covariance to 33 lags
 from two real transforms of data and mask, padded by the largest lag, and their inverses.

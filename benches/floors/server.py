@@ -1,7 +1,7 @@
-"""titiler as one sets it up: the floor of the bench `server`.
+"""titiler in its usual setup: the floor of the bench `server`.
 
 server.py FILE PORT LEVELS serves the tiles of a COG without a reference system, whose side is 256 pixels times a power of two, on
-a grid of its own, so that they are those of the terrain server; with 2 workers.
+the grid of the terrain server, with 2 workers.
 """
 
 import os

@@ -1,8 +1,8 @@
-"""MuJoCo on the missions of the bench `traverse`: its floor.
+"""MuJoCo on the missions of the bench `traverse`, as its floor.
 
     traverse.py HEIGHTS GIVEN.json
 
-Heights are doubles, north row first; the JSON holds their geometry, the missions (as rows of the table `missions`), and the parameters
+Heights are doubles, north row first; the JSON has their geometry, the missions (as rows of the table `missions`), and the parameters
 of traverse and vehicle. Prints simulated seconds, settling included, over processor seconds, and time steps
 over processor seconds. The vehicle is that of `tests/peer`.
 """

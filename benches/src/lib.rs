@@ -1,10 +1,10 @@
-//! What benches share: floors that other programs set in the same run.
+//! Shared by the benches: floors measured with other programs in the same run.
 
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Figures that a script of `floors/` prints, measured in a process of its own with one thread; `None` where Python lacks
-/// what it needs. The checkout's own Python is used where `./test` has made one.
+/// Numbers printed by a script of `floors/`, measured in a separate process with one thread; `None` if Python lacks a package
+/// that it needs. Uses the checkout's own Python if `./test` has installed one.
 pub fn floor(script: &str, arguments: &[&str]) -> Option<Vec<f64>> {
     floor_in("readers", script, arguments)
 }
@@ -19,7 +19,7 @@ pub fn floor_in(environment: &str, script: &str, arguments: &[&str]) -> Option<V
     words.split_whitespace().map(|w| w.parse().ok()).collect()
 }
 
-/// Python of an environment of `.cache`, where it was made.
+/// Python of an environment of `.cache`, if it is installed.
 pub fn python(environment: &str) -> Option<PathBuf> {
     let own = Path::new(env!("CARGO_MANIFEST_DIR")).join("../.cache").join(environment).join("bin/python");
     own.exists().then_some(own)

@@ -1,4 +1,4 @@
-//! Hashes the sources of every room, so that a stage's cache key changes when, and only when, code that it uses does.
+//! Hashes the sources of every room, so that a stage's cache key changes if and only if code that it uses changes.
 
 use std::fs;
 use std::path::{Path, PathBuf};

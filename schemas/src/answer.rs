@@ -1,21 +1,21 @@
-//! The three answers of a comparison.
+//! The three verdicts of a comparison.
 
 use serde::Serialize;
 
-/// An answer about one quantity, or about all of them.
+/// The verdict on one quantity, or on all of them.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Answer {
     /// Equivalent within the bounds.
     Same,
-    /// Not equal, and not shown to be equivalent.
+    /// Significantly different, and not shown to be equivalent.
     Different,
-    /// The data rules out neither.
+    /// The data can rule out neither.
     CannotTell,
 }
 
 impl Answer {
-    /// In words.
+    /// Name.
     pub fn name(self) -> &'static str {
         match self {
             Self::Same => "same",

@@ -1,58 +1,58 @@
-//! How one DEM was co-registered to another before their difference was taken.
+//! The co-registration of one DEM to another before they are subtracted.
 
 use serde::{Deserialize, Serialize};
 
-/// The DEM that was subtracted, and how it was co-registered to the other.
+/// The subtracted DEM and its co-registration.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Minus {
     /// File name without its folder.
     pub file: String,
     /// SHA-256 of the file.
     pub sha256: String,
-    /// How it was moved.
+    /// Its co-registration.
     pub coregistration: Coregistration,
 }
 
-/// How B was moved to lie on A, and what that did to `A - B`. NMAD is 1.4826 times the median absolute deviation from the median.
+/// The co-registration of B to A, and `A - B` before and after. NMAD is 1.4826 times the median absolute deviation from the median.
 ///
-/// Files of version 0.1.0 have neither medians but the first, nor standard errors, `shift_p` and `gained`.
+/// Files of version 0.1.0 lack the medians except the first, the standard errors, `shift_p` and `gained`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Coregistration {
-    /// B was moved this far east and north, m; absent where the ground has no slopes in two directions to find a shift by.
+    /// Shift of B east and north, m; absent if the ground lacks slopes in two directions from which a shift could be estimated.
     pub shift_m: Option<[f64; 2]>,
-    /// B was raised by this at the centre of A, m. Without stable terrain it holds the median snow depth.
+    /// Raise of B at the centre of A, m. Without stable terrain it includes the median snow depth.
     pub raise_m: f64,
-    /// B was tilted by this eastwards and northwards about the centre of A, m/m.
+    /// Tilt of B eastwards and northwards about the centre of A, m/m.
     pub tilt: [f64; 2],
-    /// Standard errors of all these; absent where the fit did not converge or the data is too little for them.
+    /// Standard errors of shift, raise and tilt; absent if the fit did not converge or there are too few data.
     #[serde(default)]
     pub standard_errors: Option<StandardErrors>,
-    /// Probability of a shift as large as this or larger where B needs none; absent without standard errors or shift.
+    /// p-value of the shift: probability of a shift at least this large if B needs none; absent without standard errors or shift.
     #[serde(default)]
     pub shift_p: Option<f64>,
-    /// True when the shift gained something: it is significant (`shift_p` below 0.05), and from one cell on the NMAD is smaller than
-    /// with raise and tilt alone. Absent where it was not examined.
+    /// True if the shift improved the fit: it is significant (`shift_p` below 0.05) and, if it is one cell or more, the NMAD is smaller
+    /// than with raise and tilt alone. Absent if not tested.
     #[serde(default)]
     pub gained: Option<bool>,
-    /// Median of `A - B` before, m.
+    /// Median of `A - B` before co-registration, m.
     pub median_before_m: f64,
-    /// Median once B was raised and tilted where it lay, m.
+    /// Median after raise and tilt without a shift, m.
     #[serde(default)]
     pub median_plane_m: Option<f64>,
-    /// Median after all, m.
+    /// Median after co-registration, m.
     #[serde(default)]
     pub median_after_m: Option<f64>,
-    /// NMAD of `A - B` before, m.
+    /// NMAD of `A - B` before co-registration, m.
     pub nmad_before_m: f64,
-    /// NMAD once B was raised and tilted where it lay, m.
+    /// NMAD after raise and tilt without a shift, m.
     pub nmad_plane_m: f64,
-    /// NMAD after all, m.
+    /// NMAD after co-registration, m.
     pub nmad_after_m: f64,
-    /// Cells of A with data in both.
+    /// Number of cells of A with data in both DEMs.
     pub cells: u64,
-    /// Rounds of the horizontal fit.
+    /// Iterations of the horizontal fit.
     pub iterations: u32,
-    /// True when the last round moved B by less than 0.005 cells; true without a shift.
+    /// True if the last iteration moved B by less than 0.005 cells; true without a shift.
     pub converged: bool,
 }
 
@@ -65,7 +65,7 @@ pub struct StandardErrors {
     pub raise_m: f64,
     /// Of the tilt eastwards and northwards, m/m.
     pub tilt: [f64; 2],
-    /// Blocks they are from: an interval takes Student's t with one degree of freedom fewer.
+    /// Number of blocks: intervals use Student's t with one degree of freedom fewer.
     pub blocks: u32,
 }
 
@@ -73,7 +73,7 @@ pub struct StandardErrors {
 mod tests {
     use super::*;
 
-    /// What version 0.1.0 wrote is read, and what it did not know is absent.
+    /// Files of version 0.1.0 are read; what they lack is absent.
     #[test]
     fn val_an_older_record_is_read() {
         let text = r#"{"shift_m": [0.07, -0.04], "raise_m": -3.0, "tilt": [0.0, 1e-3], "median_before_m": 3.1, "nmad_before_m": 0.2,

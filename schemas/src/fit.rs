@@ -1,23 +1,23 @@
-//! The fit file (JSON): what `fit` writes and `texture` reads.
+//! The fit file (JSON), written by `fit` and read by `texture`.
 
 use crate::coregistration::Minus;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 
-/// A covariance fit. `texture` needs only `model` and `parameters`; everything else may be absent.
+/// A covariance fit. `texture` requires only `model` and `parameters`; everything else may be absent.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct FitFile {
     /// `corrected` or `paper`; empty for a hand-written file.
     pub mode: String,
-    /// Covariance model, as `exponential`.
+    /// Covariance model, such as `exponential`.
     pub model: String,
     /// Model parameters by name and unit: `sigma_m`, `range_m`, `nugget_m2` ...
     pub parameters: BTreeMap<String, f64>,
     /// True window of the moving average, east-west and north-south, m.
     pub window_m: Option<[f64; 2]>,
-    /// What was trimmed.
+    /// Trimming.
     pub trim: Option<Trim>,
     /// Cell size east-west and north-south, m.
     pub cell_m: Option<[f64; 2]>,
@@ -27,62 +27,62 @@ pub struct FitFile {
     pub covariance_m2: Vec<f64>,
     /// Pairs in each bin.
     pub pairs: Vec<u64>,
-    /// Fitted model in each bin as the estimator sees it, m2.
+    /// Fitted model in each bin including the bias of detrending and trimming, comparable with the empirical covariance, m2.
     pub model_m2: Vec<f64>,
     /// Fitted model in each bin before detrending and trimming, m2.
     pub surface_model_m2: Vec<f64>,
-    /// What was found about the fit.
+    /// Diagnostics.
     pub diagnostics: Diagnostics,
-    /// 95 % intervals by parametric bootstrap; absent when none were asked for.
+    /// 95 % intervals by parametric bootstrap; absent if not requested.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub intervals: Option<Intervals>,
-    /// The same by block bootstrap, where the DEM has enough blocks.
+    /// The same by block bootstrap, if the DEM has enough blocks.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block_intervals: Option<Intervals>,
-    /// The measured covariance by lag, where `model` is `empirical`.
+    /// The measured covariance by lag, if `model` is `empirical`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub map: Option<CovarianceMap>,
-    /// What of the residual a texture from this fit has.
+    /// Shares of the residual that a texture from this fit reproduces.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub carried: Option<Carried>,
-    /// Every model tried, the best first.
+    /// All candidate models, the best first.
     pub candidates: Vec<Candidate>,
-    /// How the likelihood falls away from the fitted range.
+    /// Profile likelihood along the range.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub profile: Option<Profile>,
     /// Covariance by direction.
     pub directions: Vec<DirectionBin>,
-    /// Heights of the residual at equally spaced probabilities from 0 to 1, m.
+    /// Quantiles of the residual at equally spaced probabilities from 0 to 1, m.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub height_quantiles_m: Vec<f64>,
-    /// The model as GSTools' classes take it.
+    /// The model as arguments of GSTools' classes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gstools: Option<GsTools>,
-    /// One sentence or two: what describes the surface at this scale, what may be published, what a texture from the fit is good for.
+    /// The verdict, in one or two sentences: what describes the surface at this scale, what may be published, what a texture from the fit can be used for.
     #[serde(skip_serializing_if = "String::is_empty")]
     pub verdict: String,
-    /// What speaks against the fit, the most consequential first.
+    /// Warnings about the fit, the most important first.
     pub warnings: Vec<String>,
-    /// Every parameter of the fit, as a study states them; absent in a hand-written file.
+    /// All parameters of the fit, as in a study; absent in a hand-written file.
     #[serde(skip_serializing_if = "Value::is_null")]
     pub settings: Value,
-    /// Where the DEM came from.
+    /// Origin of the DEM.
     pub source: Option<Source>,
 }
 
 impl FitFile {
-    /// Level of the tests from which on parametric intervals are not to be trusted.
+    /// Level of the tests below which parametric intervals are not trusted.
     const TEST_LEVEL: f64 = 0.01;
-    /// Root mean square misfit of the bins, over the variance, from which on the model is wrong whatever the test says.
+    /// RMS misfit of the bins over the variance, above which the model is rejected regardless of the test.
     const MISFIT_MAX: f64 = 0.05;
 
-    /// The intervals to quote, and what they are: those by blocks where the model misfits or the site is not stationary, and there are any.
+    /// The intervals to quote, and their kind: those by block bootstrap, if available and the model misfits or the site is not stationary.
     pub fn quoted_intervals(&self) -> Option<(&Intervals, &'static str)> {
         let blocks = self.block_intervals.as_ref();
         match (&self.intervals, blocks) {
-            (Some(_), Some(blocks)) if self.misfits() => Some((blocks, "block bootstrap, as the model misfits")),
+            (Some(_), Some(blocks)) if self.misfits() => Some((blocks, "block bootstrap, because the model misfits")),
             (Some(_), Some(blocks)) if Self::rejects(self.diagnostics.stationarity_p) => {
-                Some((blocks, "block bootstrap, as the site is not stationary"))
+                Some((blocks, "block bootstrap, because the site is not stationary"))
             }
             (Some(own), _) if own.from_profile => Some((own, "profile likelihood")),
             (Some(own), _) => Some((own, "parametric bootstrap")),
@@ -91,7 +91,7 @@ impl FitFile {
         }
     }
 
-    /// Whether the model is not that of the data.
+    /// Whether the model misfits the data.
     fn misfits(&self) -> bool {
         let variance_m2 = self.covariance_m2.first().copied().unwrap_or(f64::NAN);
         let misfit_m2 = self.diagnostics.misfit_m2.unwrap_or(f64::NAN);
@@ -102,7 +102,7 @@ impl FitFile {
         p.is_some_and(|p| p <= Self::TEST_LEVEL)
     }
 
-    /// A parameter, or `sigma2_over_range_m` (sigma^2 / b, m) of a model that has it; `None` where the fit has none.
+    /// A parameter, or `sigma2_over_range_m` (sigma^2 / b, m) for models that have it; `None` if the fit lacks it.
     pub fn parameter(&self, name: &str) -> Option<f64> {
         match name {
             SILL_OVER_RANGE => self.diagnostics.sigma2_over_range_m,
@@ -110,7 +110,18 @@ impl FitFile {
         }
     }
 
-    /// A parameter as it is to be quoted, with the interval of [`Self::quoted_intervals`]; `None` where the fit has none.
+    /// A parameter as it should be quoted, with the interval of [`Self::quoted_intervals`]; `None` if the fit lacks it.
+    ///
+    /// ```
+    /// use sastrugi_schemas::fit::{FitFile, Quoted};
+    ///
+    /// let text = r#"{"model": "exponential", "parameters": {"sigma_m": 0.03, "range_m": 0.28},
+    ///     "intervals": {"level": 0.95, "replicates": 99, "range_m": [0.25, 0.33]}}"#;
+    /// let fit: FitFile = serde_json::from_str(text).unwrap();
+    /// let interval = Some([Some(0.25), Some(0.33)]);
+    /// assert_eq!(fit.quoted("range_m"), Some(Quoted::Estimate { value: 0.28, interval }));
+    /// assert_eq!(fit.quoted("nugget_m2"), None);
+    /// ```
     pub fn quoted(&self, name: &str) -> Option<Quoted> {
         let value = self.parameter(name)?;
         let interval = self.quoted_intervals().and_then(|(intervals, _)| intervals.values.get(name).copied());
@@ -122,13 +133,13 @@ impl FitFile {
         })
     }
 
-    /// Whether the search for the range ended at its bound: then range and sigma are no estimates, only their lower limits are known.
+    /// Whether the search for the range ended at its bound: range and sigma are then not estimates, only their lower limits are known.
     pub fn range_at_bound(&self) -> bool {
         self.diagnostics.range_at_search_bound
     }
 }
 
-/// What was found about a fit. A figure is absent where it was not looked for, or is undefined.
+/// Diagnostics of a fit. A value is absent if it was not computed or is undefined.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Diagnostics {
@@ -138,13 +149,13 @@ pub struct Diagnostics {
     /// Largest over smallest sigma of the blocks of the DEM.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub block_sigma_max_over_min: Option<f64>,
-    /// Rise of the sum of squares at three times the range, over the misfit that there is.
+    /// Rise of the sum of squares at three times the range, over the misfit of the fit.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub chi2_rise_at_3b: Option<f64>,
-    /// Shortest lag at which the texture can be distinguished from the noise, m; absent where it cannot at any lag.
+    /// Shortest lag at which the texture can be distinguished from the noise, m; absent if there is none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub effective_resolution_m: Option<f64>,
-    /// Hurst exponent of the self-affine model, where fits at other windows disagree.
+    /// Hurst exponent of the self-affine model, if fits at other windows disagree.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hurst: Option<f64>,
     /// Its root mean square increment over 1 m, m.
@@ -165,7 +176,7 @@ pub struct Diagnostics {
     /// Longest lag of the bins, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lag_max_m: Option<f64>,
-    /// Least share of cells with data that a window needs.
+    /// Minimum share of cells with data in a window.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub min_valid_share: Option<f64>,
     /// Generalised sum of squares per degree of freedom.
@@ -180,7 +191,7 @@ pub struct Diagnostics {
     /// Range of the fit without correction for detrending and trimming, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub naive_range_m: Option<f64>,
-    /// Naive range, in windows.
+    /// Naive range over the window.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub naive_range_windows: Option<f64>,
     /// Standard deviation of the fit without correction, m.
@@ -189,10 +200,10 @@ pub struct Diagnostics {
     /// Share of cells without data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub no_data_share: Option<f64>,
-    /// P-value of the test of normal heights.
+    /// P-value of the test of normally distributed heights.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub normality_p: Option<f64>,
-    /// Share of cells taken for objects.
+    /// Share of cells rejected as objects.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub object_share: Option<f64>,
     /// Fits at half and twice the outer scale.
@@ -219,17 +230,17 @@ pub struct Diagnostics {
     /// Largest disagreement of fits at other windows, standard errors.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window_disagreement_z: Option<f64>,
-    /// Share of cells whose window holds too few data.
+    /// Share of cells whose window contains too few data.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub window_lacks_data_share: Option<f64>,
 }
 
-/// `null` as the default: files may be written by hand, or by programs that know no other absence.
+/// Reads `null` as the default: files may be written by hand, or by programs that cannot omit a key.
 fn or_default<'de, T: Default + Deserialize<'de>, D: Deserializer<'de>>(value: D) -> Result<T, D::Error> {
     Ok(Option::deserialize(value)?.unwrap_or_default())
 }
 
-/// A count, also as the float that other programs write.
+/// A count, also if written as a float.
 fn whole<'de, D: Deserializer<'de>>(value: D) -> Result<Option<u64>, D::Error> {
     Ok(Option::<f64>::deserialize(value)?.map(|count| count as u64))
 }
@@ -248,24 +259,24 @@ pub struct OtherWindow {
     pub parameters: BTreeMap<String, Option<f64>>,
     /// Generalised sum of squares per degree of freedom.
     pub misfit_chi2_per_freedom: Option<f64>,
-    /// Root mean square height of the residual, on the cells that all windows have, m.
+    /// Root mean square height of the residual on the cells common to all windows, m.
     pub band_rms_m: Option<f64>,
 }
 
-/// Name of sigma^2 / b among intervals.
+/// Name of sigma^2 / b in intervals.
 pub const SILL_OVER_RANGE: &str = "sigma2_over_range_m";
 
-/// How a parameter of a fit is quoted.
+/// A quoted parameter of a fit.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Quoted {
-    /// An estimate with its interval, where there is one; an end is `None` where the data knows none.
+    /// An estimate with its interval, if any; an end is `None` if the interval is open there.
     Estimate {
         /// The estimate.
         value: f64,
         /// Lower and upper end.
         interval: Option<[Option<f64>; 2]>,
     },
-    /// The search for the range ended at its bound: the lower end of the interval is all that is known.
+    /// The search for the range ended at its bound: only the lower end of the interval is known.
     AtLeast(f64),
     /// The search ended at its bound, and the interval has no lower end.
     NotIdentified {
@@ -274,29 +285,29 @@ pub enum Quoted {
     },
 }
 
-/// Measured covariance by lag, of a fit whose `model` is `empirical`; its lags are in cells of `cell_m`.
+/// Measured covariance by lag, for a fit with `model` `empirical`; lags are in cells of `cell_m`.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct CovarianceMap {
-    /// What it is of: `residual` (heights less their background over `window_m`, before trimming) or `surface`.
+    /// What it describes: `residual` (heights minus their background over `window_m`, before trimming) or `surface`.
     pub base: String,
-    /// Covariance model, with the file's `parameters`, that continues it at wavelengths which the background has taken away.
+    /// Covariance model, with the file's `parameters`, that extends it to wavelengths removed with the background.
     pub model: String,
-    /// Largest lag, cells north-south and east-west.
+    /// Largest lag north-south and east-west, cells.
     pub max_lag: [usize; 2],
     /// Covariance in m2 at lags of 0 to `max_lag[0]` rows southwards (outer) and -`max_lag[1]` to `max_lag[1]` columns eastwards (inner).
     pub covariance_m2: Vec<f64>,
 }
 
-/// What of the measured residual a texture has that is detrended and trimmed as the DEM was, on average.
+/// Expected shares of the measured residual in a texture that is detrended and trimmed like the DEM.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Carried {
-    /// Its root mean square over the residual's, both trimmed.
+    /// RMS of the texture over that of the residual, both trimmed.
     pub rms_share: f64,
     /// The square of that.
     pub variance_share: f64,
-    /// The same as `rms_share` before trimming: tails included.
+    /// As `rms_share`, but before trimming, so including the tails.
     pub untrimmed_rms_share: f64,
-    /// Mean square of increments over those of the residual, by octave of lag.
+    /// Mean square increments over those of the residual, by octave of lag.
     pub increments: Vec<CarriedOctave>,
 }
 
@@ -314,33 +325,33 @@ pub struct CarriedOctave {
 /// Trimming of residuals.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Trim {
-    /// Two-sided significance level in (0, 0.5); 0 when nothing was trimmed.
+    /// Two-sided significance level in (0, 0.5); 0 if nothing was trimmed.
     pub level: f64,
     /// Residuals beyond this absolute value were dropped, m.
     pub threshold_m: f64,
-    /// Share of the DEM's cells that did not enter the covariance (no data, border, objects, trimmed).
+    /// Share of the DEM's cells excluded from the covariance (no data, border, objects, trimmed).
     pub masked_share: f64,
 }
 
-/// The DEM a fit was made from.
+/// The DEM of a fit.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Source {
     /// File name without its folder.
     pub file: String,
     /// SHA-256 of the file.
     pub sha256: String,
-    /// Window of the DEM `[x0, y0, x1, y1]` in its own coordinates, when one was asked for.
+    /// Window of the DEM `[x0, y0, x1, y1]` in its own coordinates, if given.
     pub window: Option<[f64; 4]>,
-    /// Files that said which cells take part.
+    /// Mask files.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub masks: Vec<MaskSource>,
-    /// Share of the window's cells with data that the masks dropped.
+    /// Share of the window's cells with data that the masks excluded.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub masked_share: Option<f64>,
-    /// The smooth part of the DEM that its noise was found from, when one was given.
+    /// The smooth part of the DEM from which its noise was estimated, if given.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_reference: Option<NoiseReference>,
-    /// The DEM that was subtracted, when one was, and how it was co-registered to this one.
+    /// The subtracted DEM, if any, and its co-registration.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minus: Option<Minus>,
 }
@@ -352,11 +363,11 @@ pub struct MaskSource {
     pub file: String,
     /// SHA-256 of the file.
     pub sha256: String,
-    /// True when what it marks was dropped, false when the rest was.
+    /// True if the marked cells were excluded, false if only they were used.
     pub excludes: bool,
 }
 
-/// A smooth part of a DEM, and the noise found there.
+/// A smooth part of a DEM, and the noise estimated there.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct NoiseReference {
     /// File name without its folder.
@@ -365,37 +376,37 @@ pub struct NoiseReference {
     pub sha256: String,
     /// Standard deviation of the white noise of a cell, m.
     pub sigma_m: f64,
-    /// Standard deviation of noise that neighbouring cells share, m; 0 where none was found.
+    /// Standard deviation of spatially correlated noise, m; 0 if none was found.
     #[serde(default)]
     pub correlated_sigma_m: f64,
-    /// Lag at which that noise has a correlation of 1/e, m; 0 where none was found.
+    /// Lag at which the correlation of that noise falls to 1/e, m; 0 if none was found.
     #[serde(default)]
     pub correlated_range_m: f64,
-    /// Longest separation looked at, m, where the reference has relief, or noise correlated further than it is wide, so that only white
-    /// noise was taken.
+    /// Longest separation examined, m, if the reference has relief, or noise correlated over more than its width, so that only white
+    /// noise was estimated.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub unresolved_to_m: Option<f64>,
-    /// Second differences it was found from.
+    /// Number of second differences used.
     pub differences: u64,
 }
 
 /// Intervals of a fit's parameters.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Intervals {
-    /// Level, as 0.95.
+    /// Level, such as 0.95.
     pub level: f64,
     /// Number of replicates.
     pub replicates: u32,
-    /// True when `sigma_m` and `range_m` are by profile likelihood: it is open at an end, or replicates cannot tell the range
-    /// from the end of the search.
+    /// True if `sigma_m` and `range_m` are by profile likelihood, because it is open at an end, or replicates cannot distinguish the
+    /// range from the bound of the search.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub from_profile: bool,
-    /// Lower and upper end by the parameter's name; `null` where the data knows no end.
+    /// Lower and upper end by the parameter's name; `null` for an open end.
     #[serde(flatten)]
     pub values: BTreeMap<String, [Option<f64>; 2]>,
 }
 
-/// A model that was tried.
+/// A candidate model.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Candidate {
     /// Covariance model.
@@ -404,21 +415,21 @@ pub struct Candidate {
     pub parameters: BTreeMap<String, f64>,
     /// Number of free parameters.
     pub free: u32,
-    /// Generalised sum of squares; absent when its weights could not be made.
+    /// Generalised sum of squares; absent if its weights could not be computed.
     pub chi2: Option<f64>,
-    /// Akaike's corrected criterion above the least of all candidates.
+    /// Akaike's corrected criterion (AICc) minus the smallest of all candidates.
     pub aicc_above_best: Option<f64>,
-    /// The model in each bin as the estimator sees it, m2, as `model_m2` of the fit.
+    /// The model in each bin, like `model_m2` of the fit, m2.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub model_m2: Vec<f64>,
 }
 
-/// The generalised sum of squares along the range, everything else fitted anew.
+/// The generalised sum of squares along the range, with all other parameters refitted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Profile {
-    /// Range held, m.
+    /// Fixed range, m.
     pub range_m: Vec<f64>,
-    /// Rise above the minimum; 3.84 is the edge of a 95 % interval.
+    /// Rise above the minimum; 3.84 is the limit of a 95 % interval.
     pub chi2_rise: Vec<f64>,
 }
 
@@ -433,11 +444,11 @@ pub struct DirectionBin {
     pub covariance_m2: f64,
     /// Number of pairs.
     pub pairs: u64,
-    /// Fitted model as the estimator sees it, m2.
+    /// Fitted model including the bias of detrending and trimming, m2.
     pub model_m2: f64,
 }
 
-/// A covariance model in the words of GSTools: `getattr(gstools, model)(dim=2, var=var, ...)`.
+/// A covariance model as arguments of GSTools: `getattr(gstools, model)(dim=2, var=var, ...)`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct GsTools {
     /// Class.
@@ -461,7 +472,7 @@ pub struct GsTools {
 mod tests {
     use super::*;
 
-    /// Absent, null, floats for counts, keys that are not known: none of it keeps a file from being read.
+    /// Files with absent keys, nulls, counts as floats, and unknown keys can be read.
     #[test]
     fn val_diagnostics_of_other_programs_are_read() {
         let text = r#"{ "model": "exponential", "parameters": { "sigma_m": 1.0 }, "diagnostics": { "iterations": 12.0, "misfit_p": null,
@@ -474,13 +485,62 @@ mod tests {
         assert_eq!(again, found);
     }
 
+    /// Which intervals are quoted: those by blocks where the model or the site is rejected, at the level and beyond.
+    #[test]
+    fn val_intervals_to_quote() {
+        let open = [None, None];
+        let kind = |fit: &FitFile| fit.quoted_intervals().map(|(_, kind)| kind.split(',').next().unwrap_or_default());
+        let fit = FitFile { intervals: intervals(open, false), ..FitFile::default() };
+        assert_eq!(kind(&FitFile::default()), None);
+        assert_eq!(kind(&fit), Some("parametric bootstrap"));
+        assert_eq!(
+            kind(&FitFile { intervals: intervals(open, true), ..FitFile::default() }),
+            Some("profile likelihood")
+        );
+        let blocks = FitFile { block_intervals: intervals(open, false), ..FitFile::default() };
+        assert_eq!(kind(&blocks), Some("block bootstrap"));
+        let both = FitFile { block_intervals: intervals(open, false), covariance_m2: vec![2.0, 1.0], ..fit.clone() };
+        let with = |diagnostics: Diagnostics| FitFile { diagnostics, ..both.clone() };
+        let plain = Diagnostics::default;
+        // The level of the tests is 0.01; a misfit counts from 5 % of the variance.
+        for (diagnostics, by_blocks) in [
+            (plain(), false),
+            (Diagnostics { misfit_p: Some(0.01), ..plain() }, true),
+            (Diagnostics { misfit_p: Some(0.011), ..plain() }, false),
+            (Diagnostics { stationarity_p: Some(0.01), ..plain() }, true),
+            (Diagnostics { stationarity_p: Some(0.011), ..plain() }, false),
+            (Diagnostics { misfit_m2: Some(0.11), ..plain() }, true),
+            (Diagnostics { misfit_m2: Some(0.09), ..plain() }, false),
+        ] {
+            let expected = if by_blocks { "block bootstrap" } else { "parametric bootstrap" };
+            assert_eq!(kind(&with(diagnostics.clone())), Some(expected), "{diagnostics:?}");
+            // Without blocks there is no choice.
+            let alone = FitFile { block_intervals: None, ..with(diagnostics) };
+            assert_eq!(kind(&alone), Some("parametric bootstrap"));
+        }
+    }
+
+    /// A hand-written file needs a model and its parameters; what is absent stays absent when it is written.
+    #[test]
+    fn val_a_hand_written_fit() {
+        let text = r#"{"model": "exponential", "parameters": {"sigma_m": 0.03, "range_m": 0.28}}"#;
+        let fit: FitFile = serde_json::from_str(text).unwrap();
+        assert_eq!(["sigma_m", "nugget_m2", SILL_OVER_RANGE].map(|name| fit.parameter(name)), [Some(0.03), None, None]);
+        assert_eq!(fit.quoted("range_m"), Some(Quoted::Estimate { value: 0.28, interval: None }));
+        let written = serde_json::to_value(&fit).unwrap();
+        for absent in ["intervals", "block_intervals", "map", "carried", "profile", "verdict", "settings"] {
+            assert!(written.get(absent).is_none(), "{absent}");
+        }
+        assert_eq!(serde_json::from_value::<FitFile>(written).unwrap(), fit);
+    }
+
     fn intervals(range: [Option<f64>; 2], from_profile: bool) -> Option<Intervals> {
         let values = [("range_m".to_owned(), range), (SILL_OVER_RANGE.to_owned(), [Some(0.001), Some(0.002)])].into();
         Some(Intervals { level: 0.95, replicates: 99, from_profile, values })
     }
 
-    /// At the bound of the search the lower end of the quoted interval is all that is quoted: the profile's, unless the model
-    /// misfits and there are blocks.
+    /// At the bound of the search only the lower end of the interval is quoted: that of the profile, unless the model misfits and
+    /// there are blocks.
     #[test]
     fn val_a_range_at_the_bound_is_quoted_as_a_limit() {
         let fit = FitFile {

@@ -1,5 +1,4 @@
-//! Kinds (generators, models, vehicles, methods): how a registry describes an entry, and how an entry refuses its
-//! parameters.
+//! Kinds (generators, models, vehicles, methods): entries of registries, and errors in their parameters.
 
 use schemars::JsonSchema;
 use serde::Serialize;
@@ -9,7 +8,7 @@ use serde_json::Value;
 /// One entry of a registry.
 #[derive(Clone, Debug, Serialize)]
 pub struct Kind {
-    /// The room's word for what it is: `terrain`, `texture`, `vehicle`, `fit` ...
+    /// Family: `terrain`, `texture`, `vehicle`, `fit` ...
     pub family: &'static str,
     /// Name in `kind = "..."`.
     pub kind: &'static str,
@@ -22,24 +21,33 @@ pub struct Kind {
 }
 
 impl Kind {
-    /// Values of the parameters as a whole, nested as they are: of a vehicle or a surface.
+    /// Values of all parameters, nested; for vehicles and surfaces.
     pub fn values(&self) -> Option<&Value> {
         self.parameters.get("default")
     }
 
-    /// Source of each of these values, nested as they are.
+    /// Source of each of these values, nested likewise.
     pub fn sources(&self) -> Option<&Value> {
         self.parameters.get("x-sources")
     }
 }
 
-/// A parameter that was refused.
+/// An invalid parameter.
+///
+/// ```
+/// use sastrugi_schemas::ParameterError;
+///
+/// let error = ParameterError::positive("cell_m", -0.1).unwrap_err();
+/// assert_eq!(error.to_string(), "`cell_m` is -0.1; it must be a finite number above 0");
+/// // Seen from the table that contains the parameter:
+/// assert_eq!(error.within("grid").key, "grid.cell_m");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}{message}", if key.is_empty() { String::new() } else { format!("`{key}` ") })]
 pub struct ParameterError {
     /// Dotted path of the parameter below its item (`layers.2.fractal_dimension`); empty for the item as a whole.
     pub key: String,
-    /// What is wrong, with the value, and what would be right.
+    /// The problem, with the value, and what would be valid.
     pub message: String,
 }
 
@@ -49,12 +57,12 @@ impl ParameterError {
         Self { key: key.into(), message: message.into() }
     }
 
-    /// The last word of the key.
+    /// The last segment of the key.
     fn name(&self) -> &str {
         self.key.rsplit('.').next().unwrap_or_default()
     }
 
-    /// True when it says that a required key is not there.
+    /// True if it reports this required key as missing.
     pub fn is_missing(&self, key: &str) -> bool {
         self.message == format!("missing field `{key}`")
     }
@@ -65,7 +73,7 @@ impl ParameterError {
         Self { key, ..self }
     }
 
-    /// `Ok` when the value is finite and above zero.
+    /// `Ok` if the value is finite and above zero.
     pub fn positive(key: &str, value: f64) -> Result<f64, Self> {
         if value.is_finite() && value > 0.0 {
             Ok(value)
@@ -74,7 +82,7 @@ impl ParameterError {
         }
     }
 
-    /// `Ok` when the value is finite and not negative.
+    /// `Ok` if the value is finite and not negative.
     pub fn not_negative(key: &str, value: f64) -> Result<f64, Self> {
         if value.is_finite() && value >= 0.0 {
             Ok(value)
@@ -83,7 +91,7 @@ impl ParameterError {
         }
     }
 
-    /// `Ok` when the value lies between the bounds, which are excluded.
+    /// `Ok` if the value lies strictly between the bounds.
     pub fn between(key: &str, value: f64, low: f64, high: f64) -> Result<f64, Self> {
         if value > low && value < high {
             Ok(value)
@@ -93,7 +101,7 @@ impl ParameterError {
     }
 }
 
-/// A number for a message: as a person writes it, with an exponent where it would be hundreds of digits.
+/// A number for a message, with an exponent if it would otherwise be very long.
 pub fn shown(value: f64) -> String {
     let size = value.abs();
     if size.is_finite() && size != 0.0 && !(1e-9..1e15).contains(&size) {
@@ -108,10 +116,24 @@ pub fn schema_of<T: JsonSchema>() -> Value {
     schemars::schema_for!(T).to_value()
 }
 
-/// Reads raw parameters from JSON (the form every study item and `--set` is brought to).
+/// Reads raw parameters from JSON, to which study items and `--set` are converted.
 ///
 /// # Errors
-/// A [`ParameterError`] that names the key that does not fit.
+/// A [`ParameterError`] that names the invalid key.
+///
+/// # Examples
+/// ```
+/// use sastrugi_schemas::kind::read_parameters;
+/// use sastrugi_schemas::study::RoughnessSection;
+/// use serde_json::json;
+///
+/// // What is not given has its default.
+/// let section: RoughnessSection = read_parameters(&json!({ "low_max": 0.2 })).unwrap();
+/// assert_eq!((section.low_max, section.border_m), (0.2, 5.0));
+///
+/// let error = read_parameters::<RoughnessSection>(&json!({ "low_max": "smooth" })).unwrap_err();
+/// assert_eq!(error.key, "low_max");
+/// ```
 pub fn read_parameters<T: DeserializeOwned>(value: &Value) -> Result<T, ParameterError> {
     serde_path_to_error::deserialize(value).map_err(|e| {
         let key = dotted(e.path());
@@ -119,10 +141,22 @@ pub fn read_parameters<T: DeserializeOwned>(value: &Value) -> Result<T, Paramete
     })
 }
 
-/// Reads parameters as [`read_parameters`] does, with every value of the wrong type refused and not the first alone.
+/// As [`read_parameters`], but reports every value of the wrong type, not only the first.
 ///
 /// # Errors
-/// The keys that do not fit, at least one.
+/// The invalid keys, at least one.
+///
+/// # Examples
+/// ```
+/// use sastrugi_schemas::kind::read_all;
+/// use sastrugi_schemas::study::RoughnessSection;
+/// use serde_json::json;
+///
+/// let errors = read_all::<RoughnessSection>(json!({ "low_max": "smooth", "border_m": [1.0] })).unwrap_err();
+/// let mut keys: Vec<&str> = errors.iter().map(|error| error.key.as_str()).collect();
+/// keys.sort();
+/// assert_eq!(keys, ["border_m", "low_max"]);
+/// ```
 pub fn read_all<T: DeserializeOwned>(mut value: Value) -> Result<T, Vec<ParameterError>> {
     let mut refused = Vec::new();
     loop {
@@ -130,11 +164,11 @@ pub fn read_all<T: DeserializeOwned>(mut value: Value) -> Result<T, Vec<Paramete
             Ok(read) if refused.is_empty() => return Ok(read),
             Ok(_) => return Err(refused),
             Err(error) => {
-                // Other elements of a list would move to other positions: the list goes as a whole.
+                // Removing one element would move the others to other positions, so the whole list is removed.
                 let words = error.key.split('.').filter(|word| !word.is_empty());
                 let path: Vec<String> =
                     words.take_while(|word| word.parse::<usize>().is_err()).map(str::to_owned).collect();
-                // A required key that was taken out for its type is not missing.
+                // A required key that was removed because of its type is not missing.
                 let known = refused.iter().any(|e: &ParameterError| error.is_missing(e.name()));
                 if !known {
                     refused.push(error);
@@ -147,14 +181,14 @@ pub fn read_all<T: DeserializeOwned>(mut value: Value) -> Result<T, Vec<Paramete
     }
 }
 
-/// Takes out what lies at a path of names; false when nothing lies there.
+/// Removes the value at a path; false if there is none.
 pub fn remove(value: &mut Value, path: &[String]) -> bool {
     let Some((last, parents)) = path.split_last() else { return false };
     let parent = parents.iter().try_fold(value, |at, word| below(at, word));
     parent.and_then(Value::as_object_mut).is_some_and(|map| map.remove(last).is_some())
 }
 
-/// What a table has under a key, or a list at a position.
+/// The value of a table at a key, or of a list at a position.
 fn below<'a>(value: &'a mut Value, word: &str) -> Option<&'a mut Value> {
     match value {
         Value::Object(map) => map.get_mut(word),
@@ -163,7 +197,7 @@ fn below<'a>(value: &'a mut Value, word: &str) -> Option<&'a mut Value> {
     }
 }
 
-/// The path with a dot before every name and index, as the keys of a study are written.
+/// The path in dotted form, as keys of a study are written.
 fn dotted(path: &serde_path_to_error::Path) -> String {
     use serde_path_to_error::Segment;
     let step = |segment: &Segment| match segment {
@@ -206,11 +240,11 @@ mod tests {
     }
 
     #[test]
-    fn val_all_wrong_values_are_told() {
+    fn val_all_invalid_values_are_reported() {
         let keys = |value: Value| -> Vec<String> {
             let mut keys: Vec<String> =
                 read_all::<Item>(value).err().unwrap_or_default().into_iter().map(|e| e.key).collect();
-            // JSON objects keep their order or sort their keys, by a feature of serde_json that other crates choose.
+            // Whether JSON objects keep their order or sort their keys depends on a feature of serde_json that other crates select.
             keys.sort();
             keys
         };
@@ -219,6 +253,50 @@ mod tests {
         assert_eq!(keys(json!({"id": 5, "count": "x"})), ["count", "id"]);
         assert_eq!(keys(json!({"count": 1})), [""]);
         assert_eq!(keys(json!([])), [""]);
+    }
+
+    /// At the bound, beside it, and without a number.
+    #[test]
+    fn val_bounds_of_parameters() {
+        assert_eq!(ParameterError::positive("a", f64::MIN_POSITIVE), Ok(f64::MIN_POSITIVE));
+        assert_eq!(ParameterError::not_negative("a", 0.0), Ok(0.0));
+        assert_eq!(ParameterError::between("a", 0.5, 0.0, 1.0), Ok(0.5));
+        let refused = |checked: Result<f64, ParameterError>| checked.unwrap_err().to_string();
+        assert_eq!(refused(ParameterError::positive("a", 0.0)), "`a` is 0; it must be a finite number above 0");
+        for value in [-f64::MIN_POSITIVE, -1.0, f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
+            assert!(refused(ParameterError::positive("a", value)).contains("finite number above 0"), "{value}");
+            assert!(refused(ParameterError::not_negative("a", value)).contains("finite number, 0 or above"), "{value}");
+        }
+        for value in [0.0, 1.0, -0.5, 1.5, f64::NAN] {
+            let message = refused(ParameterError::between("a", value, 0.0, 1.0));
+            assert_eq!(message, format!("`a` is {value}; it must lie above 0 and below 1"));
+        }
+    }
+
+    #[test]
+    fn val_errors_seen_from_outer_tables() {
+        let error = ParameterError::new("hurst", "is 2").within("texture").within("processes.0");
+        assert_eq!(error.to_string(), "`processes.0.texture.hurst` is 2");
+        assert_eq!(error.name(), "hurst");
+        let of_table = ParameterError::new("", "is not a table");
+        assert_eq!(of_table.to_string(), "is not a table");
+        assert_eq!(of_table.within("low").key, "low");
+        let missing = read_parameters::<Item>(&json!({})).unwrap_err();
+        assert!(missing.is_missing("id") && !missing.is_missing("count"), "{missing}");
+    }
+
+    #[test]
+    fn val_values_are_removed_by_path() {
+        let mut value = json!({"a": {"b": 1, "c": [{"d": 2, "e": 3}]}});
+        let mut removed = |path: &[&str]| {
+            let path: Vec<String> = path.iter().map(|word| (*word).to_owned()).collect();
+            (remove(&mut value, &path), value.clone())
+        };
+        for nowhere in [&[][..], &["x"], &["a", "x"], &["a", "b", "x"], &["a", "c", "1", "d"], &["a", "c", "0"]] {
+            assert_eq!(removed(nowhere), (false, json!({"a": {"b": 1, "c": [{"d": 2, "e": 3}]}})), "{nowhere:?}");
+        }
+        assert_eq!(removed(&["a", "c", "0", "d"]), (true, json!({"a": {"b": 1, "c": [{"e": 3}]}})));
+        assert_eq!(removed(&["a"]), (true, json!({})));
     }
 
     #[test]

@@ -1,19 +1,19 @@
-//! What an MCAP log of any origin says about a vehicle's motion: the form in which recordings pass from files to figures.
+//! The motion of a vehicle from an MCAP log of any origin: the form in which logs pass from the file readers to the metrics.
 
-/// A log as read.
+/// A log.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Log {
     /// Streams of poses, in the order of their channels.
     pub poses: Vec<PoseStream>,
-    /// Transforms between frames, one for each pair of frames of a topic.
+    /// Transforms between frames, one stream for each pair of frames on a topic.
     pub transforms: Vec<TransformStream>,
     /// Inertial measurement units.
     pub imus: Vec<ImuStream>,
-    /// Outcomes that the log itself states, in order of time: the names of its events.
+    /// Outcomes stated in the log, in order of time: the names of its events.
     pub events: Vec<(i64, String)>,
-    /// Where the file breaks off, in words; what stands before it has been read.
+    /// Where the file is truncated, as text; everything before has been read.
     pub broken: Option<String>,
-    /// Topics of known messages in an encoding that is not read, in words.
+    /// Topics with known messages in an unsupported encoding, as text.
     pub unread: Vec<String>,
 }
 
@@ -26,7 +26,7 @@ pub struct TimedPose {
     pub position_m: [f64; 3],
     /// Orientation quaternion (fixed frame from body) `[x, y, z, w]`.
     pub orientation: [f64; 4],
-    /// Angular velocity in the body's frame, rad/s, where the message has one.
+    /// Angular velocity in the body's frame, rad/s, if the message has one.
     pub angular_velocity_rad_s: Option<[f64; 3]>,
 }
 
@@ -37,11 +37,11 @@ pub struct PoseStream {
     pub topic: String,
     /// Full name of its message.
     pub schema: String,
-    /// Frame that the poses are in, as the first message says.
+    /// Reference frame of the poses, from the first message.
     pub frame: String,
-    /// Frame that is posed; empty where the message does not say.
+    /// Frame of the body; empty if the message does not state it.
     pub body: String,
-    /// Poses in the order of the file.
+    /// Poses, in file order.
     pub poses: Vec<TimedPose>,
 }
 
@@ -50,11 +50,11 @@ pub struct PoseStream {
 pub struct TransformStream {
     /// Topic.
     pub topic: String,
-    /// Frame that the transforms lead to.
+    /// Parent frame.
     pub parent: String,
-    /// Frame that they come from.
+    /// Child frame.
     pub child: String,
-    /// Pose of the child in the parent, in the order of the file.
+    /// Pose of the child in the parent, in file order.
     pub poses: Vec<TimedPose>,
 }
 
@@ -65,9 +65,9 @@ pub struct ImuStream {
     pub topic: String,
     /// Full name of its message.
     pub schema: String,
-    /// Frame of the unit; empty where the message does not say.
+    /// Frame of the unit; empty if the message does not state it.
     pub frame: String,
-    /// Measurements in the order of the file.
+    /// Measurements, in file order.
     pub samples: Vec<TimedForce>,
 }
 

@@ -1,9 +1,9 @@
-//! `manifest.json` of a release: what each file is, where it came from, and what it hashes to. No clock times.
+//! `manifest.json` of a release: origin and hashes of each file. No clock times.
 
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Version of the manifest's form.
+/// Version of the manifest's format.
 pub const FORMAT: u32 = 1;
 /// Name of the program in [`Manifest::program`].
 pub const PROGRAM: &str = "sastrugi";
@@ -16,24 +16,24 @@ pub struct Manifest {
     pub program: String,
     /// Version of the program that made the release.
     pub version: String,
-    /// Version of the manifest's form, [`FORMAT`].
+    /// Version of the manifest's format, [`FORMAT`].
     pub format: u32,
     /// Name of the study.
     pub name: String,
-    /// SHA-256 of the study as it was run.
+    /// SHA-256 of the study as run.
     pub study_sha256: String,
     /// Seed of the study.
     pub seed: u64,
     /// Licence of the release, SPDX.
     pub license: String,
-    /// Every file of the release but this one and SHA256SUMS, by path.
+    /// All files of the release except this one and SHA256SUMS, by path.
     pub artifacts: Vec<Artifact>,
-    /// Measured data that files come from, in the study's order.
+    /// Measured data that files are derived from, in the study's order.
     #[serde(default)]
     pub sources: Vec<Source>,
     /// Items that failed, by stage and item.
     pub failed: Vec<FailedItem>,
-    /// Sentences that readers of an item's files must know, in order of the items.
+    /// Notes on items, in order of the items.
     #[serde(default)]
     pub notes: Vec<ItemNote>,
 }
@@ -47,16 +47,16 @@ pub struct Artifact {
     pub bytes: u64,
     /// SHA-256 of the file.
     pub sha256: String,
-    /// Where it came from.
+    /// Its origin.
     #[serde(flatten)]
     pub origin: Origin,
 }
 
-/// Where a file came from, and what it holds when decoded.
+/// Origin of a file, and hash of its decoded content.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(default)]
 pub struct Origin {
-    /// Stage that made it; empty for documents of the release itself.
+    /// Stage that produced it; empty for documents of the release itself.
     pub stage: String,
     /// Item of that stage.
     #[serde(skip_serializing_if = "String::is_empty")]
@@ -67,27 +67,27 @@ pub struct Origin {
     /// Number of rows or messages.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub records: Option<u64>,
-    /// Items that it was made from, as `terrain/t-0001`.
+    /// Parent items, such as `terrain/t-0001`.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parents: Vec<String>,
-    /// Words of its random streams, joined by `/`.
+    /// Label of its random streams, words joined by `/`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub stream: Option<String>,
-    /// Ids of the measured data it comes from, itself or through its parents.
+    /// Ids of the measured data it is derived from, directly or through its parents.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub sources: Vec<String>,
 }
 
-/// Measured data: what its maker asks of everything that comes from it.
+/// Measured data, with terms that extend to everything derived from it.
 #[derive(Clone, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Source {
     /// Id of the DEM in the study.
     pub id: String,
-    /// Licence, as the study states it.
+    /// Licence, as stated in the study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub license: Option<String>,
-    /// Whom to name.
+    /// Attribution: whom to name.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attribution: Option<String>,
     /// How to cite it.
@@ -95,7 +95,7 @@ pub struct Source {
     pub citation: Option<String>,
 }
 
-/// A sentence about an item: a conversion, a rounded size, the verdict on a fit.
+/// A note on an item, one sentence: a conversion, a rounded size, the verdict on a fit.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct ItemNote {
@@ -115,8 +115,57 @@ pub struct FailedItem {
     pub stage: String,
     /// Item of that stage.
     pub item: String,
-    /// What went wrong.
+    /// The error.
     pub error: String,
     /// Parameters of the item.
     pub parameters: Value,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn manifest() -> Manifest {
+        Manifest {
+            program: PROGRAM.to_owned(),
+            version: "0.1.0".to_owned(),
+            format: FORMAT,
+            name: "x".to_owned(),
+            study_sha256: "0".to_owned(),
+            seed: u64::MAX,
+            license: "CC-BY-4.0".to_owned(),
+            artifacts: vec![Artifact {
+                path: "README.md".to_owned(),
+                bytes: 5,
+                sha256: "1".to_owned(),
+                origin: Origin::default(),
+            }],
+            sources: Vec::new(),
+            failed: Vec::new(),
+            notes: Vec::new(),
+        }
+    }
+
+    /// What is written is read; the origin of a document is its stage alone, and lies beside its hash.
+    #[test]
+    fn val_a_manifest_is_written_and_read() {
+        let written = serde_json::to_value(manifest()).unwrap();
+        let readme = serde_json::json!({ "path": "README.md", "bytes": 5, "sha256": "1", "stage": "" });
+        assert_eq!(written["artifacts"][0], readme);
+        assert_eq!(written["seed"], u64::MAX);
+        assert_eq!(serde_json::from_value::<Manifest>(written).unwrap(), manifest());
+    }
+
+    /// Manifests without sources and notes, of earlier versions, are read; unknown keys are not passed over.
+    #[test]
+    fn val_manifests_of_other_versions() {
+        let mut written = serde_json::to_value(manifest()).unwrap();
+        for key in ["sources", "notes"] {
+            written.as_object_mut().unwrap().remove(key);
+        }
+        assert_eq!(serde_json::from_value::<Manifest>(written.clone()).unwrap(), manifest());
+        written["clock"] = "now".into();
+        let error = serde_json::from_value::<Manifest>(written).unwrap_err().to_string();
+        assert!(error.contains("unknown field `clock`"), "{error}");
+    }
 }

@@ -1,34 +1,34 @@
-//! A vehicle as rigid bodies on joints: what its files for other simulators are made from. SI units.
+//! A vehicle as rigid bodies connected by joints, from which its files for other simulators are written. SI units.
 //!
-//! Frames of all links are parallel to base_link (x forward, y left, z up) while all joints are at zero.
+//! With all joints at zero, the frames of all links are parallel to base_link (x forward, y left, z up).
 
-/// A vehicle as rigid bodies on joints.
+/// A vehicle as rigid bodies connected by joints.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Mechanism {
-    /// Name, as `husky_a200`.
+    /// Name, such as `husky_a200`.
     pub name: String,
     /// Bodies, parents before their children. The first is the chassis, `base_link`, which moves freely.
     pub links: Vec<Link>,
-    /// Joints without a motor that move together.
+    /// Coupled joints without a motor.
     pub couplings: Vec<Coupling>,
     /// Motors.
     pub motors: Vec<Motor>,
-    /// Friction of the ground that the vehicle is meant for.
+    /// Friction of the ground for which the file is written.
     pub friction: GroundFriction,
     /// Height of base_link above level ground with all joints at zero and rigid wheels, m.
     pub standing_height_m: f64,
-    /// How far the tyres give way under the vehicle's weight, m. The wheels of a mechanism are rigid.
+    /// Deflection of the tyres under the vehicle's weight, m. The wheels of a mechanism are rigid.
     pub tyre_sag_m: f64,
 }
 
 /// A rigid body.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Link {
-    /// Name, as `front_left_wheel`.
+    /// Name, such as `front_left_wheel`.
     pub name: String,
-    /// Number of the body that carries it; none for the chassis.
+    /// Index of the parent body; none for the chassis.
     pub parent: Option<usize>,
-    /// Its frame in that of its parent, all joints at zero, m.
+    /// Origin of its frame in that of its parent with all joints at zero, m.
     pub origin_m: [f64; 3],
     /// Mass, kg.
     pub mass_kg: f64,
@@ -36,7 +36,7 @@ pub struct Link {
     pub centre_of_mass_m: [f64; 3],
     /// Moments of inertia about x, y, z through the centre of mass, kg m2; products of inertia are 0.
     pub inertia_kg_m2: [f64; 3],
-    /// What touches the ground.
+    /// Collision shape.
     pub shape: Option<Shape>,
     /// Joints to the parent, the first next to it. All pass through the origin of the link.
     pub joints: Vec<Joint>,
@@ -49,10 +49,10 @@ pub enum Shape {
     Box {
         /// Length, width and height, m.
         size_m: [f64; 3],
-        /// Its middle in the frame of the link, m.
+        /// Its centre in the frame of the link, m.
         centre_m: [f64; 3],
     },
-    /// A cylinder about y, its middle at the origin of the link.
+    /// A cylinder about y, centred at the origin of the link.
     Wheel {
         /// Radius, m.
         radius_m: f64,
@@ -61,7 +61,7 @@ pub enum Shape {
     },
 }
 
-/// How a joint moves.
+/// Degree of freedom of a joint.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Motion {
     /// Along z, up positive, m.
@@ -75,11 +75,11 @@ pub enum Motion {
 /// A joint with one degree of freedom.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Joint {
-    /// Name, as `front_left_wheel_spin`.
+    /// Name, such as `front_left_wheel_spin`.
     pub name: String,
-    /// How it moves.
+    /// Degree of freedom.
     pub motion: Motion,
-    /// Stops, m or rad; none for a wheel that spins.
+    /// Stops, m or rad; none for the spin of a wheel.
     pub range: Option<[f64; 2]>,
     /// Damping, N s/m or N m s/rad.
     pub damping: f64,
@@ -92,7 +92,7 @@ pub struct Joint {
 pub struct Spring {
     /// Stiffness, N/m.
     pub stiffness_n_m: f64,
-    /// Position of the joint at which it carries nothing, m.
+    /// Position of the joint at which the spring force is zero, m.
     pub unloaded_m: f64,
     /// Its largest force between the stops, N.
     pub force_max_n: f64,
@@ -101,9 +101,9 @@ pub struct Spring {
 /// Two joints that move together: `follower = ratio * leader`.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coupling {
-    /// Joint that leads.
+    /// Leading joint.
     pub leader: String,
-    /// Joint that follows.
+    /// Following joint.
     pub follower: String,
     /// Position of the follower over that of the leader.
     pub ratio: f64,
@@ -112,15 +112,15 @@ pub struct Coupling {
 /// A motor.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Motor {
-    /// Name, as `left_motor`.
+    /// Name, such as `left_motor`.
     pub name: String,
-    /// Joints that it turns, all at the same speed.
+    /// Joints that it drives, all at the same speed.
     pub joints: Vec<String>,
-    /// What it follows.
+    /// Its control.
     pub servo: Servo,
 }
 
-/// What a motor follows.
+/// Control of a motor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Servo {
     /// A commanded speed of the joints.
@@ -132,7 +132,7 @@ pub enum Servo {
         /// Largest speed that the vehicle's controller commands, rad/s.
         speed_limit_rad_s: f64,
     },
-    /// A commanded angle, whatever the load.
+    /// A commanded angle, independent of the load.
     Angle {
         /// Torque over the difference of angles, N m/rad.
         stiffness_n_m: f64,
@@ -146,7 +146,7 @@ pub enum Servo {
 /// Friction of the ground.
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundFriction {
-    /// Name of the surface, as `hard_soil`.
+    /// Name of the surface, such as `hard_soil`.
     pub surface: String,
     /// Friction coefficient between tyre and ground.
     pub wheel: f64,

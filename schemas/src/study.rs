@@ -1,5 +1,5 @@
-//! The envelope of a study file: what stands around the parameters of each item. The parameters themselves belong to
-//! the kernels; a section's table is its envelope's keys and the kernel's keys together.
+//! The envelope of a study file: the keys of each item other than its kernel parameters. The parameters themselves are defined
+//! by the kernels; a section's table combines the keys of the envelope and the kernel.
 
 use crate::ParameterError;
 use crate::tables::MissionRow;
@@ -8,48 +8,48 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// `[study]`: the release as a whole.
+/// `[study]`: properties of the release.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyHead {
     /// Short name, `[a-z0-9][a-z0-9.-]{0,63}`.
     pub name: String,
-    /// Title of the release; the name when absent.
+    /// Title of the release; default: the name.
     #[serde(default)]
     pub title: String,
-    /// A paragraph for readers of the release.
+    /// Description of the release, one paragraph.
     #[serde(default)]
     pub description: String,
     /// Seed of every random stream of the study.
     pub seed: u64,
     /// Date of the study, YYYY-MM-DD: the only date in any output.
     pub date: String,
-    /// Version of the dataset, as its readers cite it.
+    /// Version of the dataset, for citations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub version: Option<String>,
-    /// Page of the dataset, `https://...`.
+    /// Web page of the dataset, `https://...`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub url: Option<String>,
     /// DOI of the dataset, `10.<registrant>/<suffix>`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub doi: Option<String>,
-    /// Licence of the release as an SPDX expression; it must be one that the licences of its DEMs permit.
+    /// Licence of the release as an SPDX expression; the licences of its DEMs must permit it.
     #[serde(default = "default_license")]
     pub license: String,
-    /// People and organisations that made the study: names, or tables `{ name = "Family, Given", orcid = "...", affiliation = "..." }`. Write people
-    /// as `Family, Given` so that citations can tell the parts of a name apart.
+    /// Creators: names of people and organisations, or tables `{ name = "Family, Given", orcid = "...", affiliation = "..." }`. Write people
+    /// as `Family, Given` so that citations can separate the parts of a name.
     #[serde(default)]
     pub creators: Vec<Creator>,
-    /// Those of `creators` that are organisations.
+    /// Names in `creators` that are organisations, not people.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub organizations: Vec<String>,
-    /// Words to find the dataset by.
+    /// Keywords of the dataset.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub keywords: Vec<String>,
-    /// Grants that paid for it: identifiers as Zenodo has them (`<DOI of the funder>::<number of the grant>`), or any text.
+    /// Funding: grants as Zenodo identifiers (`<DOI of the funder>::<number of the grant>`), or any text.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub funding: Vec<String>,
-    /// Start of every mission's clock in MCAP files, ns since 1970-01-01 UTC.
+    /// Start time of every mission in MCAP files, ns since 1970-01-01 UTC.
     #[serde(default = "default_epoch_ns")]
     pub epoch_ns: u64,
     /// Flavour of the MCAP files.
@@ -58,16 +58,16 @@ pub struct StudyHead {
     /// Layout of the GeoTIFFs in `terrain/`, `texture/` and `dem/`.
     #[serde(default)]
     pub geotiff: GeoTiff,
-    /// Whether groups share their random draws.
+    /// Whether terrains of different groups share their random draws.
     #[serde(default)]
     pub pairing: Pairing,
-    /// Shares of the parts `train`, `validation` and `test` among the terrains of every group, as `[0.7, 0.15, 0.15]`, or of `train` and `test`, as
-    /// `[0.8, 0.2]`; they add up to 1. Terrains without a group take no part where others have one.
+    /// Shares of the splits `train`, `validation` and `test` among the terrains of every group, such as `[0.7, 0.15, 0.15]`, or of `train` and
+    /// `test`, such as `[0.8, 0.2]`; they must add up to 1. If some terrains have a group, terrains without one are left out.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split: Option<Shares>,
 }
 
-/// Who made a study, or took part in it.
+/// A creator of a study.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(
     untagged,
@@ -75,14 +75,14 @@ pub struct StudyHead {
     expecting = "must be a name, or a table `{ name = \"Family, Given\", orcid = \"...\", affiliation = \"...\" }`"
 )]
 pub enum Creator {
-    /// A name and what identifies its bearer.
+    /// A name with identifiers.
     Described {
         /// Name; people as `Family, Given`.
         name: String,
-        /// ORCID iD of a person, as `0000-0002-1825-0097`.
+        /// ORCID iD of a person, such as `0000-0002-1825-0097`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         orcid: Option<String>,
-        /// Organisation that a person works for.
+        /// Affiliation of a person.
         #[serde(default, skip_serializing_if = "Option::is_none")]
         affiliation: Option<String>,
     },
@@ -106,7 +106,7 @@ impl Creator {
         }
     }
 
-    /// The organisation that a person works for.
+    /// The affiliation.
     pub fn affiliation(&self) -> Option<&str> {
         match self {
             Self::Name(_) => None,
@@ -115,9 +115,9 @@ impl Creator {
     }
 }
 
-/// Shares of the parts of a dataset.
+/// Shares of the splits of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "expected the shares of two or three parts, as [0.8, 0.2] or [0.7, 0.15, 0.15]")]
+#[serde(untagged, expecting = "expected the shares of two or three splits, such as [0.8, 0.2] or [0.7, 0.15, 0.15]")]
 pub enum Shares {
     /// `train`, `validation`, `test`.
     Three([f64; 3]),
@@ -127,6 +127,14 @@ pub enum Shares {
 
 impl Shares {
     /// Shares of `train`, `validation` and `test`.
+    ///
+    /// ```
+    /// use sastrugi_schemas::study::Shares;
+    ///
+    /// let shares: Shares = serde_json::from_str("[0.8, 0.2]").unwrap();
+    /// // Without a split for validation:
+    /// assert_eq!(shares.by_part(), [0.8, 0.0, 0.2]);
+    /// ```
     pub fn by_part(self) -> [f64; 3] {
         match self {
             Self::Three(shares) => shares,
@@ -179,14 +187,14 @@ pub enum McapFlavour {
     Ros2,
 }
 
-/// Layout of a GeoTIFF. The heights are the same.
+/// Layout of a GeoTIFF; heights are the same in both.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum GeoTiff {
-    /// Tiles, without overviews.
+    /// Tiled, without overviews.
     #[default]
     Plain,
-    /// With overviews, laid out so that a part can be read over a network (cloud-optimised GeoTIFF).
+    /// Cloud-optimised GeoTIFF: with overviews, readable in part over a network.
     Cog,
 }
 
@@ -194,12 +202,12 @@ pub enum GeoTiff {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Pairing {
-    /// Every terrain and every mission is drawn by itself.
+    /// Every terrain and every mission has its own draws.
     #[default]
     Independent,
-    /// The k-th replicates of all terrains draw from one stream, so that they differ by their parameters alone. Their missions
-    /// come from the same draws, each accepted by the terrain's own class map: where two terrains accept the same draw,
-    /// their missions lead from the same start to the same goal.
+    /// The k-th replicates of all terrains use the same random stream, so that they differ only in their parameters. Their missions
+    /// come from the same draws, accepted or rejected by each terrain's own class map: if two terrains accept the same draw,
+    /// their missions have the same start and goal.
     Common,
 }
 
@@ -214,37 +222,37 @@ pub struct DemItem {
     /// Label for statistics.
     #[serde(default)]
     pub group: Option<String>,
-    /// Part to use, `[x0, y0, x1, y1]` in the DEM's own coordinates (m, or degrees for a geographic raster).
+    /// Part to use, `[x0, y0, x1, y1]`, in the DEM's own coordinates (m, or degrees for a geographic raster).
     #[serde(default)]
     pub window: Option<[f64; 4]>,
-    /// Cell size east-west and north-south, m, for files that carry none (.npy) and for point clouds, whose cells are square.
+    /// Cell size east-west and north-south, m, for files that state none (.npy) and for point clouds, whose cells are square.
     #[serde(default)]
     pub cell_m: Option<[f64; 2]>,
-    /// Height of a cell of a point cloud (.las, .laz): `mean` of its points (default), `median`, `min`, `max`, or `p90` for
-    /// the 90th percentile.
+    /// Statistic that gives the height of a point-cloud cell (.las, .laz): `mean` of its points (default), `median`, `min`, `max`, or
+    /// a percentile such as `p90`.
     #[serde(default)]
     pub statistic: Option<String>,
-    /// Fill the gaps of a point cloud up to this many cells from its points; none are filled when absent.
+    /// Fill gaps of a point cloud up to this distance from its points, in cells; default: gaps are not filled.
     #[serde(default)]
     pub fill_cells: Option<u32>,
-    /// Take only the ground points (class 2) of a point cloud.
+    /// Use only the ground points (class 2) of a point cloud.
     #[serde(default)]
     pub ground_only: Option<bool>,
     /// Licence of the data as an SPDX identifier, or `public domain`.
     #[serde(default)]
     pub license: Option<String>,
-    /// File with the text of that licence, relative to the study file; it goes into the release beside the data.
+    /// File with the text of that licence, relative to the study file; it is copied into the release with the data.
     #[serde(default)]
     pub license_file: Option<String>,
-    /// Whom to name as the source.
+    /// Attribution: whom to name as the source.
     #[serde(default)]
     pub attribution: Option<String>,
-    /// How the data asks to be cited.
+    /// How to cite the data.
     #[serde(default)]
     pub citation: Option<String>,
 }
 
-/// `[[terrain]]`: a generated terrain, or as many as `count` and `sweep` say.
+/// `[[terrain]]`: one generated terrain, or several with `count` and `sweep`.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TerrainItem {
@@ -267,29 +275,29 @@ pub struct TerrainItem {
     /// Also write a 16-bit PNG of the heights.
     #[serde(default)]
     pub png16: bool,
-    /// Also write folders to import into simulators, `export/<id>/<simulator>/`, and the vehicles that drive there as MJCF and URDF,
+    /// Also export for these simulators, to `export/<id>/<simulator>/`, with the vehicles driven on the terrain as MJCF and URDF,
     /// `export/vehicle/<traverse id>.xml` and `.urdf`.
     #[serde(default)]
     pub exports: BTreeSet<Simulator>,
-    /// Decimate the meshes of the exports (`gazebo`, `isaac`): no post is farther from them than this, vertically, m. Not decimated
-    /// when absent.
+    /// Decimate the meshes of the exports (`gazebo`, `isaac`): maximum vertical distance of any post from the mesh, m. Default: not
+    /// decimated.
     #[serde(default)]
     pub export_max_error_m: Option<f64>,
 }
 
-/// Program into which a terrain can be imported.
+/// Simulator for which a terrain can be exported.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Simulator {
     /// Unreal Engine: 16-bit PNG of a valid landscape size.
     Unreal,
-    /// Unity: 16-bit raw heightmap of 2^n + 1 posts a side.
+    /// Unity: 16-bit raw heightmap of 2^n + 1 posts per side.
     Unity,
-    /// Gazebo: SDF model and world with a 16-bit PNG of 2^n + 1 posts a side.
+    /// Gazebo: SDF model and world with a 16-bit PNG of 2^n + 1 posts per side.
     Gazebo,
     /// MuJoCo: MJCF with a height field of 32-bit numbers.
     Mujoco,
-    /// Isaac Sim and others that read OpenUSD: a mesh with collision.
+    /// Isaac Sim and other readers of OpenUSD: a mesh with collision.
     Isaac,
 }
 
@@ -309,7 +317,7 @@ impl Simulator {
     }
 }
 
-/// `[[fit]]`: the covariance of a measured DEM, detrended by a moving average.
+/// `[[fit]]`: a covariance fit of a measured DEM, detrended by a moving average.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FitItem {
@@ -317,21 +325,21 @@ pub struct FitItem {
     pub id: String,
     /// Id of the DEM to fit.
     pub dem: String,
-    /// Mask, or list of masks: files, relative to the study file, of the cells that take part; with several, those that all
-    /// of them mark. GeoJSON with polygons in the DEM's own coordinates, or a raster that is not 0 there.
+    /// Mask, or list of masks, as files relative to the study file: only cells marked by all of them are fitted. GeoJSON polygons in
+    /// the DEM's own coordinates, or the nonzero cells of a raster.
     #[serde(default)]
     pub mask: Files,
-    /// As `mask`, for cells that take no part.
+    /// As `mask`, for cells to exclude.
     #[serde(default)]
     pub exclude: Files,
-    /// File, as `mask`, of a part of the DEM that is smooth in reality: the DEM's noise, white and correlated, is found there. Not
-    /// with `noise_sigma_m` or `correlated_noise_sigma_m`.
+    /// File, as for `mask`, that marks a part of the DEM known to be smooth, from which the DEM's white and correlated noise are
+    /// estimated. Not with `noise_sigma_m` or `correlated_noise_sigma_m`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_reference: Option<String>,
-    /// Id of a DEM that is co-registered to the first and subtracted (snow depth), both in one metric coordinate system.
+    /// Id of a DEM to co-register to the first and subtract (snow depth); both must be in the same metric coordinate system.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub minus: Option<String>,
-    /// Seed of the replicates' random streams; follows from the study's seed and the id when absent.
+    /// Seed for the random streams of the replicates; default: derived from the study's seed and the id.
     #[serde(default)]
     pub seed: Option<u64>,
     /// One fit per value of a parameter: `sweep.<parameter> = [...]`.
@@ -339,7 +347,7 @@ pub struct FitItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// No file, one, or several.
+/// None, one or several files.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "expected a file name or a list of file names")]
 pub enum Files {
@@ -356,7 +364,7 @@ impl Default for Files {
 }
 
 impl Files {
-    /// The names, each with its position in the list when there is a list.
+    /// The names, with their positions if given as a list.
     pub fn numbered(&self) -> Vec<(Option<usize>, &str)> {
         match self {
             Self::One(file) => vec![(None, file)],
@@ -365,35 +373,35 @@ impl Files {
     }
 }
 
-/// `[[texture]]`: a synthetic surface with a given covariance, alone or on a base.
+/// `[[texture]]`: a synthetic surface with a given covariance, alone or added to a base.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TextureItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
-    /// Id of the fit to match, or a stated covariance: `{ model = "exponential", sigma_m = 0.03, range_m = 0.28 }`.
+    /// Id of the fit to match, or an explicit covariance: `{ model = "exponential", sigma_m = 0.03, range_m = 0.28 }`.
     pub fit: FitReference,
     /// Synthesis method (see `sastrugi kinds`).
     #[serde(default = "default_method")]
     pub method: String,
-    /// Several methods side by side, `"all"` or a list, in place of `method`: a texture `<id>-<method>` of each, and the
-    /// table `scoreboard`.
+    /// Several methods to compare, `"all"` or a list, instead of `method`: one texture `<id>-<method>` each, and the table
+    /// `scoreboard`.
     #[serde(default)]
     pub methods: Option<Methods>,
-    /// Realisations of each method that the scoreboard measures.
+    /// Number of realisations per method for the scoreboard.
     #[serde(default = "default_realisations")]
     pub realisations: u32,
-    /// What the texture is added to: the id of a terrain or DEM, or `{ background = "<fit id>" }`, the background that a fit took
-    /// off; the texture stands alone when absent.
+    /// Base to which the texture is added: the id of a terrain or DEM, or `{ background = "<fit id>" }`, the background that a fit
+    /// removed. Default: no base.
     #[serde(default)]
     pub onto: Option<Onto>,
-    /// Factor on the heights of the texture, above 0: 2 doubles their standard deviation. Not with `methods` or `fill`.
+    /// Factor on the heights of the texture, above 0; 2 doubles their standard deviation. Not with `methods` or `fill`.
     #[serde(default = "one")]
     pub amplitude: f64,
-    /// Factor of the texture on its base: the id of a raster of factors, or a table by the base's slope.
+    /// Local factor on the texture: the id of a raster of factors, or a table of factors by the slope of the base.
     #[serde(default)]
     pub modulate: Option<Modulate>,
-    /// Id of a DEM whose holes are filled with texture that fits what is around them.
+    /// Id of a DEM whose holes are filled with texture conditioned on their surroundings.
     #[serde(default)]
     pub fill: Option<String>,
     /// Label for statistics.
@@ -419,25 +427,25 @@ fn one() -> f64 {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "`onto` is the id of a terrain or DEM, or a table `{ background = \"<fit id>\" }`"
+    expecting = "`onto` must be the id of a terrain or DEM, or a table `{ background = \"<fit id>\" }`"
 )]
 pub enum Onto {
     /// Id of a terrain or DEM.
     Id(String),
-    /// The DEM without its texture.
+    /// The background of a fitted DEM.
     Background {
-        /// Id of the fit that took the background off its DEM.
+        /// Id of the fit.
         background: String,
     },
 }
 
-/// Factor of a texture on its base.
+/// Local factor on a texture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "`modulate` is the id of a raster, or a table with lists `slope_deg` and `factor`")]
+#[serde(untagged, expecting = "`modulate` must be the id of a raster, or a table with lists `slope_deg` and `factor`")]
 pub enum Modulate {
     /// Id of a raster of factors, 0 or above.
     Raster(String),
-    /// By the base's slope: straight lines between the slopes given, the outer factors beyond them.
+    /// By the slope of the base: linear interpolation between the given slopes, constant beyond them.
     #[serde(rename_all = "snake_case")]
     Slope {
         /// Slopes, degrees, ascending.
@@ -447,13 +455,13 @@ pub enum Modulate {
     },
 }
 
-/// What a texture matches.
+/// The covariance that a texture matches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "`fit` is the id of a fit, or a table with `model` and the numbers of that model")]
+#[serde(untagged, expecting = "`fit` must be the id of a fit, or a table with `model` and its parameters")]
 pub enum FitReference {
     /// Id of a fit.
     Id(String),
-    /// A covariance without a measured surface.
+    /// An explicit covariance.
     Stated {
         /// Covariance model, as in fit files.
         model: String,
@@ -465,7 +473,7 @@ pub enum FitReference {
 
 /// Synthesis methods.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "`methods` is \"all\" or a list of synthesis methods")]
+#[serde(untagged, expecting = "`methods` must be \"all\" or a list of synthesis methods")]
 pub enum Methods {
     /// `all`.
     Word(String),
@@ -481,20 +489,20 @@ fn default_method() -> String {
     "fft_ma".to_owned()
 }
 
-/// `[[missions]]`: starts and goals on terrains, and the lines between them.
+/// `[[missions]]`: starts and goals on terrains, and the lines to follow between them.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MissionsItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
-    /// What a mission follows (see `sastrugi kinds`): `straight` lines, `routed` paths or the `trail` of a terrain.
+    /// Line that missions follow (see `sastrugi kinds`): `straight`, a planned route (`routed`), or the `trail` of a terrain.
     #[serde(default)]
     pub kind: MissionKind,
-    /// Ids of the terrains, textures or DEMs to draw missions on; the id of a replicated item stands for all of them. Not for
-    /// `routed` missions, which have those of `of`.
+    /// Ids of the terrains, textures or DEMs to draw missions on; the id of a replicated item includes all its replicates. Not for
+    /// `routed` missions, which use those of `of`.
     #[serde(default)]
     pub terrains: Vec<String>,
-    /// For `routed` missions: id of the straight missions whose starts and goals they have.
+    /// For `routed` missions: id of the straight missions whose starts and goals are used.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
     /// Explicit seed instead of the study's.
@@ -502,7 +510,7 @@ pub struct MissionsItem {
     pub seed: Option<u64>,
 }
 
-/// What a mission follows.
+/// Line that a mission follows.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum MissionKind {
@@ -511,38 +519,38 @@ pub enum MissionKind {
     Straight,
     /// The planned route from the start to the goal of a straight mission.
     Routed,
-    /// The trail that a terrain was given (`compose`, `operation = "trail"`).
+    /// The trail of a terrain (`compose`, `operation = "trail"`).
     Trail,
 }
 
-/// `[[route]]`: planned paths over terrains.
+/// `[[route]]`: routes planned over terrains.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RouteItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; routes are named `<id>-0001` ...
     pub id: String,
-    /// Ids of the terrains, textures or DEMs to plan on; the id of a replicated item stands for all of them.
+    /// Ids of the terrains, textures or DEMs to plan on; the id of a replicated item includes all its replicates.
     pub terrains: Vec<String>,
-    /// Start, `[x, y]` in the terrain's coordinates, m; drawn when absent.
+    /// Start, `[x, y]` in the terrain's coordinates, m; default: drawn at random.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub start: Option<[f64; 2]>,
-    /// Goal, `[x, y]` in the terrain's coordinates, m; drawn when absent.
+    /// Goal, `[x, y]` in the terrain's coordinates, m; default: drawn at random.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal: Option<[f64; 2]>,
-    /// Pairs of start and goal to draw on each terrain; 1 when absent. All route stages with the same rules draw the same pairs.
+    /// Number of start-goal pairs to draw on each terrain; default 1. All route stages with the same rules draw the same pairs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pairs: Option<u32>,
-    /// File, or list of files, relative to the study file, of what cannot be entered: GeoJSON with polygons in the terrain's
-    /// coordinates, or a raster that is not 0 there.
+    /// Areas to avoid, as a file or list of files relative to the study file: GeoJSON polygons in the terrain's coordinates, or the
+    /// nonzero cells of a raster.
     #[serde(default)]
     pub obstacles: Files,
-    /// Vehicle whose limits of slope hold (see `sastrugi kinds`); `max_up_deg` and `max_down_deg` override them.
+    /// Vehicle whose slope limits apply (see `sastrugi kinds`); `max_up_deg` and `max_down_deg` override them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<String>,
-    /// Id of a raster (a DEM or terrain) of factors above 0 for `cost = "raster"`, in the terrain's coordinates; NaN is blocked.
+    /// For `cost = "raster"`: id of a raster (a DEM or terrain) of factors above 0, in the terrain's coordinates; NaN cells are blocked.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub cost_raster: Option<String>,
-    /// Explicit seed of drawn pairs instead of the study's.
+    /// Explicit seed for drawing pairs, instead of the study's.
     #[serde(default)]
     pub seed: Option<u64>,
     /// One stage per value of a parameter: `sweep.<parameter> = [...]`.
@@ -550,7 +558,7 @@ pub struct RouteItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `[[navigate]]`: a team in formation along planned routes.
+/// `[[navigate]]`: a team that follows planned routes in formation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct NavigateItem {
@@ -558,7 +566,7 @@ pub struct NavigateItem {
     pub id: String,
     /// Id of the routes to follow.
     pub route: String,
-    /// Runs along each route, `<id>-0001-01`, `<id>-0001-02` ..., which differ by their random draws; one run when absent.
+    /// Number of runs along each route, `<id>-0001-01`, `<id>-0001-02` ..., which differ in their random draws; default 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<u32>,
     /// Explicit seed instead of the study's.
@@ -569,7 +577,7 @@ pub struct NavigateItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `[[rover]]`: rovers that find their own way by what they sense.
+/// `[[rover]]`: rovers that find their own way with limited sensing.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RoverItem {
@@ -577,19 +585,20 @@ pub struct RoverItem {
     pub id: String,
     /// Navigator: see `sastrugi kinds`.
     pub kind: String,
-    /// Ids of the terrains, textures or DEMs to drive on; the id of a replicated item stands for all of them. Of a `planetary` terrain rovers
-    /// drive on the whole world, which is made around them, not on its window alone; rocks and albedo of other terrains are those of their maps.
+    /// Ids of the terrains, textures or DEMs to drive on; the id of a replicated item includes all its replicates. On a `planetary` terrain,
+    /// rovers drive on the unbounded world, which is generated around them, not only in its window; rocks and albedo of other terrains are
+    /// those of their maps.
     pub terrains: Vec<String>,
-    /// Distance between two rows of `rover_samples` of a rover, m; 0 for a row every cycle; 0.5 when absent.
+    /// Distance between rows of a rover in `rover_samples`, m; 0 for one row per cycle; default 0.5.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub sample_m: Option<f64>,
-    /// Rovers of each terrain that are recorded as MCAP files, the first ones; 1 when absent, 0 for none.
+    /// Number of rovers recorded as MCAP on each terrain, starting with the first; default 1, 0 for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub record: Option<u32>,
     /// Explicit seed of starts and noise instead of the study's.
     #[serde(default)]
     pub seed: Option<u64>,
-    /// Which number of the navigator matters most? Trials with changed numbers, beside the plain one.
+    /// Sensitivity of the results to the navigator's parameters: trials with varied parameters, in addition to the plain trial.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub perturb: Option<Perturb>,
     /// One stage per value of a parameter: `sweep.<parameter> = [...]`.
@@ -597,40 +606,40 @@ pub struct RoverItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `[[image]]`: a rendered image of a surface under a sun and a camera.
+/// `[[image]]`: a rendered image of a surface, with sun and camera.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study. With several surfaces images are named `<id>-<surface>`.
     pub id: String,
-    /// Id of the terrain, texture or DEM to look at; the id of a replicated item stands for all of them. Its albedo is that of the
-    /// terrain's map, where it has one.
+    /// Id of the terrain, texture or DEM to render; the id of a replicated item includes all its replicates. The albedo is that of the
+    /// terrain's map, if it has one.
     pub surface: String,
     /// Explicit seed of the noise instead of the study's.
     #[serde(default)]
     pub seed: Option<u64>,
-    /// One image per value of a parameter: `sweep.<parameter> = [...]`, as `sweep."sun.azimuth_deg" = [0, 120, 240]`.
+    /// One image per value of a parameter: `sweep.<parameter> = [...]`, such as `sweep."sun.azimuth_deg" = [0, 120, 240]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `perturb` of `[[rover]]`: elementary effects of the navigator's numbers (M. Morris, Technometrics 33, 1991). Along a trajectory each
-/// parameter moves once, up or down, while worlds, starts and noise stay.
+/// `perturb` of `[[rover]]`: elementary effects of the navigator's parameters (M. Morris, Technometrics 33, 1991). Along a trajectory each
+/// parameter changes once, up or down, while worlds, starts and noise stay fixed.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Perturb {
-    /// Largest relative change to either side, above 0 and below 1: 0.1 moves each parameter between 0.9 and 1.1 of its value.
+    /// Largest relative change in either direction, above 0 and below 1: 0.1 varies each parameter between 0.9 and 1.1 of its value.
     pub share: f64,
-    /// Trajectories, 1 to 999; the same ones on every world.
+    /// Number of trajectories, 1 to 999; the same on every world.
     pub trajectories: u32,
-    /// Equally spaced values of each parameter, even, 2 to 64. A step is `levels / 2` of them: 4 levels and a share of 0.1 have the factors
+    /// Number of equally spaced values of each parameter, even, 2 to 64. A step spans `levels / 2` of them: 4 levels and a share of 0.1 have the factors
     /// 0.9, 0.967, 1.033 and 1.1, and steps of 0.133.
     pub levels: u32,
-    /// Rovers of each design on each world; those of the trial, but at most 10, when absent.
+    /// Number of rovers per design and world; default: that of the trial, at most 10.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rovers: Option<u32>,
-    /// Parameters to move: names of numbers or of lists of numbers, which are scaled as a whole; `noise.<name>` for those of the noise. All of the
-    /// navigator's when empty. Those of value 0 are left out, and named in a note.
+    /// Parameters to vary: names of numbers, or of lists of numbers, which are scaled together; `noise.<name>` for those of the noise. Default: all
+    /// parameters of the navigator. Parameters of value 0 are left out and named in a note.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<String>,
 }
@@ -642,16 +651,16 @@ impl Default for Perturb {
 }
 
 impl Perturb {
-    /// Most trajectories: three digits in the ids of their items.
+    /// Maximum number of trajectories: item ids have three digits for it.
     pub const TRAJECTORIES_MAX: u32 = 999;
-    /// Most levels.
+    /// Maximum number of levels.
     pub const LEVELS_MAX: u32 = 64;
 
     /// # Errors
     /// A value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
         if !(self.share > 0.0 && self.share < 1.0) {
-            let rule = "it must lie above 0 and below 1, as 0.1 for 10 %";
+            let rule = "it must lie above 0 and below 1, such as 0.1 for 10 %";
             return Err(ParameterError::new("share", format!("is {}; {rule}", self.share)));
         }
         if !(1..=Self::TRAJECTORIES_MAX).contains(&self.trajectories) {
@@ -673,18 +682,18 @@ impl Perturb {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct PhotoclinometryItem {
-    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study. Where the images show several surfaces, one `<id>-<surface>` for each.
+    /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study. If the images show several surfaces, there is one item `<id>-<surface>` for each.
     pub id: String,
-    /// Ids of images; the id of a swept image stands for all of its images. Three or more of each surface.
+    /// Ids of images, three or more of each surface; the id of a swept image includes all its values.
     pub images: Vec<String>,
-    /// Id of a coarse DEM that holds the heights: rounds begin there, and it is a soft constraint.
+    /// Id of a coarse DEM that constrains the heights: the first round starts from it, and it is a soft constraint.
     #[serde(default)]
     pub coarse: Option<String>,
-    /// Standard deviation of the heights of its cells, m.
+    /// Standard deviation of its heights, m.
     #[serde(default)]
     pub coarse_sigma_m: Option<f64>,
-    /// File of measured points (columns `x`, `y`, `z`, `sigma`, m), each a soft constraint with its sigma, above 0. Beside `free_exposure` three or more
-    /// points settle the tilt.
+    /// File of measured points (columns `x`, `y`, `z`, `sigma`, m), each a soft constraint with its sigma, above 0. With `free_exposure`, three or
+    /// more points determine the tilt.
     #[serde(default)]
     pub altimetry: Option<String>,
     /// Label for statistics.
@@ -693,7 +702,7 @@ pub struct PhotoclinometryItem {
     /// Explicit seed instead of the study's.
     #[serde(default)]
     pub seed: Option<u64>,
-    /// One inversion per value of a setting: `sweep.<setting> = [...]`, as `sweep."first_image_errors.exposure" = [0.0, 0.02]`.
+    /// One inversion per value of a setting: `sweep.<setting> = [...]`, such as `sweep."first_image_errors.exposure" = [0.0, 0.02]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
@@ -706,11 +715,11 @@ pub struct TraverseItem {
     pub id: String,
     /// Id of the missions to drive.
     pub missions: String,
-    /// Id of a raster (a DEM or terrain) of friction coefficients between tyre and ground, in the terrain's coordinates; where
-    /// it holds no data the surface's own counts.
+    /// Id of a raster (a DEM or terrain) of friction coefficients between tyre and ground, in the terrain's coordinates; where it
+    /// has no data, the value of the surface applies.
     #[serde(default)]
     pub wheel_friction_raster: Option<String>,
-    /// As `wheel_friction_raster`, of rolling resistance over normal force.
+    /// As `wheel_friction_raster`, for rolling resistance over normal force.
     #[serde(default)]
     pub rolling_resistance_raster: Option<String>,
     /// One run per value of a parameter: `sweep.<parameter> = [...]`.
@@ -718,34 +727,34 @@ pub struct TraverseItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
-/// `[[hypothesis]]`: a claim about groups of missions, stated before the run. It computes nothing: the report tests it and shows it
-/// apart from everything that was not stated beforehand.
+/// `[[hypothesis]]`: a claim about groups of missions, stated before the run. It does not affect the run; the report tests it and shows
+/// it separately from exploratory comparisons.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HypothesisItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
     pub id: String,
-    /// Figure of the missions.
+    /// Metric of the missions.
     pub statistic: Statistic,
-    /// Labels of the groups: two for `difference` and `equivalence`, three or more in their order for `trend`.
+    /// Labels of the groups: two for `difference` and `equivalence`, three or more in order for `trend`.
     pub groups: Vec<String>,
-    /// Id of the `[[traverse]]` whose missions are meant, one that drives all of these groups and has no sweep; needed where several
-    /// drive them.
+    /// Id of the `[[traverse]]` whose missions are tested. It must drive all of these groups and have no sweep; required if several
+    /// traverses drive them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub traverse: Option<String>,
-    /// What is claimed.
+    /// The claim.
     pub test: HypothesisTest,
-    /// Which way the figure goes from the first group to the last; either way when absent. Not for `equivalence`.
+    /// Direction of the change from the first group to the last; default: either. Not for `equivalence`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<Direction>,
-    /// For `equivalence` alone: the difference of means from which on groups count as different, in the unit of the statistic
-    /// (success: percentage points), above 0.
+    /// Only for `equivalence`: the smallest difference of means at which groups count as different, above 0, in the unit of the
+    /// statistic (success: percentage points).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub margin: Option<f64>,
     /// Level of the test, above 0 and below 0.5.
     #[serde(default = "default_alpha")]
     pub alpha: f64,
-    /// Hypotheses with the same text share one level (Holm, 1979); all that name none are one family.
+    /// Hypotheses of the same family share one level (Holm, 1979); those without a family form one family.
     #[serde(default)]
     pub family: String,
 }
@@ -755,31 +764,42 @@ fn default_alpha() -> f64 {
 }
 
 impl HypothesisItem {
-    /// Refuses what no test can be made of, whatever the study.
+    /// Refuses claims that cannot be tested in any study.
     ///
     /// # Errors
-    /// The first key that is wrong.
+    /// The first invalid key.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_schemas::study::HypothesisItem;
+    /// use serde_json::{from_value, json};
+    ///
+    /// let claim = json!({ "id": "a", "statistic": "time_s", "groups": ["smooth", "rough"], "test": "equivalence" });
+    /// let claim: HypothesisItem = from_value(claim).unwrap();
+    /// assert_eq!(claim.check().unwrap_err().key, "margin");
+    /// assert!(HypothesisItem { margin: Some(2.0), ..claim }.check().is_ok());
+    /// ```
     pub fn check(&self) -> Result<(), ParameterError> {
         let refuse = |key: &str, message: String| Err(ParameterError::new(key, message));
         let (count, trend) = (self.groups.len(), self.test == HypothesisTest::Trend);
         if trend && count < 3 {
-            return refuse("groups", format!("has {count}; a trend goes over three or more, in their order"));
+            return refuse("groups", format!("has {count}; a trend needs three or more, in order"));
         }
         if !trend && count != 2 {
-            return refuse("groups", format!("has {count}; this test compares two"));
+            return refuse("groups", format!("has {count}; this test compares exactly two"));
         }
         if let Some(k) = (1..count).find(|&k| self.groups[..k].contains(&self.groups[k])) {
             return refuse(&format!("groups.{k}"), format!("names \"{}\" twice", self.groups[k]));
         }
         let equivalence = self.test == HypothesisTest::Equivalence;
         match self.margin {
-            None if equivalence => refuse("margin", "is missing; equivalence is claimed within a margin".into())?,
-            Some(_) if !equivalence => refuse("margin", "is for `test = \"equivalence\"` alone".into())?,
+            None if equivalence => refuse("margin", "is missing; an equivalence claim needs a margin".into())?,
+            Some(_) if !equivalence => refuse("margin", "applies only to `test = \"equivalence\"`".into())?,
             Some(margin) => drop(ParameterError::positive("margin", margin)?),
             None => {}
         }
         if equivalence && self.direction.is_some() {
-            return refuse("direction", "has no meaning for equivalence".into());
+            return refuse("direction", "does not apply to equivalence".into());
         }
         if !(self.alpha > 0.0 && self.alpha < 0.5) {
             return refuse("alpha", format!("is {}; it must be above 0 and below 0.5", self.alpha));
@@ -788,8 +808,8 @@ impl HypothesisItem {
     }
 }
 
-/// Figure of the missions that a hypothesis is about. Every terrain counts once, by the mean of its missions: of all for
-/// `success`, of the successful ones for the others.
+/// Metric of a hypothesis. Every terrain counts once, with the mean of its missions: of all missions for `success`, of the successful
+/// ones for the others.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Statistic {
@@ -824,7 +844,7 @@ impl Statistic {
         Self::MaxRollDeg,
     ];
 
-    /// Column of the table `missions`; `success` is that of no column.
+    /// Column of the table `missions`; `success` has no column.
     pub const fn column(self) -> &'static str {
         match self {
             Self::Success => "success",
@@ -838,7 +858,7 @@ impl Statistic {
         }
     }
 
-    /// Value of a mission: of success 100 or 0 (%), of others NaN unless it reached its goal.
+    /// Value for a mission: 100 or 0 (%) for success; for others, NaN unless it reached its goal.
     pub fn of(self, mission: &MissionRow) -> f64 {
         let succeeded = mission.outcome == EventKind::Success.name();
         match self {
@@ -856,19 +876,19 @@ impl Statistic {
     }
 }
 
-/// What a hypothesis claims.
+/// Claim of a hypothesis.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HypothesisTest {
     /// Two groups differ.
     Difference,
-    /// The figure rises or falls over ordered groups.
+    /// The metric rises or falls over ordered groups.
     Trend,
     /// The means of two groups differ by less than the margin.
     Equivalence,
 }
 
-/// Which way a figure goes.
+/// Direction of a change.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Direction {
@@ -878,7 +898,7 @@ pub enum Direction {
     Falls,
 }
 
-/// `[roughness]`: how every heightfield is classified and described.
+/// `[roughness]`: settings for the roughness and classes of every heightfield.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RoughnessSection {
@@ -886,17 +906,17 @@ pub struct RoughnessSection {
     pub low_max: f64,
     /// Largest Moore gradient of class `semi`, m/m (140 levels per cm).
     pub semi_max: f64,
-    /// Border left out of the class shares, m (Majhor and Bos, section 2.4).
+    /// Border excluded from the class shares, m (Majhor and Bos, section 2.4).
     pub border_m: f64,
     /// Radius of the disk of the morphological closing, m (half diagonal of a Husky A200's outline).
     pub closing_radius_m: f64,
-    /// Window of the moving average below which the band RMS is taken, m; 41 cells when absent.
+    /// Window of the moving average that is subtracted for the band RMS, m; default: 41 cells.
     pub band_window_m: Option<f64>,
 }
 
 impl Default for RoughnessSection {
     fn default() -> Self {
-        // 0.75/128 cm a level: Unreal Engine's Z scale of 0.75 % (Majhor and Bos, section 2.2).
+        // 0.75/128 cm per level: Unreal Engine's Z scale of 0.75 % (Majhor and Bos, section 2.2).
         let level_cm = 0.75 / 128.0;
         Self {
             low_max: 50.0 * level_cm,
@@ -911,10 +931,108 @@ impl Default for RoughnessSection {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tables::{Cell, Column, ColumnType, Record};
+    use serde_json::{from_value, json, to_value};
 
-    /// Every rule is broken alone.
+    /// Thresholds as published: 50 and 140 levels of 0.75/128 cm per cm.
     #[test]
-    fn val_hypotheses_that_no_test_fits_are_refused() {
+    fn val_roughness_by_default() {
+        let section: RoughnessSection = from_value(json!({})).unwrap();
+        assert_eq!((section.low_max, section.semi_max), (0.292_968_75, 0.820_312_5));
+        assert_eq!((section.border_m, section.closing_radius_m, section.band_window_m), (5.0, 0.57, None));
+        assert!(from_value::<RoughnessSection>(json!({ "low": 1.0 })).is_err());
+    }
+
+    /// A statistic is named like its column, and reads that column of a mission.
+    #[test]
+    fn val_statistics_are_those_of_their_columns() {
+        let table = MissionRow::TABLE;
+        // Every number of the row is the position of its column.
+        let cell = |(k, column): (usize, &Column)| match (column.name, column.column_type) {
+            ("outcome", _) => Cell::Text("success".to_owned()),
+            (_, ColumnType::Text) => Cell::Text(String::new()),
+            (_, ColumnType::I64) => Cell::I64(1),
+            _ => Cell::F64(k as f64),
+        };
+        let reached = MissionRow::from_cells(table.columns.iter().enumerate().map(cell).collect()).unwrap();
+        let stuck = MissionRow { outcome: "stuck".to_owned(), ..reached.clone() };
+        for statistic in Statistic::ALL {
+            assert_eq!(to_value(statistic).unwrap(), statistic.column());
+            let found = [statistic.of(&reached), statistic.of(&stuck)];
+            if statistic == Statistic::Success {
+                assert_eq!(found, [100.0, 0.0]);
+                continue;
+            }
+            let column = table.position(statistic.column()).unwrap();
+            assert_eq!(found[0], column as f64, "{statistic:?}");
+            assert!(found[1].is_nan(), "{statistic:?}");
+        }
+    }
+
+    /// Each value at its bounds and beyond.
+    #[test]
+    fn val_perturbations_out_of_range_are_refused() {
+        let refusal = |perturb: Perturb| perturb.check().err().map(|e| e.key).unwrap_or_default();
+        let plain = Perturb::default;
+        assert_eq!(refusal(plain()), "");
+        for share in [1e-9, 0.999] {
+            assert_eq!(refusal(Perturb { share, ..plain() }), "", "{share}");
+        }
+        for share in [0.0, 1.0, -0.1, f64::NAN] {
+            assert_eq!(refusal(Perturb { share, ..plain() }), "share", "{share}");
+        }
+        for (trajectories, key) in [(1, ""), (999, ""), (0, "trajectories"), (1000, "trajectories")] {
+            assert_eq!(refusal(Perturb { trajectories, ..plain() }), key, "{trajectories}");
+        }
+        for (levels, key) in [(2, ""), (64, ""), (0, "levels"), (1, "levels"), (3, "levels"), (66, "levels")] {
+            assert_eq!(refusal(Perturb { levels, ..plain() }), key, "{levels}");
+        }
+        assert_eq!(refusal(Perturb { rovers: Some(0), ..plain() }), "rovers");
+        assert_eq!(refusal(Perturb { rovers: Some(1), ..plain() }), "");
+    }
+
+    /// Values that may be written in two ways.
+    #[test]
+    fn val_short_and_long_forms() {
+        let creators: Vec<Creator> = from_value(json!(["Lab", { "name": "Doe, Jane", "affiliation": "Lab" }])).unwrap();
+        assert_eq!((creators[0].name(), creators[0].affiliation()), ("Lab", None));
+        let jane = &creators[1];
+        assert_eq!((jane.name(), jane.orcid(), jane.affiliation()), ("Doe, Jane", None, Some("Lab")));
+        let refused = from_value::<Creator>(json!({ "name": "Doe", "mail": "x" })).unwrap_err().to_string();
+        assert!(refused.contains("must be a name, or a table"), "{refused}");
+
+        let shares = |value| from_value::<Shares>(value).map(Shares::by_part).ok();
+        assert_eq!(shares(json!([0.5, 0.25, 0.25])), Some([0.5, 0.25, 0.25]));
+        assert_eq!(shares(json!([0.75, 0.25])), Some([0.75, 0.0, 0.25]));
+        assert_eq!((shares(json!([1.0])), shares(json!(0.5))), (None, None));
+
+        let files = |value| from_value::<Files>(value).unwrap();
+        assert_eq!(files(json!("a.tif")).numbered(), [(None, "a.tif")]);
+        assert_eq!(files(json!(["a", "b"])).numbered(), [(Some(0), "a"), (Some(1), "b")]);
+        assert_eq!(Files::default().numbered(), []);
+
+        let onto = |value| from_value::<Onto>(value).ok();
+        assert_eq!(onto(json!("site")), Some(Onto::Id("site".to_owned())));
+        assert_eq!(onto(json!({ "background": "fit" })), Some(Onto::Background { background: "fit".to_owned() }));
+        assert_eq!(onto(json!({ "fit": "fit" })), None);
+        let stated = json!({ "model": "exponential", "sigma_m": 0.03, "range_m": 0.28 });
+        let stated: FitReference = from_value(stated).unwrap();
+        let FitReference::Stated { model, parameters } = &stated else { panic!("{stated:?}") };
+        let values = [parameters["sigma_m"], parameters["range_m"]];
+        assert_eq!((model.as_str(), parameters.len(), values), ("exponential", 2, [0.03, 0.28]));
+    }
+
+    /// Words of the command line and of folders are those of studies.
+    #[test]
+    fn val_simulators_have_one_name() {
+        for simulator in Simulator::ALL {
+            assert_eq!(to_value(simulator).unwrap(), simulator.name());
+        }
+    }
+
+    /// Each rule is violated on its own.
+    #[test]
+    fn val_untestable_hypotheses_are_refused() {
         let base = serde_json::json!({ "id": "a", "statistic": "success", "groups": ["x", "y"], "test": "difference" });
         let refusal = |changes: &[(&str, serde_json::Value)]| {
             let mut item = base.clone();

@@ -94,11 +94,16 @@ fn val_exports_are_refused() {
         &["fewer than 127 posts a side"],
     );
     refused(path, &["convert", "holed.asc", "out.tif", "--crop"], USAGE, &["--for"]);
-    refused(path, &["convert", "row.asc", "out", "--for", "isaac"], USAGE, &["isaac", "3 x 1 cells are no surface"]);
+    refused(
+        path,
+        &["convert", "row.asc", "out", "--for", "isaac"],
+        USAGE,
+        &["isaac", "a surface needs at least 2 x 2 cells, got 3 x 1"],
+    );
     refused(path, &["convert", "holed.asc", "out", "--for", "blender"], USAGE, &["blender", "unreal", "isaac"]);
-    refused(path, &["convert", "holed.asc", "file", "--for", "isaac"], USAGE, &["file: is a file"]);
-    refused(path, &["convert", "holed.asc", "out", "--for", "isaac", "--cog"], USAGE, &["--cog takes a GeoTIFF"]);
-    refused(path, &["convert", "holed.asc", "out"], USAGE, &["the ending names no DEM format", ".usda"]);
+    refused(path, &["convert", "holed.asc", "file", "--for", "isaac"], USAGE, &["file is a file"]);
+    refused(path, &["convert", "holed.asc", "out", "--for", "isaac", "--cog"], USAGE, &["--cog requires a GeoTIFF"]);
+    refused(path, &["convert", "holed.asc", "out"], USAGE, &["unknown extension", ".usda"]);
 }
 
 /// Windows beyond their surface and cells that do not go together are refused before anything runs, with the place in the study and what
@@ -151,7 +156,7 @@ fn val_places_are_refused_before_the_run() {
         (texture("empirical", "cell_m = 2.0\nmethod = \"gaussians\""), &["`method`", "made by `fft_ma` only"]),
         (
             texture("exponential", "cell_m = 1.0\nonto = \"site\""),
-            &["`cell_m`", "make the texture at the base's cell size"],
+            &["`cell_m`", "generate the texture at the base's cell size"],
         ),
     ] {
         let (code, told) = told(&tables);
@@ -180,15 +185,25 @@ fn val_vehicles_and_decimations_are_refused() {
     let folder = area();
     let path = folder.path();
     write(path, "a.asc", "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n3 5\n");
-    refused(path, &["convert", "a.asc", "b.tif", "--max-error", "1"], USAGE, &["b.tif", "decimate meshes", ".glb"]);
+    refused(
+        path,
+        &["convert", "a.asc", "b.tif", "--max-error", "1"],
+        USAGE,
+        &["b.tif", "apply to meshes only", ".glb"],
+    );
     refused(path, &["convert", "a.asc", "b", "--for", "unity", "--triangles", "9"], USAGE, &["isaac"]);
     refused(path, &["convert", "a.asc", "b.obj", "--max-error", "-1"], USAGE, &["must be 0 m or more, got -1 m"]);
     refused(path, &["convert", "a.asc", "b.obj", "--triangles", "1"], USAGE, &["take 2 triangles"]);
-    refused(path, &["convert", "a.asc", "b.obj", "--surface", "ice"], USAGE, &["--surface is for vehicles"]);
+    refused(path, &["convert", "a.asc", "b.obj", "--surface", "ice"], USAGE, &["--surface applies to vehicles only"]);
     refused(path, &["convert", "husky", "b.xml"], USAGE, &["`husky`", "`husky_a200`"]);
     refused(path, &["convert", "husky_a200", "b.obj"], USAGE, &["is a vehicle", ".urdf"]);
     refused(path, &["convert", "husky_a200", "b.urdf", "--surface", "mud"], USAGE, &["mud", "hard_soil"]);
-    refused(path, &["convert", "husky_a200", "b.urdf", "--window", "0,0,1,1"], USAGE, &["takes --surface"]);
+    refused(
+        path,
+        &["convert", "husky_a200", "b.urdf", "--window", "0,0,1,1"],
+        USAGE,
+        &["the only option for a vehicle is --surface"],
+    );
     refused(path, &["convert", "none.toml", "b.urdf"], INPUT, &["none.toml"]);
 }
 
@@ -216,7 +231,7 @@ fn val_hypotheses_are_refused_with_the_line() {
         );
     };
     refused("success", "sucess", &["sucess", "rms_pitch_rate_deg_s", "statistic"]);
-    refused("\"b\"", "\"c\"", &["no missions are driven in a group \"c\"", "there are a, b"]);
+    refused("\"b\"", "\"c\"", &["no missions are driven in group \"c\"", "known: a, b"]);
     refused("\"b\"", "\"a\"", &["twice"]);
     refused("difference", "trend", &["three or more"]);
     refused("difference", "same", &["same", "equivalence"]);
@@ -231,7 +246,7 @@ fn val_hypotheses_are_refused_with_the_line() {
     refused("[[hypothesis]]", second, &["traverse", "is missing", "again, husky"]);
     let swept = "missions = \"short\"\nsweep.speed_m_s = [0.5, 1.0]\n";
     let hypothesis = format!("{swept}{good}");
-    study_refused("missions = \"short\"\n", &hypothesis, &["traverse", "no run without a sweep"]);
+    study_refused("missions = \"short\"\n", &hypothesis, &["traverse", "no traverse without a sweep"]);
     let other = good.replace("\"h\"", "\"k\"") + "alpha = 0.01\n";
     study_refused(
         "missions = \"short\"\n",
@@ -340,19 +355,23 @@ fn val_bands_of_vehicles_are_refused() {
     };
     roughness(&["--vehicle", "wb=2.7"], USAGE, &["wb=WHEELBASE,r=TYRE_RADIUS"]);
     roughness(&["--vehicle", "wb=2.7,r=big"], USAGE, &["wb=WHEELBASE,r=TYRE_RADIUS"]);
-    roughness(&["--vehicle", "wb=0,r=0.4"], USAGE, &["wheelbase", "above 0"]);
-    roughness(&["--vehicle", "wb=1,r=-0.4"], USAGE, &["tyre radius", "above 0"]);
-    roughness(&["--vehicle", "wb=0.1,r=0.4"], USAGE, &["no band"]);
+    roughness(&["--vehicle", "wb=0,r=0.4"], USAGE, &["wheelbase must be positive"]);
+    roughness(&["--vehicle", "wb=1,r=-0.4"], USAGE, &["tyre radius must be positive"]);
+    roughness(&["--vehicle", "wb=0.1,r=0.4"], USAGE, &["limits of a wavelength band", "increasing"]);
     roughness(&["--vehicle", "tank"], USAGE, &["tank", "husky_a200"]);
     roughness(&["--band", "0.4"], USAGE, &["MIN:MAX"]);
-    roughness(&["--band", "3:0.4"], USAGE, &["no band", "rise"]);
-    roughness(&["--vehicle", "wb=1,r=0.33"], INPUT, &["cells of at most 0.165 m", "--allow-coarse"]);
+    roughness(&["--band", "3:0.4"], USAGE, &["limits of a wavelength band", "increasing", "3 to 0.4 m"]);
+    roughness(
+        &["--vehicle", "wb=1,r=0.33"],
+        INPUT,
+        &["cells of 0.2 m are too coarse", "at most 0.165 m", "--allow-coarse"],
+    );
     roughness(&["--band", "0.4:4"], INPUT, &["at least 16 m"]);
     roughness(&["--detrend", "ma"], USAGE, &["--vehicle", "--band"]);
     roughness(&["--rms-map", "rms.txt"], USAGE, &["--vehicle", "--band"]);
     roughness(&["--band", "0.4:3", "--vehicle", "husky_a200"], USAGE, &["cannot be used with"]);
     let map = ["--band", "0.4:3", "--rms-map", "rms.txt", "--rms-predicted", "dem.asc"];
-    roughness(&[&map[..], &["--detrend", "ma"]].concat(), USAGE, &["different detrenders are not comparable"]);
+    roughness(&[&map[..], &["--detrend", "ma"]].concat(), USAGE, &["results of other detrenders are not comparable"]);
     write(path, "other.asc", "ncols 3\nnrows 3\nxllcorner 0\nyllcorner 0\ncellsize 0.2\n1 1 1 1 1 1 1 1 1\n");
     let other = ["--band", "0.4:3", "--rms-map", "rms.txt", "--rms-predicted", "other.asc"];
     roughness(&other, INPUT, &["other.asc", "cells"]);
@@ -393,7 +412,7 @@ fn val_rasters_that_cannot_be_fitted_say_why() {
     write(path, "fit.json", "{\"model\": \"exponential\", \"parameters\": {\"sigma_m\": -1.0, \"range_m\": 0.3}}");
     refused(path, &["texture", "fit.json", "-o", "t.tif"], USAGE, &["sigma_m"]);
     write(path, "not.json", "{\"a\": 1}");
-    refused(path, &["texture", "not.json", "-o", "t.tif"], INPUT, &["no fit file"]);
+    refused(path, &["texture", "not.json", "-o", "t.tif"], INPUT, &["not a fit file"]);
 }
 
 /// An ESRI ASCII grid of 96 x 96 cells of 0.1 m.
@@ -507,11 +526,11 @@ fn val_bad_masks_are_input_errors() {
         assert_eq!(stderr.lines().count(), 1, "one sentence: {stderr}");
     };
     fit("--mask", "nothing.geojson", &["nothing.geojson", "no such file"]);
-    fit("--mask", "point.geojson", &["point.geojson", "holds a Point"]);
+    fit("--mask", "point.geojson", &["point.geojson", "contains a Point"]);
     fit("--mask", "broken.geojson", &["broken.geojson", "not GeoJSON"]);
     fit("--mask", "metres.geojson", &["metres.geojson", "none of the DEM's cells", "coordinates"]);
     fit("--exclude", "all.geojson", &["all.geojson", "none of the DEM's cells"]);
-    fit("--mask", "words.txt", &["words.txt", "no raster"]);
+    fit("--mask", "words.txt", &["words.txt", "not a supported raster"]);
     // What the mask keeps lies outside of the window.
     let ring = "[-84.6, 36.4], [-84.3, 36.4], [-84.3, 36.7], [-84.6, 36.7], [-84.6, 36.4]";
     write(path, "west.geojson", &format!("{{\"type\": \"Polygon\", \"coordinates\": [[{ring}]]}}"));
@@ -541,9 +560,9 @@ fn val_bad_transects_are_input_errors() {
     write(path, "heights.csv", "1\n2\n4\n");
     for verb in [&["info"][..], &["fit", "-o", "fit.json"]] {
         let call = |name| [verb, &[name]].concat();
-        refused(path, &call("words.csv"), INPUT, &["words.csv: line 3, column 2", "\"two\" is no number"]);
-        refused(path, &call("uneven.csv"), INPUT, &["uneven.csv: line 3, column 1", "even place"]);
-        refused(path, &call("heights.csv"), USAGE, &["heights.csv", "cell size", "must be given"]);
+        refused(path, &call("words.csv"), INPUT, &["words.csv: line 3, column 2", "\"two\" is not a number"]);
+        refused(path, &call("uneven.csv"), INPUT, &["uneven.csv: line 3, column 1", "not evenly spaced"]);
+        refused(path, &call("heights.csv"), USAGE, &["heights.csv", "give the spacing", "cell size"]);
     }
     refused(path, &["fit", "heights.csv", "--window", "0,0,1,1", "-o", "f.json"], USAGE, &["transects", "window"]);
 }
@@ -553,7 +572,7 @@ fn val_settings_of_point_clouds_are_refused_elsewhere() {
     let folder = area();
     let path = folder.path();
     std::fs::copy(sastrugi_fixtures::jacksboro(), path.join("site.tif")).unwrap();
-    let words = ["site.tif", "is no point cloud"];
+    let words = ["site.tif", "is not a point cloud"];
     for more in [&["--statistic", "median"][..], &["--fill", "2"], &["--ground"]] {
         refused(path, &[&["fit", "site.tif", "-o", "fit.json"], more].concat(), USAGE, &words);
         refused(path, &[&["convert", "site.tif", "b.tif"], more].concat(), USAGE, &words);

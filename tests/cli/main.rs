@@ -10,6 +10,7 @@ mod metadata;
 mod minus;
 mod navigate;
 mod pack;
+mod snapshots;
 mod sources;
 mod study;
 mod verbs;

@@ -21,8 +21,8 @@ fn study(head: &str, dem: &str) -> String {
 fn val_a_licence_that_the_data_does_not_permit_is_refused() {
     let folder = area();
     for (license, words) in [
-        ("CC-BY-SA-4.0", "must be \"CC-BY-SA-4.0\" as well"),
-        ("CC-BY-NC-4.0", "must be non-commercial too"),
+        ("CC-BY-SA-4.0", "must also be \"CC-BY-SA-4.0\""),
+        ("CC-BY-NC-4.0", "must also be non-commercial"),
         ("CC-BY-ND-4.0", "permits no derivatives"),
     ] {
         write(folder.path(), "study.toml", &study("", &format!("license = \"{license}\"\n")));
@@ -56,7 +56,7 @@ fn val_what_the_data_asks_for_goes_with_everything_made_from_it() {
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     let release = folder.path().join("release");
-    assert!(read(&release, "manifest.json").contains("is not known here"));
+    assert!(read(&release, "manifest.json").contains("it is unknown whether data under"));
     assert_eq!(read(&release, "dem/site.license.txt"), "The agency's terms, whole.\n");
     assert!(read(&release, "study.toml").contains("license_file = \"dem/site.license.txt\""));
     for name in ["README.md", "CITATION.cff", "LICENSE"] {

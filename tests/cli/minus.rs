@@ -79,20 +79,17 @@ fn val_a_study_subtracts_as_the_verb_does() {
     }
 }
 
-/// A measured site with snow on it, and the site in a file that says it lies elsewhere: shifts of part and of several cells come back to
-/// 0.05 cells (0.001 measured without snow).
+/// A measured catchment with 10 cm of snow on it, and the catchment in a file that says it lies elsewhere: shifts of part and of several cells come
+/// back to 0.05 cells. On its slopes (0.4 m/m along either axis) some 900 independent patches of snow leave a standard error of 0.01 cells; the
+/// snow has mean 0 and sigma 0.1 m, to which reading the ground between its cells adds a few centimetres in square.
 #[test]
-#[ignore = "slow: ./test --full"]
 fn val_a_measured_site_is_moved_back() {
-    let Some(site) = sastrugi_fixtures::measured("akl_lidar.tif") else {
-        eprintln!("SKIPPED: ../shared/data/akl_lidar.tif is absent");
-        return;
-    };
+    let site = sastrugi_fixtures::workspace_root().join("fixtures/dem/pozo_blanca.tif");
     let folder = area();
     let path = folder.path();
-    write(path, "snow.json", r#"{"model": "exponential", "parameters": {"sigma_m": 0.1, "range_m": 4.0}}"#);
+    write(path, "snow.json", r#"{"model": "exponential", "parameters": {"sigma_m": 0.1, "range_m": 3.0}}"#);
     let site = site.to_str().unwrap();
-    let call = ["texture", "snow.json", "--size", "600x860", "--cell", "1", "--phase", "gaussian", "--onto", site];
+    let call = ["texture", "snow.json", "--size", "271x281", "--cell", "1", "--phase", "gaussian", "--onto", site];
     done(path, &[&call[..], &["-o", "snow.tif"]].concat());
     done(path, &["convert", site, "site.asc"]);
     let text = std::fs::read_to_string(path.join("site.asc")).unwrap();
@@ -103,9 +100,12 @@ fn val_a_measured_site_is_moved_back() {
             &["fit", "snow.tif", "--minus", "moved.asc", "--outer-scale", "25", "--bootstrap", "0", "-o", "d.json"],
         );
         let fit: Value = serde_json::from_slice(&std::fs::read(path.join("d.json")).unwrap()).unwrap();
-        let shift = &fit["source"]["minus"]["coregistration"]["shift_m"];
-        let error = [0, 1].map(|k| shift[k].as_f64().unwrap() + by[k]);
-        assert!(error.iter().all(|e| e.abs() < 0.05), "{by:?}: {shift}");
+        let c = &fit["source"]["minus"]["coregistration"];
+        let error = [0, 1].map(|k| number(&c["shift_m"][k]) + by[k]);
+        assert!(error.iter().all(|e| e.abs() < 0.05), "{by:?}: {c}");
+        assert!(number(&c["raise_m"]).abs() < 0.03 && c["converged"] == true, "{by:?}: {c}");
+        let sigma = number(&fit["parameters"]["sigma_m"]);
+        assert!((sigma / 0.1 - 1.0).abs() < 0.25, "{by:?}: {}", fit["parameters"]);
     }
 }
 
@@ -175,7 +175,7 @@ fn val_a_failed_fit_keeps_the_coregistration() {
     let call = sastrugi_in(path, &["run", "study.toml", "-o", "release", "--quiet"]);
     let said = format!("{}{}", call.stdout, call.stderr);
     assert!(
-        call.code == 3 && said.contains("white") && said.contains("two.asc was moved -0.03"),
+        call.code == 3 && said.contains("white") && said.contains("two.asc was shifted -0.03"),
         "{} {said}",
         call.code
     );
@@ -185,7 +185,7 @@ fn val_a_failed_fit_keeps_the_coregistration() {
         (&["--difference", "one.asc"][..], own),
         (&["--difference", "./two.asc"], own),
         (&["--difference", "d.tif", "--map", "d.tif"], own),
-        (&["--difference", "d.xyz"], "names no DEM format"),
+        (&["--difference", "d.xyz"], "unknown extension"),
     ] {
         let call = sastrugi_in(path, &[&fit[..], more].concat());
         assert!(call.code == 2 && call.stderr.contains(words), "{more:?}: {} {}", call.code, call.stderr);

@@ -74,10 +74,10 @@ fn val_refusals() {
         (&["--set", "cost=raster"], 2, "`cost` is \"raster\", which needs the `cost_raster` of a [[route]]"),
         (&["--set", "threshold_m=0"], 2, "`threshold_m` is 0; it must be a finite number above 0"),
         (&["--set", "class_factors=[1.0, -2.0, 3.0]"], 2, "`class_factors.1` is -2"),
-        (&["--set", "plan_cell_m=300"], 65, "leaves fewer than two cells"),
-        (&["--set", "max_down_deg=3"], 65, "no route joins start and goal"),
+        (&["--set", "plan_cell_m=300"], 65, "leaves fewer than two planning cells"),
+        (&["--set", "max_down_deg=3"], 65, "no route from start to goal"),
         (&["--method", "dijkstra"], 2, "expected one of `grid`, `roadmap`, `theta_star`, `anytime`"),
-        (&["--vehicle", "tank"], 2, "`tank` is no vehicle"),
+        (&["--vehicle", "tank"], 2, "is `tank`; it must"),
         (&["--obstacles", "nothing.geojson"], 65, "nothing.geojson: no such file"),
     ] {
         let call = navigate(folder.path(), &[more, &["-o", "route.svg"]].concat());
@@ -91,7 +91,7 @@ fn val_refusals() {
             "1,2",
             "239010,3765150",
             65,
-            "the start (1, 2) lies outside of the terrain, which covers x from 238933 to 239204",
+            "the start (1, 2) lies outside the terrain, which covers x from 238933 to 239204",
         ),
         (
             "238990.5,3765350.5",
@@ -105,7 +105,7 @@ fn val_refusals() {
             65,
             "the goal (238940.5, 3765110.5) cannot be entered: there is no height in its cell",
         ),
-        ("238990", "239010,3765150", 2, "`--start 238990`: it takes 2 numbers"),
+        ("238990", "239010,3765150", 2, "`--start 238990`: expected 2 numbers"),
     ] {
         let call = sastrugi_in(folder.path(), &["navigate", &dem, "--start", start, "--goal", goal, "-o", "r.geojson"]);
         assert_eq!(call.code, code, "{}", call.stderr);
@@ -125,7 +125,7 @@ fn val_a_team_follows_the_route() {
     // A route alone has no room for a team.
     let call = navigate(folder.path(), &[&team[..], &["-o", "route.svg"]].concat());
     assert_eq!(call.code, 2);
-    assert!(call.stderr.contains("a team needs a folder"), "{}", call.stderr);
+    assert!(call.stderr.contains("a team is written as a release"), "{}", call.stderr);
     let call = navigate(folder.path(), &["--team", "members=3", "-o", "release"]);
     assert_eq!(call.code, 2, "{}", call.stderr);
 }

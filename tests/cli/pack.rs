@@ -102,9 +102,9 @@ fn val_only_whole_releases_are_packed() {
     };
     refused(&["pack", "release", "-o", "release/a.tar"], 2, "sealed");
     refused(&["pack", "release", "-o", "."], 2, "folder");
-    refused(&["pack", "nowhere", "-o", "a.tar"], 65, "no release");
+    refused(&["pack", "nowhere", "-o", "a.tar"], 65, "not a sastrugi release");
     fs::create_dir(path.join("empty")).unwrap();
-    refused(&["pack", "empty", "-o", "a.tar"], 65, "no release");
+    refused(&["pack", "empty", "-o", "a.tar"], 65, "not a sastrugi release");
     let shard = sastrugi_in(path, &["run", "study.toml", "--shard", "1/2", "-o", "shard", "--quiet"]);
     assert_eq!(shard.code, 0, "{}", shard.stderr);
     for arguments in [
@@ -114,7 +114,7 @@ fn val_only_whole_releases_are_packed() {
         &["report", "shard", "-o", "r"],
         &["verify", "shard"],
     ] {
-        refused(arguments, 65, "join the shards first: `sastrugi merge");
+        refused(arguments, 65, "the shards first: `sastrugi merge");
     }
     fs::write(path.join("release/README.md"), "changed").unwrap();
     refused(&["pack", "release", "-o", "a.tar"], 4, "README.md");

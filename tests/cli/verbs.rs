@@ -17,25 +17,6 @@ fn ok_json(folder: &Path, arguments: &[&str]) -> Value {
 }
 
 #[test]
-fn val_help_has_an_example_for_every_verb() {
-    let folder = area();
-    let help = ok(folder.path(), &["--help"]);
-    let verbs: Vec<&str> = help
-        .lines()
-        .skip_while(|l| !l.starts_with("Commands:"))
-        .skip(1)
-        .take_while(|l| !l.is_empty())
-        .filter(|l| l.starts_with("  ") && !l.starts_with("   "))
-        .filter_map(|l| l.split_whitespace().next())
-        .filter(|v| *v != "help")
-        .collect();
-    assert!(verbs.len() >= 15, "{verbs:?}");
-    for verb in verbs {
-        assert!(ok(folder.path(), &[verb, "--help"]).contains(&format!("sastrugi {verb}")), "{verb} has no example");
-    }
-}
-
-#[test]
 fn val_kinds_and_schemas_are_complete() {
     let folder = area();
     let kinds = ok_json(folder.path(), &["kinds"]);
@@ -43,21 +24,28 @@ fn val_kinds_and_schemas_are_complete() {
     for kind in ["multifractal", "weierstrass_mandelbrot", "fft_ma", "exponential", "husky_a200", "straight"] {
         assert!(names.contains(&kind), "{kind} is not in {names:?}");
     }
+    let mut count = 0;
     for kind in kinds.as_array().unwrap() {
         let text = |key: &str| kind[key].as_str().unwrap_or_default().len();
         assert!(text("summary") > 10 && text("source") > 3, "{kind}");
         for (name, parameter) in kind["parameters"]["properties"].as_object().into_iter().flatten() {
             let described = parameter.get("description").is_some() || parameter.get("$ref").is_some();
             assert!(described, "{}: {name} has no description", kind["kind"]);
+            count += 1;
         }
     }
+    assert!(count > 100, "{count} parameters");
     let schema = ok_json(folder.path(), &["schema"]);
     for section in ["study", "roughness", "dem", "terrain", "fit", "texture", "missions", "traverse"] {
         assert!(schema["properties"].get(section).is_some(), "{section}");
     }
     let table = ok_json(folder.path(), &["schema", "missions"]);
-    assert!(table["columns"].as_array().unwrap().iter().any(|c| c["unit"] == "m/s2"));
-    assert!(ok(folder.path(), &["completions", "bash"]).contains("sastrugi"));
+    let column = table["columns"].as_array().unwrap().iter().find(|c| c["name"] == "rms_vertical_acceleration_m_s2");
+    assert_eq!(column.unwrap()["unit"], "m/s2");
+    let completions = ok(folder.path(), &["completions", "bash"]);
+    for word in ["complete -F", "photoclinometry", "--outer-scale", "--set-missions"] {
+        assert!(completions.contains(word), "{word} is not completed");
+    }
 }
 
 /// A verb with `--seed` gives the bytes of a study's item with that explicit seed.
@@ -108,7 +96,9 @@ fn val_fit_texture_roughness_and_info_work_on_files() {
     let dem = sastrugi_fixtures::jacksboro();
     let dem = dem.to_str().unwrap();
     let fit = ok_json(path, &["fit", dem, "--outer-scale", "5000", "--mode", "paper", "-o", "fit.json"]);
-    assert!(fit["parameters"]["sigma_m"].as_f64().unwrap() > 10.0);
+    let sigma = fit["parameters"]["sigma_m"].as_f64().unwrap();
+    // The residual of a plain moving average of 67 x 53 cells has 88 m, 68 m without its extreme tenth.
+    assert!((55.0..110.0).contains(&sigma), "{sigma}");
     assert_eq!(ok_json(path, &["info", "fit.json"])["what"], "covariance fit");
     let made = ok_json(path, &["texture", "fit.json", "--size", "9000x9000", "--cell", "90", "-o", "t.tif"]);
     assert_eq!(made["grid"]["rows"], 100);
@@ -173,7 +163,7 @@ fn val_a_texture_is_added_to_the_background_of_a_fit() {
     ok(path, &["verify", "release", "--recompute", "all", "--quiet"]);
 
     for (onto, words) in
-        [("{ background = \"g\" }", "`onto.background` names \"g\""), ("{ fit = \"f\" }", "`onto` is the id")]
+        [("{ background = \"g\" }", "`onto.background` names \"g\""), ("{ fit = \"f\" }", "`onto` must be the id")]
     {
         write(path, "study.toml", &textured(&texture("on", &format!("onto = {onto}"))));
         let call = sastrugi_in(path, &["run", "study.toml", "-o", "other", "--quiet"]);
@@ -194,7 +184,7 @@ fn val_notes_of_a_texture_on_a_base() {
         ok_json(path, &[&call[..], more].concat())["notes"].to_string()
     };
     let size = ["--size", "12x12", "--cell", "0.1"];
-    let chosen = "covariance = residual: the base is taken for a measured background";
+    let chosen = "covariance = residual: the base is assumed to be a measured background";
     let own = "still has its own texture";
     let onto = |base: &str, more: &[&str]| notes(&[&size[..], &["--onto", base], more].concat());
     let said = onto("background.tif", &[]);
@@ -331,9 +321,17 @@ fn val_textures_are_tiled_shaped_and_fill_holes() {
     let size = ["--size", "3x2", "--cell", "0.05"];
     let tiled = ok_json(path, &[&["texture", "own.json", "--tile", "2x3", "-o", "tiled.tif"], &size[..]].concat());
     assert_eq!((tiled["grid"]["rows"].as_u64(), tiled["grid"]["cols"].as_u64()), (Some(80), Some(180)));
+    // Two tiles one above the other, three side by side.
+    let all = heights(path, "tiled.tif");
+    let tile = |row: usize, col: usize| all[180 * (row % 40) + col % 60];
+    assert!((0..80 * 180).all(|k| all[k] == tile(k / 180, k % 180)) && all[0] != all[1]);
     for method in ["gaussians", "quasi_wavelets", "cholesky"] {
         let made = ok_json(path, &[&["texture", "own.json", "--method", method, "-o", "m.tif"], &size[..]].concat());
-        assert_eq!(made["grid"]["cols"], 60, "{method}");
+        assert_eq!([&made["grid"]["rows"], &made["grid"]["cols"]], [40, 60], "{method}");
+        // Sigma is 0.01 m; some 24 independent patches leave it a standard error of 15 %.
+        let all = heights(path, "m.tif");
+        let rms = (all.iter().map(|z| z * z).sum::<f64>() / all.len() as f64).sqrt();
+        assert!((0.004..0.02).contains(&rms), "{method}: {rms}");
     }
     // 24 values around a hole.
     let rows = ["1 1.01 1 1 1.02"; 2].join("\n");
@@ -362,8 +360,14 @@ fn val_conversions_keep_the_heights() {
         }
     }
     ok(path, &["convert", "a.tif", "e.obj"]);
+    let mesh = std::fs::read_to_string(path.join("e.obj")).unwrap();
+    let count = |start: &str| mesh.lines().filter(|line| line.starts_with(start)).count();
+    assert_eq!((count("v "), count("f ")), (90 * 70, 2 * 89 * 69));
     ok(path, &["convert", "a.tif", "f.png"]);
-    assert!(path.join("e.obj").exists() && path.join("f.png").exists());
+    // Signature, and in the first chunk width and height, 16 bits, grey.
+    let picture = std::fs::read(path.join("f.png")).unwrap();
+    assert!(picture.starts_with(b"\x89PNG\r\n\x1a\n"));
+    assert_eq!(picture[16..26], [0, 0, 0, 90, 0, 0, 0, 70, 16, 0]);
 }
 
 /// A DEM of 90 x 70 cells as a picture of 30 x 24 pixels; what cannot be drawn is refused.
@@ -535,7 +539,10 @@ fn val_plan_says_what_is_stale_and_why() {
     let path = folder.path();
     write(path, "study.toml", &small_study());
     let plan = ok_json(path, &["plan", "study.toml", "-o", "release"]);
-    assert_eq!(plan["ready"], 0);
+    // A DEM as it is and in metres, two fits, a texture, three terrains; a description of each of these five surfaces; missions and traverse on
+    // the terrains.
+    let found = (plan["ready"].as_u64(), plan["items"].as_u64(), plan["stale"].as_array().map(Vec::len));
+    assert_eq!(found, (Some(0), Some(19), Some(19)));
     assert!(plan["stale"].as_array().unwrap().iter().all(|s| s["reason"] == "new"));
     ok(path, &["run", "study.toml", "-o", "release", "--quiet"]);
     assert!(ok(path, &["plan", "study.toml", "-o", "release"]).contains("0 to compute"));
@@ -617,9 +624,13 @@ fn val_every_kind_is_described() {
     let folder = area();
     let all = sastrugi_in(folder.path(), &["kinds", "--json"]);
     let kinds: Value = serde_json::from_str(&all.stdout).unwrap();
+    assert!(kinds.as_array().unwrap().len() > 30, "{kinds}");
     for kind in kinds.as_array().unwrap() {
-        let call = sastrugi_in(folder.path(), &["kinds", kind["kind"].as_str().unwrap()]);
-        assert_eq!(call.code, 0, "{}: {}", kind["kind"], call.stderr);
+        let name = kind["kind"].as_str().unwrap();
+        let told = ok(folder.path(), &["kinds", name]);
+        let head =
+            format!("{} {name}: {}\nsource: ", kind["family"].as_str().unwrap(), kind["summary"].as_str().unwrap());
+        assert!(told.contains(&head), "{told}");
     }
     let wedge = sastrugi_in(folder.path(), &["kinds", "wedge"]).stdout;
     assert!(wedge.contains("slots[].team") && !wedge.contains("slots[].team[].team[]"), "{wedge}");

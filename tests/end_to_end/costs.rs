@@ -1,16 +1,16 @@
-//! Estimates of `plan` beside the times of a run, stage by stage: a table to look at, which no test suite can hold a machine to.
+//! Estimates of `plan` and measured times of a run, stage by stage: a table to look at, since no test can fix the speed of a machine.
 
 use sastrugi_tests::{area, sastrugi_in};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fs;
 
-/// Estimated and measured seconds of the stages of the quick start on one thread. Times are wall times: run it alone on an idle machine.
+/// Estimated and measured seconds of the stages of the quick start on one thread. Times are wall-clock times: run it alone on an idle machine.
 ///
 ///     cargo test --release --workspace --test end_to_end costs -- --ignored --nocapture
 #[test]
 #[ignore = "measures: run it alone, with --nocapture"]
-fn val_estimates_stand_beside_measured_times() {
+fn val_estimates_and_measured_times() {
     let folder = area();
     let study = sastrugi_fixtures::workspace_root().join("fixtures/studies/quickstart.toml");
     let study = study.display().to_string();

@@ -1,4 +1,4 @@
-//! Folders that lie: lists that lead out of them, numbers that no program can follow; and folders that a killed call leaves behind.
+//! Hostile folders: lists of paths that lead out of them, numbers that no program can process; and folders left by a killed call.
 
 use sastrugi_tests::{Called, area, program, sastrugi_in, small_study, sums, write};
 use std::fs;
@@ -17,7 +17,7 @@ fn ends_with(call: &Called, code: i32, words: &str) {
     assert!(call.code == code && said.contains(words), "expected {code} and \"{words}\": {} {said}", call.code);
 }
 
-/// Whatever names a file outside of a release is refused by every verb that would read it, and nothing is packed.
+/// A path outside a release is refused by every verb that would read it, and nothing is packed.
 #[test]
 fn val_lists_of_a_release_stay_inside() {
     let folder = area();
@@ -30,9 +30,9 @@ fn val_lists_of_a_release_stay_inside() {
     let other = named.keys().find(|name| name.starts_with("tables/samples/")).unwrap();
     let secret = write(path, "secret", "mine").display().to_string();
     for (place, words) in [
-        (secret.as_str(), "cannot be one"),
-        ("../secret", "cannot be one"),
-        ("tables/../../secret", "cannot be one"),
+        (secret.as_str(), "cannot be a file of a release"),
+        ("../secret", "cannot be a file of a release"),
+        ("tables/../../secret", "cannot be a file of a release"),
         (other, "twice"),
     ] {
         let quoted = |name: &str| format!("\"path\": \"{name}\"");
@@ -54,12 +54,12 @@ fn val_lists_of_a_release_stay_inside() {
         assert!(!path.join("a.tar").exists() && !path.join("page").exists());
     }
     fs::write(path.join("release/manifest.json"), manifest).unwrap();
-    ends_with(&sastrugi_in(path, &["verify", "release", "--quiet"]), 0, "");
+    assert_eq!(sastrugi_in(path, &["verify", "release", "--quiet"]).code, 0);
     fs::create_dir_all(path.join("release/more/folders")).unwrap();
     ends_with(&sastrugi_in(path, &["verify", "release"]), 4, "more/folders/");
 }
 
-/// Records of shards and of work areas are believed as little as manifests.
+/// Records of shards and of work areas are trusted as little as manifests.
 #[test]
 fn val_records_of_items_stay_inside() {
     let folder = area();
@@ -87,7 +87,7 @@ fn val_records_of_items_stay_inside() {
     }
     fs::write(path.join("part-1/shard.json"), description).unwrap();
 
-    // A record that names a file elsewhere is no record: the shard is damaged, and a work area computes the item again.
+    // A record that names a file elsewhere is invalid: the shard is damaged, and a work area recomputes the item.
     write(path, "secret", "mine");
     let records = |root: &str| {
         let mut found = vec![path.join(root)];
@@ -117,9 +117,9 @@ fn val_records_of_items_stay_inside() {
     assert_eq!((again.code, sums(&path.join("release"))), (0, whole), "{}", again.stderr);
 }
 
-/// Killed at any time, `report` has made a whole page or none, and one that was there stays until the next is whole.
+/// Killed at any time, `report` has written a complete page or none, and an existing page stays until the next is complete.
 #[test]
-fn val_a_killed_report_is_whole_or_not_there() {
+fn val_a_killed_report_is_complete_or_absent() {
     let folder = area();
     let path = folder.path();
     release_in(path);
@@ -142,7 +142,7 @@ fn val_a_killed_report_is_whole_or_not_there() {
         }
         let mut child = report().spawn().unwrap();
         std::thread::sleep(Duration::from_secs_f64(whole_s * f64::from(k % 6) / 5.0));
-        // It may have ended by itself.
+        // It may have exited by itself.
         let _ = child.kill();
         child.wait().unwrap();
         if k < 6 || path.join("page").exists() {
@@ -156,11 +156,18 @@ fn val_a_killed_report_is_whole_or_not_there() {
     };
     assert_eq!(left("."), Vec::<String>::new(), "drafts of killed reports are removed by the next");
 
-    // What is not of a report is not replaced, and what an earlier report had more of does not stay.
+    // Files that are not part of a report are not replaced, and files that only an earlier report had do not stay.
     fs::write(path.join("page/figures/old.svg"), "<svg/>").unwrap();
     assert!(report().status().unwrap().success());
     assert!(!path.join("page/figures/old.svg").exists() && figures() == expected_figures);
     fs::write(path.join("page/thesis.tex"), "mine").unwrap();
     assert_eq!(report().status().unwrap().code(), Some(2));
     assert!(path.join("page/thesis.tex").is_file());
+
+    // A file of that name is not replaced, either.
+    write(path, "diary", "mine");
+    let call = sastrugi_in(path, &["report", "release", "-o", "diary", "--quiet"]);
+    let said: String = call.stderr.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    assert!(call.code == 2 && said.contains("diary is a file, not a folder"), "{} {said}", call.code);
+    assert_eq!(fs::read_to_string(path.join("diary")).unwrap(), "mine");
 }

@@ -1,4 +1,4 @@
-//! Studies of images: files, tables, refusals, the same bytes however they are made.
+//! Studies of images: files, tables, refusals, and the same bytes however the study is run.
 
 use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, run_with_kills, sastrugi_in, write};
 use serde_json::Value;
@@ -60,7 +60,7 @@ fn json(path: &Path) -> Value {
     serde_json::from_str(&fs::read_to_string(path).unwrap()).unwrap()
 }
 
-/// Every image has its three files and its row; what the description says is what the study asked for.
+/// Every image has its three files and its row, and its description states the settings of the study.
 #[test]
 fn val_images_have_files_and_rows() {
     let folder = area();
@@ -85,7 +85,7 @@ fn val_images_have_files_and_rows() {
         assert_eq!(row["has_albedo_map"], Value::from(row["surface_id"].as_str().unwrap().starts_with("mars")));
     }
     let of = |id: &str| images.iter().find(|row| row["image_id"] == id).unwrap();
-    // Haze is the least that a pixel has, and no noise reaches so far below.
+    // Haze is the lowest brightness of a pixel, and no noise reaches that far below it.
     assert!(number(of("suns-0"), "mean_brightness") > 0.1 && number(of("suns-0"), "png_white") > 0.2);
     assert!(of("rover")["pixel_m"].is_null() && number(of("rover"), "share_without_ground") > 0.05);
     assert_eq!(number(of("map-mars-0001"), "share_without_ground"), 1.0 - covered(128, 96));
@@ -93,17 +93,17 @@ fn val_images_have_files_and_rows() {
     assert_ne!(suns[0]["rendered"]["noise_stream"], suns[1]["rendered"]["noise_stream"]);
     let page = fs::read_to_string(release.join("report/index.html")).unwrap();
     assert!(
-        page.contains("What do cameras see?")
+        page.contains("What do the cameras see?")
             && page.contains("sun from 315 degrees (north-west), 25 degrees above the horizon")
     );
 }
 
-/// Share of 2 x 2 rays a pixel that fall between the outer cell centres, whose pixels are cells.
+/// Share of the 2 x 2 rays per pixel that fall between the outer cell centres; pixels are cells.
 fn covered(cols: u32, rows: u32) -> f64 {
     f64::from((2 * cols - 2) * (2 * rows - 2)) / f64::from(4 * cols * rows)
 }
 
-/// One thread, two, two shards, after kills: the same bytes, and `verify` makes them again.
+/// One thread, two, two shards, after kills: the same bytes, and `verify` reproduces them.
 #[test]
 fn prop_a_release_of_images_has_the_same_bytes() {
     let (one, two) = (area(), area());
@@ -119,7 +119,7 @@ fn prop_a_release_of_images_has_the_same_bytes() {
     assert_eq!(call.code, 0, "{}", call.stderr);
 }
 
-/// The verb with the surface and the seed of a study's item makes its bytes.
+/// The verb, with the surface and the seed of a study's item, gives its bytes.
 #[test]
 fn val_the_verb_has_the_bytes_of_the_study() {
     let folder = area();
@@ -133,14 +133,14 @@ fn val_the_verb_has_the_bytes_of_the_study() {
     let read = |path: &str| fs::read(folder.path().join(path)).unwrap();
     assert_eq!(read("sun.tif"), read("release/image/suns-0.tif"));
     assert_eq!(json(&folder.path().join("sun.json"))["sun"]["elevation_deg"], 45.0);
-    // The albedo map beside a DEM counts.
+    // The albedo map next to a DEM is used.
     let call =
         sastrugi_in(folder.path(), &["render", "release/terrain/mars-0001.tif", "--sun", "100,20", "-o", "map.tif"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     assert_eq!(read("map.tif"), read("release/image/map-mars-0001.tif"));
 }
 
-/// Wrong studies, one sentence each.
+/// Invalid studies are refused with one sentence each.
 #[test]
 fn val_wrong_images_are_refused() {
     let folder = area();
@@ -156,7 +156,7 @@ fn val_wrong_images_are_refused() {
         ("relative = 0.01", "relative = -1.0", "`noise.relative` is -1"),
         ("surface = \"mars\"", "surface = \"venus\"", "names \"venus\""),
         ("pixel_m = 0.1", "pixel_m = -0.1", "`camera.pixel_m` is -0.1"),
-        ("target_m = [3.2, 3.0, 0.0]", "target_m = [3.2, 0.5, 0.3]", "`camera.target_m` is where the camera is"),
+        ("target_m = [3.2, 3.0, 0.0]", "target_m = [3.2, 0.5, 0.3]", "`camera.target_m` is the position"),
         ("kind = \"parallel\"", "kind = \"fisheye\"", "unknown variant `fisheye`"),
         ("id = \"orbit\"", "id = \"suns-120\"", "is taken"),
     ] {
@@ -169,7 +169,7 @@ fn val_wrong_images_are_refused() {
     }
 }
 
-/// A camera that does not fit its surface costs its own item only, and the release says so.
+/// A camera that does not fit its surface fails only its own item, and the release states it.
 #[test]
 fn val_a_camera_below_the_ground_fails_alone() {
     let folder = area();
@@ -177,7 +177,11 @@ fn val_a_camera_below_the_ground_fails_alone() {
     write(folder.path(), "study.toml", &STUDY.replace("position_m = [3.2, 0.5, 0.3]", buried));
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 3, "{}", call.stderr);
-    assert!(call.stderr.contains("`camera.position_m` is at z = -50 m; the ground there is at "), "{}", call.stderr);
+    assert!(
+        call.stderr.contains("`camera.position_m` is at z = -50 m; it must be above the ground"),
+        "{}",
+        call.stderr
+    );
     assert_eq!(rows(&folder.path().join("release"), "images").len(), 6);
 }
 
@@ -202,16 +206,16 @@ fn val_the_verb_refuses_and_draws() {
             && !path.join("mars.json").exists()
     );
     for (arguments, code, words) in [
-        (&["planetary", "-o", "x.jpg"][..], 2, "name it .tif or .png"),
+        (&["planetary", "-o", "x.jpg"][..], 2, "images are written as .tif or .png"),
         (&["planetary", "--sun", "0,-1", "-o", "x.tif"], 2, "`sun.elevation_deg` is -1"),
-        (&["planetary", "--sun", "0", "-o", "x.tif"], 2, "azimuth and elevation in degrees, as `--sun 120,20`"),
+        (&["planetary", "--sun", "0", "-o", "x.tif"], 2, "azimuth and elevation in degrees, such as `--sun 120,20`"),
         (&["planetary", "--camera", "nadir:900", "-o", "x.tif"], 2, "does not fill a pixel"),
         (
             &["planetary", "--set", "photometry={lambert=0,lommel_seeliger=0}", "-o", "x.tif"],
             2,
             "would reflect nothing",
         ),
-        (&["planetary", "--camera", "fisheye", "-o", "x.tif"], 2, "it takes nadir[:PIXEL_M]"),
+        (&["planetary", "--camera", "fisheye", "-o", "x.tif"], 2, "expected nadir[:PIXEL_M]"),
         (&["planetary", "--size", "9x9", "-o", "x.tif"], 2, "nadir covers the surface"),
         (&["planetary", "--set", "samples=99", "-o", "x.tif"], 2, "`samples` is 99"),
         (&["planetary", "--set", "smaples=2", "-o", "x.tif"], 2, "did you mean `samples`"),
@@ -220,7 +224,7 @@ fn val_the_verb_refuses_and_draws() {
         (&["planetary", "--albedo", "none.tif", "-o", "x.tif"], 65, "no such file"),
         (&["planetary", "--albedo", "1.5", "-o", "x.tif"], 2, "`albedo` is 1.5"),
         (&["planetary", "--camera", "pinhole:1,1,9,1,1,99", "--size", "4x4", "-o", "x.tif"], 2, "sees no ground"),
-        (&["planetary", "--camera", "pinhole:-1,1,9,1,1,0", "-o", "x.tif"], 2, "no ground"),
+        (&["planetary", "--camera", "pinhole:-1,1,9,1,1,0", "-o", "x.tif"], 2, "where the surface has no data"),
     ] {
         let called = render(&[arguments, &["--quiet"]].concat());
         let told: String = called.stderr.split_whitespace().collect::<Vec<_>>().join(" ");

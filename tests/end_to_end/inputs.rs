@@ -1,4 +1,4 @@
-//! Terrains made from rasters and measured points: a real DEM refined, and worlds whose rocks follow a raster.
+//! Terrains from rasters and measured points: a refined real DEM, and worlds whose rocks follow a raster.
 
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, resample};
 use sastrugi_store::dem::{self, Crs, WriteOptions};
@@ -69,12 +69,12 @@ fn pozo_file() -> PathBuf {
     sastrugi_fixtures::workspace_root().join("fixtures/dem/pozo_blanca.tif")
 }
 
-/// Posts of the shipped lidar DEM that its refinement stands on.
+/// Posts of the shipped lidar DEM that is refined.
 fn pozo() -> dem::Dem {
     dem::read(&pozo_file()).unwrap()
 }
 
-/// South-west post of a window of `posts` x `posts` posts with data all around.
+/// South-west post of a window of `posts` x `posts` posts surrounded by data.
 fn corner(grid: &Grid, posts: usize) -> [usize; 2] {
     let margin = 12;
     let whole = |[row, col]: [usize; 2]| {
@@ -87,7 +87,7 @@ fn corner(grid: &Grid, posts: usize) -> [usize; 2] {
     [row + margin + posts - 1, col + margin]
 }
 
-/// Writes the inputs, and returns the study with the window at a place that has data.
+/// Writes the inputs; returns the study with the window placed where there is data.
 fn prepare(folder: &Path) -> (String, [f64; 2]) {
     fs::copy(pozo_file(), folder.join("pozo.tif")).unwrap();
     let site = pozo();
@@ -113,7 +113,8 @@ fn prepare(folder: &Path) -> (String, [f64; 2]) {
     (study, origin)
 }
 
-/// Files go into the release, once for all replicates; a released study runs by itself to the same bytes; threads and shards change none.
+/// Input files go into the release, once for all replicates; a released study reproduces the same bytes without other files; threads and
+/// shards change none.
 #[test]
 fn val_inputs_go_with_the_release() {
     let folder = area();
@@ -178,7 +179,7 @@ fn val_inputs_go_with_the_release() {
     assert!(share(true) > 0.1 && share(false) < 0.05, "{} {}", share(true), share(false));
 }
 
-/// What is wrong with an input is said, with its place in the study.
+/// Errors in an input are reported with their place in the study.
 #[test]
 fn val_wrong_inputs_are_refused() {
     let folder = area();
@@ -190,11 +191,11 @@ fn val_wrong_inputs_are_refused() {
         (call.code, call.stderr)
     };
     for (from, to, code, words) in [
-        ("\"bright.tif\"", "\"brihgt\"", 2, "names \"brihgt\", which no item before it has"),
+        ("\"bright.tif\"", "\"brihgt\"", 2, "names \"brihgt\", which no earlier section defines"),
         ("\"bright.tif\"", "\"dark.tif\"", 65, "dark.tif: no such file"),
         ("\"laser.csv\"", "\"laser.txt\"", 65, "laser.txt: no such file"),
         ("world.rock-potential", "site.rock-potential", 2, "names the map `rock-potential` of \"site\""),
-        ("albedo = \"bright.tif\"", "sweep.albedo = [\"bright.tif\", \"shares.tif\"]", 2, "sweeps over files"),
+        ("albedo = \"bright.tif\"", "sweep.albedo = [\"bright.tif\", \"shares.tif\"]", 2, "cannot sweep over files"),
         ("image_resolution_m = 0.5", "image_resolution_m = 0.1", 2, "wider than 0.2 m"),
     ] {
         let (found, said) = refused(from, to);
@@ -219,10 +220,10 @@ fn made(params: &Value, inputs: &[Input]) -> Terrain {
     generator.generate(&Streams::for_seed(1, "terrain"), inputs).unwrap()
 }
 
-/// On the shipped DEMs the refined surface keeps every post, and passes through points a metre off: lidar with posts 1 m apart on slopes of
-/// 26 degrees with holes beside the window, and radar with posts 70 to 90 m apart, which are off the lattice.
+/// On the shipped DEMs, the refined surface keeps every post and passes through points a metre away from them: lidar with posts 1 m apart on
+/// slopes of 26 degrees with holes next to the window, and radar with posts 70 to 90 m apart, which are off the lattice.
 #[test]
-fn val_real_dems_are_kept() {
+fn val_posts_of_real_dems_are_kept() {
     let pozo = pozo().grid;
     let [row, col] = corner(&pozo, 14);
     let origin = [pozo.geometry.x(col), pozo.geometry.y(row)];
@@ -244,7 +245,7 @@ fn val_real_dems_are_kept() {
     let mut posts = 0;
     for k in 0..g.len() {
         if let Some(z) = fine.heights.height(g.x(k % g.cols), g.y(k / g.cols)) {
-            // Posts of this file lie on samples to the last digits of its coordinates.
+            // Posts of this file lie on samples up to the last digits of its coordinates.
             assert!((z - pozo.values[k]).abs() < 1e-6, "{z} {}", pozo.values[k]);
             posts += 1;
         }
@@ -267,12 +268,12 @@ fn val_real_dems_are_kept() {
     let near =
         (0..g.len()).filter_map(|k| Some((fine.height(g.x(k % g.cols), g.y(k / g.cols))? - jacksboro.values[k]).abs()));
     let errors: Vec<f64> = near.collect();
-    // Samples 1 m apart carry texture between them and the post.
+    // Samples 1 m from a post differ from it by the texture in between.
     assert!(errors.len() >= 25 && errors.iter().all(|e| *e < 1.0), "{errors:?}");
 }
 
 /// A synthetic site on a slope of 1 %, with noise of 3 cm (neighbours differ by 0.3 to 0.7 m) and a tenth of its posts missing: H of its fit is
-/// the true one within 0.1. Eight sites for each H scatter by 0.01 to 0.03 (printed), so that the bound is far beyond chance.
+/// within 0.1 of the true one. Eight sites for each H scatter by 0.01 to 0.03 (printed), so the bound is far beyond chance.
 #[test]
 fn stat_hurst_survives_slope_noise_and_holes() {
     for hurst in [0.5, 0.7, 0.8] {

@@ -1,4 +1,4 @@
-//! Nothing of a user's is lost: folders of other programs, links, full disks, good releases.
+//! No user data is lost: folders of other programs, links, full disks, good releases.
 
 use sastrugi_tests::{area, called, program, rows, sastrugi_in, small_study, sums, write};
 use std::fs;
@@ -19,17 +19,17 @@ fn run(folder: &Path, more: &[&str]) -> sastrugi_tests::Called {
 }
 
 #[test]
-fn val_a_folder_that_is_no_work_area_is_left_alone() {
+fn val_a_folder_that_is_not_a_work_area_is_left_alone() {
     let folder = area();
     study(folder.path());
     let mine = folder.path().join("photos/items/terrain/t/holiday");
     fs::create_dir_all(&mine).unwrap();
     fs::write(mine.join("a.jpg"), "a").unwrap();
     let call = run(folder.path(), &["--work", "photos"]);
-    assert!(call.code == 2 && call.stderr.contains("not a sastrugi work area"), "{} {}", call.code, call.stderr);
+    assert!(call.code == 2 && call.stderr.contains("nor a sastrugi work area"), "{} {}", call.code, call.stderr);
     assert!(mine.join("a.jpg").is_file() && !folder.path().join("photos/lock").exists());
 
-    // In a work area of ours, only what has the name of a result is ever removed.
+    // In a sastrugi work area, only entries with the name of a result are ever removed.
     assert_eq!(run(folder.path(), &[]).code, 0);
     let kept = folder.path().join("release.work/items/terrain/t/notes");
     let orphan = folder.path().join("release.work/items/terrain/t/unfinished-0123456789abcdef0123456789abcdef");
@@ -73,10 +73,10 @@ fn val_links_in_a_work_area_are_not_followed() {
     assert_eq!(run(path, &[]).code, 0);
 }
 
-/// A limit on the size of files stands for a disk that is full: the run ends, and the release that is there stays.
+/// A limit on file sizes simulates a full disk: the run stops, and the existing release stays.
 #[cfg(unix)]
 #[test]
-fn val_errors_of_the_machine_are_no_failed_items() {
+fn val_machine_errors_are_not_failed_items() {
     let folder = area();
     let path = folder.path();
     write(path, "study.toml", &small_study());
@@ -86,17 +86,17 @@ fn val_errors_of_the_machine_are_no_failed_items() {
     let limited = format!("ulimit -f 8; exec {} run study.toml -o release --quiet", program().display());
     let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
     assert_eq!(call.code, 1, "{}", call.stderr);
-    let words = ["File too large", "release.work", "no release was written"];
+    let words = ["File too large", "release.work", "without writing a release"];
     assert!(words.iter().all(|word| call.stderr.contains(word)), "{}", call.stderr);
     assert_eq!(sums(&path.join("release")), before);
     assert_eq!(run(path, &[]).code, 0);
     assert_eq!(sums(&path.join("release")), before);
 }
 
-/// What never ends, or never begins, is not read: at the command line, and where a study names it.
+/// Pipes and devices, which may never end or never start, are not read, whether named on the command line or in a study.
 #[cfg(unix)]
 #[test]
-fn val_pipes_and_devices_are_no_input() {
+fn val_pipes_and_devices_are_refused_as_input() {
     let folder = area();
     let path = folder.path();
     study(path);
@@ -124,10 +124,10 @@ fn val_pipes_and_devices_are_no_input() {
     }
 }
 
-/// Where memory is out, the call ends with the code of what may work later, and nothing is left that looks whole.
+/// Out of memory, the call exits with the code for temporary failures and leaves nothing that looks complete.
 #[cfg(unix)]
 #[test]
-fn val_a_lack_of_memory_is_no_crash() {
+fn val_a_lack_of_memory_does_not_crash() {
     let folder = area();
     let path = folder.path();
     write(path, "world.toml", "kind = \"multifractal\"\nseed = 1\nsize_px = [6000, 6000]\n");
@@ -137,9 +137,9 @@ fn val_a_lack_of_memory_is_no_crash() {
     assert!(!path.join("out.tif").exists());
 }
 
-/// A limit that is given holds: nothing is begun that needs more. Without one the same study runs, and `plan` says what it needs.
+/// A memory limit holds: no work is started that needs more. Without one, the same study runs, and `plan` states the memory that it needs.
 #[test]
-fn val_a_limit_of_memory_is_kept() {
+fn val_a_memory_limit_is_kept() {
     let folder = area();
     let path = folder.path();
     study(path);
@@ -148,10 +148,10 @@ fn val_a_limit_of_memory_is_kept() {
     let largest = plan["stale"].as_array().unwrap().iter().map(|s| s["memory_bytes"].as_u64().unwrap()).max().unwrap();
     let gib = largest as f64 / f64::from(1u32 << 30);
     let call = run(path, &["--memory", &format!("{:.4}", 0.9 * gib)]);
-    assert!(call.code == 2 && call.stderr.contains("by itself"), "{} {}", call.code, call.stderr);
+    assert!(call.code == 2 && call.stderr.contains("alone needs"), "{} {}", call.code, call.stderr);
     assert!(!path.join("release").exists());
     assert_eq!(run(path, &["--memory", &format!("{:.4}", 1.1 * gib)]).code, 0);
-    // What is there needs no memory.
+    // Finished results need no memory.
     assert_eq!(run(path, &["--memory", "0.001"]).code, 0);
     assert_eq!(run(path, &["--memory", "0"]).code, 2);
 }

@@ -1,4 +1,4 @@
-//! A study to a sealed release, and what verification says of it.
+//! From a study to a sealed release, and its verification.
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
@@ -169,7 +169,7 @@ fn val_verify_recomputes_and_compares() {
     let left: Vec<_> = fs::read_dir(folder.path()).unwrap().map(|e| e.unwrap().file_name()).collect();
     assert_eq!(left.len(), 3, "{left:?}");
     assert_eq!(fs::read_dir(scratch.path()).unwrap().count(), 0, "the scratch stays behind");
-    // A release whose heights do not follow from its study, with sums that agree with themselves.
+    // A forged release whose heights do not follow from its study, with consistent checksums.
     let release = folder.path().join("release");
     let study = fs::read_to_string(release.join("study.toml")).unwrap();
     forge(&release, "study.toml", &study.replace("seed = 7", "seed = 8"));
@@ -177,14 +177,14 @@ fn val_verify_recomputes_and_compares() {
     let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
     assert_eq!(call.code, 4, "{}{}", call.stdout, call.stderr);
     assert!(call.stdout.contains("terrain/smooth.tif"), "{}", call.stdout);
-    // A study that gives the same heights and other figures: the tables tell.
+    // A study that gives the same heights but other metrics: the tables differ.
     forge(&release, "study.toml", &study.replace("[[dem]]", "[roughness]\nborder_m = 1.0\n\n[[dem]]"));
     let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "18", "--quiet"]);
     assert_eq!(call.code, 4, "{}{}", call.stdout, call.stderr);
     assert!(call.stdout.contains("tables/terrains"), "{}", call.stdout);
 }
 
-/// A manifest that was changed together with its sums: what it states of files, and of the release, is computed again.
+/// A manifest that was changed together with its checksums: its statements on files and on the release are recomputed.
 #[test]
 fn val_verify_names_what_a_changed_manifest_states() {
     let folder = area();
@@ -224,11 +224,11 @@ fn val_verify_names_what_a_changed_manifest_states() {
         call.stdout
     };
     let named = |said: &str, path: &str, key: &str| {
-        let sentence = format!("{path}: computed again, `{key}` differs");
+        let sentence = format!("{path}: when recomputed, `{key}` differs");
         assert!(said.contains(&sentence), "\"{sentence}\" is not said: {said}");
     };
     let (all, items) = (verify("all"), verify("19"));
-    // What no program of ours writes is seen when all is made again.
+    // Values that sastrugi never writes are noticed when everything is recomputed.
     named(&all, recording, "maker");
     for said in [all, items] {
         of_files.iter().for_each(|(path, key, _)| named(&said, path, key));
@@ -236,7 +236,7 @@ fn val_verify_names_what_a_changed_manifest_states() {
     }
 }
 
-/// A release whose import failed holds the measured file, and can be made again from itself.
+/// A release whose import failed contains the measured file and can be reproduced from itself.
 #[test]
 fn val_a_failed_import_keeps_its_input() {
     let folder = area();
@@ -256,7 +256,7 @@ fn val_a_failed_import_keeps_its_input() {
     fs::remove_file(folder.path().join("broken.tif")).unwrap();
     let again = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
     assert_eq!(again.code, 0, "{}{}", again.stdout, again.stderr);
-    // Alone, it makes no release.
+    // Alone, it does not give a release.
     let head = broken.split("[[dem]]").next().unwrap();
     write(folder.path(), "broken.tif", "no raster");
     write(folder.path(), "alone.toml", &format!("{head}[[dem]]\nid = \"broken\"\nfile = \"broken.tif\"\n"));
@@ -264,9 +264,9 @@ fn val_a_failed_import_keeps_its_input() {
     assert!(alone.code == 65 && !folder.path().join("other").exists(), "{} {}", alone.code, alone.stderr);
 }
 
-/// `plan` looks at a work area that a run is using, and changes nothing there.
+/// `plan` reads a work area that a run is using and changes nothing there.
 #[test]
-fn val_a_plan_only_looks() {
+fn val_a_plan_only_reads() {
     let folder = area();
     release_in(folder.path());
     let unfinished =
@@ -281,7 +281,7 @@ fn val_a_plan_only_looks() {
     assert!(none.code == 0 && none.stdout.contains("new") && !folder.path().join("nothing.work").exists());
 }
 
-/// Replaces a document and mends manifest and sums.
+/// Replaces a document and updates manifest and checksums.
 fn forge(release: &Path, path: &str, text: &str) {
     fs::write(release.join(path), text).unwrap();
     forge_manifest(release, |manifest| {
@@ -295,7 +295,7 @@ fn artifact_of<'a>(manifest: &'a mut Value, path: &str) -> &'a mut Value {
     manifest["artifacts"].as_array_mut().unwrap().iter_mut().find(|a| a["path"] == path).unwrap()
 }
 
-/// Changes the manifest and mends the sums.
+/// Changes the manifest and updates the checksums.
 fn forge_manifest(release: &Path, change: impl FnOnce(&mut Value)) {
     let path = release.join("manifest.json");
     let mut manifest: Value = serde_json::from_slice(&fs::read(&path).unwrap()).unwrap();
@@ -335,7 +335,7 @@ fn flip(path: &Path) {
     fs::write(path, bytes).unwrap();
 }
 
-/// A result that was changed in the work area is found, dropped, and made again by the next run.
+/// A result that was changed in the work area is detected, dropped, and recomputed by the next run.
 #[test]
 fn val_a_changed_result_is_not_sealed() {
     let folder = area();
@@ -349,7 +349,7 @@ fn val_a_changed_result_is_not_sealed() {
     assert_eq!(sums(&folder.path().join("release")), whole);
 }
 
-/// Nothing is written into a sealed release, by whatever name it is called.
+/// Nothing is written into a sealed release, by whatever path it is reached.
 #[test]
 fn val_a_sealed_release_stays_sealed() {
     let folder = area();
@@ -364,7 +364,7 @@ fn val_a_sealed_release_stays_sealed() {
     assert_eq!(sastrugi_in(folder.path(), &["verify", "release", "--quiet"]).code, 0);
 }
 
-/// Some item's file; which items a shard holds depends on their keys.
+/// A file of some item; which items a shard has depends on their keys.
 fn first_product(items: &Path) -> std::path::PathBuf {
     let below = |folder: &Path| -> Vec<_> { fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect() };
     let files = below(items).iter().flat_map(|stage| below(stage)).flat_map(|item| below(&item)).collect::<Vec<_>>();
@@ -400,9 +400,9 @@ fn val_merge_refuses_what_does_not_fit() {
     refused(&["a", "b"], "missing or damaged");
 }
 
-/// `analyze` says of a recording what the release's table says of the mission, bit for bit.
+/// `analyze` finds in a recording the metrics that the release's table has for the mission, bit for bit.
 #[test]
-fn val_a_recording_is_judged_as_its_mission() {
+fn val_a_recording_has_the_metrics_of_its_mission() {
     for flavour in ["viewer", "ros2"] {
         let folder = area();
         let study = small_study().replace("seed = 7\n", &format!("seed = 7\nmcap = \"{flavour}\"\n"));
@@ -418,7 +418,7 @@ fn val_a_recording_is_judged_as_its_mission() {
     }
 }
 
-/// A bag is named by its folder; other folders are refused with what would be right.
+/// A bag is named by its folder; other folders are refused with advice.
 fn bags_are_judged_as_their_files(folder: &Path) {
     let bag = "release/mcap/smooth/husky-0001";
     let json = |arguments: &[&str]| -> Value {
@@ -438,7 +438,7 @@ fn bags_are_judged_as_their_files(folder: &Path) {
         assert!(call.code == 65 && call.stderr.contains(words), "{} {}", call.code, call.stderr);
     };
     fs::create_dir(folder.join("bag")).unwrap();
-    refused("name an .mcap file");
+    refused("give an .mcap file");
     write(&folder.join("bag"), "metadata.yaml", "rosbag2_bagfile_information:\n  relative_file_paths:\n    - a.db3\n");
     refused("`ros2 bag convert`");
 }
@@ -453,7 +453,7 @@ fn recordings_are_judged_as_missions(folder: &Path) {
         let found: Value = serde_json::from_str(&call.stdout).unwrap();
         let log = &found[0]["log"];
         assert_eq!(log["outcome"].as_str().unwrap(), text("outcome"));
-        // Messages of ROS 2 do not say that they are simulated (docs/analyze.md).
+        // ROS 2 messages do not state that they are simulated (docs/analyze.md).
         let simulated = log["message"] == "sastrugi.VehicleState";
         assert_eq!(log["vertical_acceleration_floor_m_s2"].as_f64() == Some(0.0), simulated, "{log}");
         for column in [

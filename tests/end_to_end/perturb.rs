@@ -1,11 +1,11 @@
-//! `sastrugi rover`: trials of rovers alone, perturbed designs, what matters most.
+//! `sastrugi rover`: rover trials without other stages, perturbed designs, the most influential parameter.
 
 use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_with_kills, sastrugi_in, sums, write};
 use serde_json::Value;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 
-/// Sojourner-like rovers at 17.6 % rocks, beside missions and a terrain that they do not need.
+/// Sojourner-like rovers at 17.6 % rocks, with missions and a terrain that they do not need.
 const STUDY: &str = r#"
 [study]
 name = "perturbed"
@@ -46,7 +46,7 @@ sample_m = 1.0
 perturb = { trajectories = 2, rovers = 2, parameters = ["hazard_step_m", "turn_deg", "rows_m", "clearance_m", "noise.slip"] }
 "#;
 
-/// Parameters of [`STUDY`] that move, in the order of the tables.
+/// Perturbed parameters of [`STUDY`], in the order of the tables.
 const MOVED: [&str; 4] = ["clearance_m", "hazard_step_m", "rows_m", "turn_deg"];
 
 fn number(row: &Row, column: &str) -> f64 {
@@ -57,7 +57,7 @@ fn text<'a>(row: &'a Row, column: &str) -> &'a str {
     row[column].as_str().unwrap_or_default()
 }
 
-/// `sastrugi rover` on a study; what it prints as JSON.
+/// Runs `sastrugi rover` on a study; returns the JSON that it prints.
 fn rover(folder: &Path, study: &str, more: &[&str]) -> Value {
     write(folder, "study.toml", study);
     let arguments =
@@ -67,9 +67,9 @@ fn rover(folder: &Path, study: &str, more: &[&str]) -> Value {
     serde_json::from_str(&call.stdout).unwrap()
 }
 
-/// Tables against each other: what is averaged, what moves, and effects taken again from the designs.
+/// Tables are consistent with each other: averages, perturbed parameters, and effects recomputed from the designs.
 #[test]
-fn val_designs_and_effects_fit_together() {
+fn val_designs_and_effects_are_consistent() {
     let folder = area();
     let told = rover(folder.path(), STUDY, &["--perturb", "20%"]);
     let release = folder.path().join("release");
@@ -96,7 +96,9 @@ fn val_designs_and_effects_fit_together() {
         found.entry((moved.to_owned(), pair[1]["trajectory"].as_i64().unwrap())).or_default().push(effect);
     }
     let mean = |values: &[f64]| values.iter().sum::<f64>() / values.len() as f64;
-    for row in effects.iter().filter(|row| text(row, "measure") == "efficiency") {
+    let of_efficiency = || effects.iter().filter(|row| text(row, "measure") == "efficiency");
+    assert_eq!(of_efficiency().map(|row| text(row, "parameter")).collect::<BTreeSet<_>>(), MOVED.into());
+    for row in of_efficiency() {
         let of: Vec<f64> = (1..=2).map(|t| mean(&found[&(text(row, "parameter").to_owned(), t)])).collect();
         let star = mean(&of.iter().map(|d| d.abs()).collect::<Vec<_>>());
         assert!((number(row, "mu") - mean(&of)).abs() < 1e-12 && (number(row, "mu_star") - star).abs() < 1e-12);
@@ -104,15 +106,17 @@ fn val_designs_and_effects_fit_together() {
         assert!(number(row, "mu_star_low") <= number(row, "mu_star_high"));
     }
     // Nothing depends on a clearance that this navigator does not use, to the last bit.
-    for row in effects.iter().filter(|row| text(row, "parameter") == "clearance_m") {
+    let unused = || effects.iter().filter(|row| text(row, "parameter") == "clearance_m");
+    assert_eq!(unused().count(), 3);
+    for row in unused() {
         let columns = ["mu", "mu_star", "sigma", "mu_star_noise", "mu_low", "mu_star_high"];
         assert!(columns.iter().all(|column| row[*column] == 0.0), "{row:?}");
     }
     assert_eq!(sastrugi_in(folder.path(), &["verify", "release", "--recompute", "3", "--quiet"]).code, 0);
 }
 
-/// The specification: at 17.6 % rocks the hazard height moves efficiency most. Six worlds, three trajectories, and an interval of `mu` above
-/// 0: higher hazards are let pass, and the way is shorter. The seed is fixed.
+/// From the specification: at 17.6 % rocks, the hazard height affects efficiency most. Six worlds, three trajectories, and an interval of `mu`
+/// above 0: with a larger hazard height, more rocks are passed and the path is shorter. The seed is fixed.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn val_the_hazard_height_matters_most() {
@@ -157,12 +161,13 @@ fn prop_a_perturbed_release_has_the_same_bytes() {
     assert_eq!(differing(&first, &killed), Vec::<String>::new());
 }
 
-/// On one world there are effects without intervals, and a note says why.
+/// On one world, effects have no intervals, and a note states why.
 #[test]
 fn val_one_world_has_no_intervals() {
     let folder = area();
     let study = STUDY.replace("count = 3", "count = 1").replace("distance_limit_m = 60.0", "distance_limit_m = 10.0");
     let told = rover(folder.path(), &study, &["--trajectories", "1"]);
+    assert_eq!(told["effects"].as_array().unwrap().len(), 3 * MOVED.len());
     for row in told["effects"].as_array().unwrap() {
         assert!(row["mu"].is_f64() && row["mu_star"].is_f64() && row["share"] == 0.1, "{row}");
         assert!(
@@ -175,7 +180,7 @@ fn val_one_world_has_no_intervals() {
     assert!(manifest.contains("neither intervals nor sigma: they need two trajectories or more"));
 }
 
-/// Each with exit code 2 and a sentence that says what would be right.
+/// Each is refused with exit code 2 and a sentence that states what is valid.
 #[test]
 fn val_wrong_perturbations_are_refused() {
     let folder = area();
@@ -187,7 +192,7 @@ fn val_wrong_perturbations_are_refused() {
         assert!(said.contains(words), "{more:?}: {said}");
     };
     for share in ["0%", "100%", "-10%", "10", "much"] {
-        told(STUDY, &["--perturb", share], "it must be a share above 0 and below 100%, such as 10% or 0.1");
+        told(STUDY, &["--perturb", share], "must be a share above 0 and below 100%, such as 10% or 0.1");
     }
     told(STUDY, &["--trajectories", "0"], "`perturb.trajectories` is 0; it must be 1 to 999");
     told(&STUDY.replace("\"turn_deg\"", "\"turn_dg\""), &[], "did you mean `turn_deg`?");

@@ -1,10 +1,10 @@
-//! Studies that take heights from images: a measured DEM under three suns, its surface recovered, compared and fitted.
+//! Studies that recover heights from images: a measured DEM under three suns, its recovered surface, comparison and fit.
 
 use sastrugi_stages::verbs::{self, Reading};
 use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, run_with_kills, sastrugi_in, sums, write};
 use serde_json::Value;
 
-/// Jacksboro, its cells four times finer than the pixels; the Sun stands above its slopes.
+/// Jacksboro, with cells four times finer than the pixels; the sun is steeper than its slopes.
 fn study() -> String {
     format!(
         r#"
@@ -69,7 +69,7 @@ bootstrap = 0
     )
 }
 
-/// Four heights of the site within its middle, by bilinear interpolation; sigma 1 m.
+/// Four heights in the middle of the site, by bilinear interpolation; sigma 1 m.
 fn laser() -> String {
     let heights = verbs::read(&sastrugi_fixtures::jacksboro(), &Reading::default()).unwrap().dem.grid;
     let g = heights.geometry;
@@ -93,9 +93,9 @@ fn area_with_points() -> tempfile::TempDir {
     folder
 }
 
-/// Files, rows and figures. Without errors the shading of the recovered surface correlates as that of the averaged truth does, to 0.02, and slopes are
-/// as far from the true ones as those of the averaged truth, to 15 %; long waves are recovered coherently; an exposure wrong by 5 % tilts the surface, and the coarse DEM
-/// holds it. A fit of the recovered surface follows in the same study.
+/// Files, rows and errors. Without image errors, the shading of the recovered surface correlates as well as that of the averaged truth, within 0.02, and its
+/// slope errors are those of the averaged truth, within 15 %. Long waves are recovered coherently. An exposure error of 5 % tilts the surface, and the coarse
+/// DEM prevents it. The same study fits the recovered surface.
 #[test]
 fn val_a_study_recovers_a_measured_surface() {
     let folder = area_with_points();
@@ -127,12 +127,12 @@ fn val_a_study_recovers_a_measured_surface() {
     assert!(number(plain, "slope_error_rms") < 1.15 * number(plain, "slope_error_rms_ceiling"));
     assert!(number(plain, "height_error_rms_detrended_m") < 0.2 * number(plain, "height_rms_m"));
     assert!(number(wrong, "height_error_rms_m") > 3.0 * number(plain, "height_error_rms_m"));
-    // The ceiling is the truth's own, whatever sun and law the inversion believes.
+    // The ceiling depends only on the truth, whatever sun and photometric law the inversion assumes.
     for column in ["shaded_correlation_ceiling", "slope_error_rms_ceiling"] {
         assert_eq!(number(of("misled"), column), number(plain, column), "{column}");
     }
     assert!(number(of("misled"), "slope_error_rms") > 1.05 * number(plain, "slope_error_rms"));
-    // A misplaced image costs the shading, not the heights: a quarter of a pixel little, a whole one much.
+    // A misplaced image degrades the shading, not the heights: a quarter of a pixel little, one pixel much.
     let shaded = [plain, of("misplaced-90.0"), of("misplaced-360.0")].map(|row| number(row, "shaded_correlation"));
     assert!(shaded[0] > shaded[1] && shaded[1] > shaded[2] + 0.01, "{shaded:?}");
     assert!(files.contains_key("input/misled-altimetry.csv"));
@@ -148,9 +148,9 @@ fn val_a_study_recovers_a_measured_surface() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// The report of the study says at which wavelengths the recovered surface has the truth's texture: without errors everywhere but in the shortest octave, 720 to
-/// 1440 m, where relief inside of the pixels is lost. Both fits stand beside each other: over lags the recovered covariance is within 15 % of the truth's, and the rms height below the
-/// window is that of the table of fits, 85 to 100 % of the truth's. Maps are drawn of the surfaces with the least and the greatest slope error.
+/// The report names the wavelengths at which the recovered surface has the truth's texture: without image errors, all but the shortest octave, 720 to 1440 m,
+/// where relief within the pixels is lost. Both fits are compared: over lags the recovered covariance is within 15 % of the truth's, and the band RMS below the
+/// window is that of the table of fits, 85 to 100 % of the truth's. Maps show the surfaces with the smallest and the largest slope error.
 #[test]
 fn val_the_report_compares_recovered_and_truth() {
     let folder = area_with_points();
@@ -160,7 +160,7 @@ fn val_the_report_compares_recovered_and_truth() {
     let section = page.split("<section id=\"photoclinometry\">").nth(1).unwrap().split("</section>").next().unwrap();
     let verdict = section.split("recovered-0.0: ").nth(1).unwrap().split("recovered-0.05: ").next().unwrap();
     println!("{verdict}");
-    assert!(verdict.contains("not at 720 to 1440 m (rms height 8"), "{verdict}");
+    assert!(verdict.contains("not at 720 to 1440 m (RMS height 8"), "{verdict}");
     let data = |name: &str| -> Vec<Vec<Value>> {
         let text = std::fs::read_to_string(release.join(format!("report/data/{name}.json"))).unwrap();
         let json: Value = serde_json::from_str(&text).unwrap();
@@ -184,7 +184,7 @@ fn val_the_report_compares_recovered_and_truth() {
         });
         assert_eq!(files.contains_key(&format!("report/figures/photoclinometry-uncertainty-{id}.svg")), id != "held");
     }
-    // The wrong exposure tilts the surface, and the page says so.
+    // The wrong exposure tilts the surface, and the page states it.
     let wrong = section.split("recovered-0.05: ").nth(1).unwrap();
     assert!(wrong.contains("most of it is a tilt"), "{wrong}");
     let sweep = data("photoclinometry-sweep-heights-recovered-site");
@@ -195,7 +195,7 @@ fn val_the_report_compares_recovered_and_truth() {
     assert_eq!(drawn, errors);
 }
 
-/// The same bytes on one thread and on three, in two shards and after kills.
+/// The same bytes with one thread and with three, in two shards and after kills.
 #[test]
 fn prop_a_recovered_surface_has_the_same_bytes() {
     let [one, three] =
@@ -208,7 +208,7 @@ fn prop_a_recovered_surface_has_the_same_bytes() {
     assert_eq!(differing(&one, &killed), Vec::<String>::new());
 }
 
-/// The verb takes the images of a release, prints every round, and writes heights with their maps; wrong files are refused in words.
+/// The verb reads the images of a release, prints every round, and writes heights with their maps; invalid files are refused with the reason.
 #[test]
 fn val_the_verb_recovers_from_files() {
     let folder = area_with_points();
@@ -229,7 +229,7 @@ fn val_the_verb_recovers_from_files() {
     let call = sastrugi_in(folder.path(), &arguments);
     assert_eq!(call.code, 0, "{}", call.stderr);
     println!("{}", call.stdout);
-    assert!(call.stdout.contains("brightness rms") && call.stdout.contains("against the truth"), "{}", call.stdout);
+    assert!(call.stdout.contains("brightness RMS") && call.stdout.contains("against the truth"), "{}", call.stdout);
     for file in ["dem.tif", "dem.albedo.tif", "dem.uncertainty.tif", "dem.lit.tif"] {
         assert!(folder.path().join(file).is_file(), "{file}");
     }
@@ -257,12 +257,12 @@ fn val_the_verb_recovers_from_files() {
     assert!(code == 65 && words.contains("a.json"), "{code} {words}");
 }
 
-/// Items that cannot be are refused before anything runs, at their line.
+/// Invalid items are refused before anything runs, with their line.
 #[test]
 fn val_wrong_items_are_refused() {
     let folder = area_with_points();
     for (before, after, words) in [
-        ("[0.0, 120.0, 240.0]", "[0.0, 120.0]", "take at least"),
+        ("[0.0, 120.0, 240.0]", "[0.0, 120.0]", "need at least"),
         ("images = [\"suns\"]\nsamples = 16", "images = [\"sun\"]\nsamples = 16", "did you mean"),
         ("coarse_sigma_m = 20.0", "coarse_sigma_m = 0.0", "above 0"),
         ("[0.0, 120.0, 240.0]", "[0.0, 0.01, 180.0]", "the suns lie in one plane"),

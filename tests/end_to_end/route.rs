@@ -1,4 +1,4 @@
-//! Studies of routes: every search on the same pairs, obstacles, stated ends, a measured DEM, and missions along routes.
+//! Studies of routes: every search on the same pairs, obstacles, given ends, a measured DEM, and missions along routes.
 
 use sastrugi_tests::{Row, area, differing, rows, sastrugi_in, sums, write};
 use serde_json::Value;
@@ -102,7 +102,7 @@ fn prop_searches_plan_the_same_pairs_at_ordered_costs() {
     assert!(vertices("roads-5") < vertices("roads-0.5") && vertices("roads-0.5") < vertices("grid"));
 }
 
-/// The points of a route lead from start to goal; distances along it end with its length.
+/// The points of a route lead from start to goal, and distances along it end at its length.
 #[test]
 fn val_points_of_a_route() {
     let folder = area();
@@ -129,9 +129,9 @@ fn val_points_of_a_route() {
     assert_eq!(line["coordinates"].as_array().unwrap().len() as f64, number(&routes[0], "smoothed_points"));
 }
 
-/// A wall with a gap is passed through the gap; without the gap there is no route, which is a result, not a failure.
+/// A route passes a wall through its gap; without the gap there is no route, which is a result, not a failure.
 #[test]
-fn val_obstacles_are_kept_clear_of() {
+fn val_routes_keep_clear_of_obstacles() {
     let polygon = |south: f64| {
         format!(r#"{{"type":"Polygon","coordinates":[[[50,{south}],[60,{south}],[60,100],[50,100],[50,{south}]]]}}"#)
     };
@@ -163,7 +163,7 @@ fn val_obstacles_are_kept_clear_of() {
     assert!(number(&routes[0], "length_m").is_nan());
 }
 
-/// Routed missions lead from the same starts to the same goals as straight ones, and are driven along the route.
+/// Routed missions have the same starts and goals as straight ones and are driven along the route.
 #[test]
 fn val_routed_missions_are_paired_with_straight_ones() {
     let study = r#"
@@ -211,8 +211,12 @@ timeout_s = 20.0
         missions.iter().filter(|row| text(row, "traverse_id") == id).map(|row| (text(row, "pair_id"), row)).collect()
     };
     let (direct, planned) = (of("direct"), of("planned"));
+    // Two missions on each of two terrains.
+    assert_eq!(direct.len(), 4);
     assert_eq!(direct.keys().collect::<Vec<_>>(), planned.keys().collect::<Vec<_>>());
     for (pair, row) in &direct {
+        let [straight_m, along_m] = [number(row, "line_length_m"), number(planned[pair], "line_length_m")];
+        assert!((straight_m - 4.0).abs() < 1e-6 && along_m >= straight_m - 1e-6, "{pair}: {straight_m} {along_m}");
         for column in ["start_x_m", "start_y_m", "goal_x_m", "goal_y_m"] {
             assert_eq!(number(row, column), number(planned[pair], column), "{pair} {column}");
         }
@@ -224,7 +228,7 @@ timeout_s = 20.0
     assert_eq!(differing(&first, &sums(&other.path().join("release"))), Vec::<String>::new());
 }
 
-/// A trail of `compose` travels with its terrain: a mission follows it from end to end, and the other way.
+/// A trail of `compose` belongs to its terrain: missions follow it from end to end, in both directions.
 #[test]
 fn val_missions_follow_a_trail() {
     let study = r#"

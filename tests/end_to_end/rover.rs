@@ -1,4 +1,4 @@
-//! Studies of rovers: tables, refusals, the same bytes however they are made.
+//! Studies of rovers: tables, refusals, and the same bytes however the study is run.
 
 use sastrugi_tests::{Row, area, differing, rows, run_in_shards, run_study, run_with_kills, sastrugi_in, write};
 use std::collections::BTreeSet;
@@ -105,7 +105,7 @@ fn val_rovers_have_rows_and_samples() {
         assert_eq!(number(own[0], "x_m"), number(rover, "start_x_m"));
         let areas = text(own[0], "hazards").len();
         assert_eq!(areas, if text(rover, "navigator") == "sojourner_like" { 5 } else { 4 });
-        // The way of one that knows the whole map is the shortest, to within the cells of that map.
+        // The path of a rover that knows the complete map is the shortest, up to the cells of that map.
         let oracle_m = number(rover, "oracle_m");
         assert_eq!(oracle_m.is_nan(), text(rover, "oracle") == "none");
         assert!(oracle_m.is_nan() || oracle_m >= straight_m - 0.2);
@@ -117,7 +117,7 @@ fn val_rovers_have_rows_and_samples() {
         of_group.map(|row| number(row, "efficiency")).sum::<f64>() / 12.0
     };
     assert!(mean("sparse") > mean("dense"), "{} {}", mean("sparse"), mean("dense"));
-    // Starts, headings and noise are shared by densities and by the values of a sweep.
+    // Starts, headings and noise are shared between densities and between the values of a sweep.
     let starts = |stage: &str, group: &str| -> BTreeSet<String> {
         let of = rovers.iter().filter(|row| text(row, "stage_id") == stage && text(row, "group") == group);
         of.map(|row| ["start_x_m", "start_heading_deg", "goal_y_m"].map(|c| row[c].to_string()).join(" ")).collect()
@@ -127,9 +127,9 @@ fn val_rovers_have_rows_and_samples() {
     assert_eq!(starts("boxes-0.13", "dense").len(), 6);
 }
 
-/// The window of a planetary terrain is a picture: rovers go beyond it. Other ground ends where it ends, and that is said.
+/// The window of a planetary terrain is only its picture: rovers drive beyond it. Other ground ends at its edge, and a note states it.
 #[test]
-fn val_worlds_go_on_and_grids_end() {
+fn val_worlds_are_unbounded_and_grids_end() {
     let folder = area();
     let study = STUDY.replace("radius_m = 8.0", "radius_m = 14.0").replace("radius_m = 5.0", "radius_m = 5.7");
     write(folder.path(), "study.toml", &study);
@@ -137,13 +137,14 @@ fn val_worlds_go_on_and_grids_end() {
     assert_eq!(call.code, 0, "{}", call.stderr);
     let rovers = rows(&folder.path().join("release"), "rovers");
     let of = |stage: &str| rovers.iter().filter(|row| text(row, "stage_id") == stage).collect::<Vec<_>>();
+    assert_eq!((of("rays").len(), of("plates").len()), (2 * 2 * 6, 4));
     assert!(of("rays").iter().all(|row| text(row, "outcome") != "off_ground"));
     let off: Vec<&str> =
         of("plates").iter().filter(|row| text(row, "outcome") == "off_ground").map(|row| text(row, "note")).collect();
     assert!(!off.is_empty() && off.iter().all(|note| note.starts_with("there is no ground at x = ")), "{off:?}");
 }
 
-/// Rovers that would start, or have their goal, off the terrain are refused (section 8): their item fails, and says where.
+/// Rovers with a start or goal off the terrain are refused (section 8): their item fails and states the place.
 #[test]
 fn val_places_off_the_terrain_are_refused() {
     let folder = area();
@@ -166,7 +167,7 @@ fn prop_a_release_of_rovers_has_the_same_bytes() {
     write(shards.path(), "study.toml", STUDY);
     assert_eq!(differing(&first, &run_in_shards(shards.path(), "study.toml")), Vec::<String>::new());
     assert!(first.keys().filter(|path| path.ends_with(".mcap")).count() == 4 + 4 + 1, "recordings are among them");
-    // Killed on the way, and started again.
+    // Killed while running, and restarted.
     let killed = run_with_kills(area().path(), STUDY, &first, &[50, 400, 1200, 2500]);
     assert_eq!(differing(&first, &killed), Vec::<String>::new());
 }
@@ -195,15 +196,15 @@ fn val_recordings_have_the_metrics_of_the_table() {
         for column in ["max_pitch_deg", "max_roll_deg", "rms_pitch_rate_deg_s", "rms_roll_rate_deg_s"] {
             same(column, 1e-9);
         }
-        // The poses of the last second are not recorded.
+        // Up to a second of poses at the end is not recorded.
         assert!((log["time_s"].as_f64().unwrap() - number(row, "time_s")).abs() <= 1.0);
         assert_eq!(log["outcome"], row["outcome"], "{path}");
     }
 }
 
-/// A rover whose start or goal nobody could reach has its row, marked, and the others of its draw stay where they were (section 11).
+/// A rover whose goal is unreachable still has its row, marked as such, and the others of its draw stay where they were (section 11).
 #[test]
-fn val_pairs_without_a_way_are_marked() {
+fn val_pairs_without_a_path_are_marked() {
     let of = |clearance_m: &str| {
         let folder = area();
         let study = STUDY.replace(
@@ -223,7 +224,7 @@ fn val_pairs_without_a_way_are_marked() {
     }
 }
 
-/// Heights in steps are no ground for rovers: a step would look like a rock (section 11). The step is told.
+/// Quantised heights are refused for rovers, because a step would look like a rock (section 11). The message states the step.
 #[test]
 fn val_heights_in_steps_are_refused() {
     let folder = area();
@@ -240,7 +241,7 @@ fn val_heights_in_steps_are_refused() {
     assert!(call.code != 0 && told.contains("heights come in steps of 61.0 mm"), "{}: {told}", call.code);
 }
 
-/// Refusals of section 8, one sentence each.
+/// Refusals of section 8, with one sentence each.
 #[test]
 fn val_wrong_studies_are_refused() {
     let folder = area();
@@ -259,9 +260,9 @@ fn val_wrong_studies_are_refused() {
         ("terrains = [\"plate\"]", "terrains = [\"plait\"]", "names \"plait\""),
         ("hazard_step_m = 1.0", "hazard_step_m = -1.0", "`hazard_step_m` is -1"),
         ("hazard_step_m = 1.0", "noise = { slip = 2.0 }", "`noise.slip` is 2"),
-        ("radius_m = 8.0", "radius_m = 0.3", "`radius_m` is 0.3 m; it must exceed the 0.5 m"),
+        ("radius_m = 8.0", "radius_m = 0.3", "`radius_m` is 0.3 m; it must exceed `goal_tolerance_m`, 0.5 m"),
         ("sensor = \"rectangles\"", "sensor = \"sonar\"", "sonar"),
-        ("sensor = \"rectangles\"", "pass_m = 1.0", "`pass_m` is a rule of the navigators"),
+        ("sensor = \"rectangles\"", "pass_m = 1.0", "`pass_m` is a rule of the reactive navigators"),
         ("sensor = \"rectangles\"", "rectangles = 4", "`rectangles` is a parameter of `schoppers_like`"),
         ("sensor = \"rectangles\"", "map_cell_m = 0.001", "more than 1048576"),
         ("sensor = \"rectangles\"", "map_beyond_m = 0.0", "`map_beyond_m` is 0"),

@@ -1,4 +1,4 @@
-//! The terrain server under faults: kills, full disks, damaged and shared libraries, clients that are slow or mean. Nothing wrong is ever
+//! The terrain server under faults: kills, full disks, damaged and shared libraries, slow or malicious clients. A wrong result is never
 //! answered with 200. Times are printed and not asserted, apart from bounds on hanging.
 
 use sastrugi_tests::server::{Answer, Client, Server};
@@ -12,7 +12,7 @@ use std::sync::Mutex;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::time::{Duration, Instant};
 
-/// Ground that is made quickly.
+/// Ground that is generated quickly.
 const QUICK: &str = r#"
 kind = "planetary"
 seed = 12
@@ -21,7 +21,7 @@ cell_m = 0.02
 basic_spacing_m = 0.01
 processes = [{ kind = "texture" }, { kind = "albedo" }]
 "#;
-/// Ground that takes its time.
+/// Ground that takes long to generate.
 const SLOW: &str = r#"
 kind = "planetary"
 seed = 12
@@ -38,14 +38,14 @@ processes = [
 ]
 "#;
 const PATCH: &str = "/v1/collections/world/patch";
-/// Columns and rows of library tiles in the ground that is asked for, and samples along a side of one.
+/// Columns and rows of library tiles in the requested ground, and samples along a side of one.
 const TILES: [usize; 2] = [8, 6];
 const SIDE: usize = 256;
 const STEP_M: f64 = 0.02;
-/// A hang, not a slow machine.
+/// Longer than a slow machine takes: the server hangs.
 const HANG: Duration = Duration::from_secs(180);
 
-/// Draws of a test; its seed stands beside its use.
+/// Random draws of a test; the seed is given at its use.
 struct Draws(u64);
 
 impl Draws {
@@ -57,7 +57,7 @@ impl Draws {
     }
 }
 
-/// What a fresh server without a library says of the ground.
+/// The ground according to a new server without a library.
 struct Truth {
     heights: Vec<f32>,
 }
@@ -71,7 +71,7 @@ impl Truth {
         Self { heights: whole.floats() }
     }
 
-    /// Asks for a window that nobody has asked for, most likely: the answers that a server keeps do not help it.
+    /// Draws a window that most likely was not requested before, so that cached answers do not help.
     fn window(draws: &mut Draws) -> Window {
         let size = [0, 1].map(|_| 8 + draws.below(80));
         Window { first: [0, 1].map(|a| draws.below(TILES[a] * SIDE - size[a])), size }
@@ -101,7 +101,7 @@ impl Window {
     }
 }
 
-/// Asks for windows until told to stop, or the server is gone; how many were answered. All answers are 200 and right.
+/// Requests windows until told to stop or the server is gone; returns the number of answers. All answers are 200 and correct.
 fn ask(server: &Server, truth: &Truth, draws: &mut Draws, mut more: impl FnMut() -> bool) -> usize {
     let (mut answered, mut client) = (0, server.client());
     while more() {
@@ -115,17 +115,17 @@ fn ask(server: &Server, truth: &Truth, draws: &mut Draws, mut more: impl FnMut()
     answered
 }
 
-/// As [`ask`], a number of times, all of them answered.
+/// As [`ask`], for a number of requests, all of which are answered.
 fn ask_times(server: &Server, truth: &Truth, draws: &mut Draws, times: usize) {
     let mut left = times + 1;
     let answered = ask(server, truth, draws, || {
         left -= 1;
         left > 0
     });
-    assert_eq!(answered, times, "the server broke off");
+    assert_eq!(answered, times, "the server stopped answering");
 }
 
-/// Files of the shelves of a library whose name passes.
+/// Files in a library whose name is wanted.
 fn files(library: &Path, wanted: impl Fn(&str) -> bool) -> Vec<PathBuf> {
     let below = |folder: &Path| fs::read_dir(folder).into_iter().flatten().flatten().map(|e| e.path());
     let named = |path: &PathBuf| path.file_name().is_some_and(|name| wanted(&name.to_string_lossy()));
@@ -139,7 +139,7 @@ fn records(library: &Path) -> Vec<PathBuf> {
     files(library, |name| name.ends_with(".tile"))
 }
 
-/// Rows and columns of a record, and whether it is shorter than the heights and albedo of so many samples.
+/// Rows and columns of a record, and whether it is too short for the heights and albedo of that many samples.
 fn shape_of(path: &Path) -> Option<([usize; 2], bool)> {
     let bytes = fs::read(path).ok()?;
     let word = |at: usize| Some(u32::from_le_bytes(bytes.get(at..at + 4)?.try_into().ok()?) as usize);
@@ -149,7 +149,7 @@ fn shape_of(path: &Path) -> Option<([usize; 2], bool)> {
     Some((shape, bytes.len() < head + 12 + 2 * 4 * shape[0] * shape[1] + 32))
 }
 
-/// Records of whole tiles: those of small windows are seldom asked for again.
+/// Records of complete tiles: those of small windows are rarely requested again.
 fn tiles(library: &Path) -> Vec<PathBuf> {
     let mut all = records(library);
     all.retain(|path| shape_of(path).is_some_and(|(shape, _)| shape == [SIDE; 2]));
@@ -165,7 +165,7 @@ fn bytes_of(paths: &[PathBuf]) -> u64 {
     paths.iter().map(|path| fs::metadata(path).map_or(0, |m| m.len())).sum()
 }
 
-/// A number of `/v1/library`.
+/// A count from `/v1/library`.
 fn counted(server: &Server, name: &str) -> u64 {
     server.get("/v1/library").json()[name].as_u64().unwrap()
 }
@@ -179,7 +179,7 @@ fn until(what: &str, mut condition: impl FnMut() -> bool) {
     }
 }
 
-/// Kills at random instants under the load of 8 clients, and restarts on one library from which some records are taken each time, so that there is
+/// Kills at random instants under the load of 8 clients, and restarts on one library from which some records are removed each time, so that there is
 /// something to write.
 fn kill_and_restart(kills: usize) {
     let (folder, mut draws) = (area(), Draws(31));
@@ -242,7 +242,7 @@ fn prop_two_hundred_kills_leave_whole_records() {
     kill_and_restart(200);
 }
 
-/// A server whose library cannot grow answers all the same, says so once, and leaves nothing behind.
+/// A server whose library cannot grow still answers, reports it once, and leaves no files behind.
 fn serve_without_room(command: &mut Command, folder: &Path, library: &Path, name: &str) {
     let log = folder.join("log.txt");
     let truth = Truth::of(folder);
@@ -250,7 +250,7 @@ fn serve_without_room(command: &mut Command, folder: &Path, library: &Path, name
     let mut draws = Draws(32);
     ask_times(&server, &truth, &mut draws, 300);
     until("the writes are given up", || counted(&server, "queued") == 0 && drafts(library) == 0);
-    // The last may just be under way.
+    // The last write may still be in progress.
     std::thread::sleep(Duration::from_millis(300));
     let [made, unwritten, damaged] = ["made", "unwritten", "damaged"].map(|name| counted(&server, name));
     let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
@@ -272,7 +272,7 @@ fn serve_without_room(command: &mut Command, folder: &Path, library: &Path, name
 
 /// No file may be longer than 100 kB: the disk is full in the middle of every record.
 #[test]
-fn val_a_library_that_cannot_grow_is_done_without() {
+fn val_a_server_works_without_room_in_its_library() {
     let folder = area();
     write(folder.path(), "world.toml", QUICK);
     let mut command = Command::new("bash");
@@ -281,7 +281,7 @@ fn val_a_library_that_cannot_grow_is_done_without() {
     serve_without_room(&mut command, folder.path(), &folder.path().join("tiles"), "RLIMIT_FSIZE");
 }
 
-/// A disk of 3 MB, of its own; unmounted when dropped.
+/// A separate disk of 3 MB, unmounted when dropped.
 struct SmallDisk(PathBuf);
 
 impl SmallDisk {
@@ -298,13 +298,13 @@ impl Drop for SmallDisk {
     }
 }
 
-/// A file system that is really full.
+/// A file system that is really full, not a limit on file sizes.
 #[test]
-fn val_a_full_disk_is_done_without() {
+fn val_a_server_works_with_a_full_disk() {
     let folder = area();
     write(folder.path(), "world.toml", QUICK);
     let Some(disk) = SmallDisk::mount(&folder.path().join("disk")) else {
-        eprintln!("SKIPPED: a small disk cannot be mounted here (root may)");
+        eprintln!("SKIPPED: a small disk cannot be mounted here (root can)");
         return;
     };
     let library = disk.0.join("tiles");
@@ -314,7 +314,7 @@ fn val_a_full_disk_is_done_without() {
     assert!(!records(&library).is_empty());
 }
 
-/// Damages a record in one of the ways in which disks and people do; its number.
+/// Damages a record in one of the ways that disks and people do; returns its number.
 fn damage(all: &[PathBuf], draws: &mut Draws) -> usize {
     let (path, way) = (&all[draws.below(all.len())], draws.below(6));
     let bytes = fs::read(path).ok().filter(|bytes| !bytes.is_empty());
@@ -332,7 +332,7 @@ fn damage(all: &[PathBuf], draws: &mut Draws) -> usize {
             fs::write(path.join("inside"), "x").unwrap();
         }
         3 => {
-            // Two records change places.
+            // Two records are swapped.
             let other = &all[draws.below(all.len())];
             let Ok(others) = fs::read(other) else { return 6 };
             fs::write(path, others).unwrap();
@@ -352,7 +352,7 @@ fn damage(all: &[PathBuf], draws: &mut Draws) -> usize {
     way
 }
 
-/// Damage between the runs of a server and while it runs.
+/// Damage between runs of a server, and during a run.
 fn damage_a_library(rounds: usize) {
     const EACH: usize = 25;
     let (folder, mut draws) = (area(), Draws(33));
@@ -370,7 +370,7 @@ fn damage_a_library(rounds: usize) {
             all = tiles(&library);
         }
         for _ in 0..EACH {
-            // One each time is damaged while the server runs.
+            // One record per round is damaged while the server runs.
             ways[damage(&all, &mut draws)] += 1;
             ask_times(&server, &truth, &mut draws, 4);
         }
@@ -392,18 +392,18 @@ fn damage_a_library(rounds: usize) {
          wrong answers 0 (seed 33)",
         ways[0], ways[1], ways[2], ways[3], ways[4], ways[5]
     );
-    // Folders in place of records are no records; what is damaged twice before it is asked for is found once.
+    // Folders in place of records do not count as records; a record damaged twice before it is requested is found once.
     assert!(found > damages as u64 / 4 && hits > found && damages > rounds * EACH, "{found} of {damages}");
 }
 
 #[test]
-fn prop_damaged_libraries_are_never_believed() {
+fn prop_damaged_records_are_never_served() {
     damage_a_library(2);
 }
 
 #[test]
 #[ignore = "slow: ./test --full"]
-fn prop_libraries_damaged_five_hundred_times_are_never_believed() {
+fn prop_records_damaged_five_hundred_times_are_never_served() {
     damage_a_library(14);
 }
 
@@ -448,7 +448,7 @@ fn share_a_small_library(requests: usize) {
     );
     assert_eq!(of("damaged"), [0, 0]);
     assert!(of("evicted").iter().all(|n| *n > 0));
-    // Each looks at the folder after every sixteenth of the limit that it wrote itself; beside that is what is just being written.
+    // Each server checks the folder after writing a sixteenth of the limit itself; records in progress come on top of that.
     assert!(most <= limit + limit / 4 + 4 * (1 << 20), "{most}");
     drop(servers);
     let alone = start();
@@ -468,15 +468,15 @@ fn prop_two_servers_share_a_small_library_for_long() {
     share_a_small_library(1500);
 }
 
-/// What is written to a server, and the status that it answers with; `None` when it closes without a word.
+/// Writes bytes to a server; returns the status and head of its answer, or `None` if it closes the connection without one.
 fn said_to(server: &Server, bytes: &[u8]) -> Option<(u16, String)> {
     let mut client = server.client().unwrap();
-    // It may answer and close before all is written.
+    // The server may answer and close before everything is written.
     let _ = client.stream().write_all(bytes);
     client.answer_into(&mut Vec::new()).ok()
 }
 
-/// Heads and bodies that are too long, each by its documented status.
+/// Heads and bodies that are too long are refused, each with its documented status.
 #[test]
 fn val_floods_are_refused() {
     let folder = area();
@@ -512,12 +512,12 @@ fn val_floods_are_refused() {
     assert_eq!(server.get("/healthz").status, 200);
 }
 
-/// Too many tiles wait; an answer takes too long; too many connections: 503 with the time to come back.
+/// Too many tiles are queued, an answer takes too long, or there are too many connections: 503 with the time to retry.
 #[test]
-fn val_who_cannot_be_served_now_is_told_when() {
+fn val_overload_is_answered_with_a_time_to_retry() {
     let folder = area();
     write(folder.path(), "world.toml", SLOW);
-    // Ten tiles each, of which no other has one.
+    // Ten tiles each, none of which are shared.
     let across = &|k: usize| {
         let [x, y] = [2048 * k, 236].map(|n| n as f64 * STEP_M);
         format!("{PATCH}?origin={x:?},{y:?}&size=1200,40&resolution_m={STEP_M}&format=raw")
@@ -536,7 +536,7 @@ fn val_who_cannot_be_served_now_is_told_when() {
     let turned_away =
         waiting.iter_mut().rev().map(|client| client.answer_into(&mut Vec::new()).unwrap()).find(|a| a.0 == 503);
     assert!(turned_away.as_ref().is_some_and(|(_, head)| head.contains("retry-after: 2")), "{turned_away:?}");
-    // Their work ends with them.
+    // Their work ends when they disconnect.
     drop(waiting);
     until("the queue empties", || counted(&server, "queued") == 0);
     assert_eq!(server.get(&small).body, truth.body);
@@ -556,7 +556,7 @@ fn val_who_cannot_be_served_now_is_told_when() {
         "POST /v1/jobs HTTP/1.1\r\nHost: localhost\r\nContent-Type: application/json\r\nContent-Length: 100\r\n\r\n{";
     let never = said_to(&server, body.as_bytes()).map(|a| a.0);
     assert!(matches!(never, Some(503 | 408)), "{never:?}");
-    // Said to be too long, and never sent.
+    // Announced with too long a body, and never sent.
     let said = said_to(&server, body.replace("100", "1000000000000").as_bytes()).map(|a| a.0);
     assert!(matches!(said, Some(413 | 503)), "{said:?}");
     until("the queue empties", || counted(&server, "queued") == 0);
@@ -583,10 +583,10 @@ fn val_who_cannot_be_served_now_is_told_when() {
     });
 }
 
-/// Clients that read nothing of 16 MB each: more than 512 MB are not on their way at once. Small answers go all the same, and large ones again once
+/// Clients that request 16 MB each and read nothing: at most 512 MB are in flight at once. Small answers are still sent, and large ones again once
 /// there is room.
 #[test]
-fn val_bytes_on_their_way_are_bounded() {
+fn val_bytes_in_flight_are_bounded() {
     let folder = area();
     write(folder.path(), "world.toml", QUICK);
     let server = Server::start(folder.path(), &["world.toml"], &[]);
@@ -597,25 +597,25 @@ fn val_bytes_on_their_way_are_bounded() {
     for client in &mut held {
         write!(client.stream(), "GET {large} HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
     }
-    let on_their_way = || {
+    let in_flight = || {
         let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
         let bytes = metrics.lines().find_map(|line| line.strip_prefix("sastrugi_sending_bytes ")?.parse::<u64>().ok());
         bytes.unwrap()
     };
-    until("no more fits", || on_their_way() + (16 << 20) > 512 << 20);
+    until("no more bytes fit", || in_flight() + (16 << 20) > 512 << 20);
     let refused = server.get(&large);
     assert_eq!((refused.status, refused.header("retry-after")), (503, Some("2")));
     assert!(refused.json()["detail"].as_str().unwrap().contains("too many response bytes"), "{}", refused.json());
     assert_eq!(reader.get(&Truth::window(&mut Draws(36)).path()).unwrap().status, 200);
     drop(held);
-    until("their bytes are forgotten", || on_their_way() == 0);
+    until("their bytes are released", || in_flight() == 0);
     assert_eq!(reader.get(&large).unwrap().status, 200);
 }
 
-/// Ways of being slow.
+/// Kinds of slow clients.
 const WAYS: [&str; 4] = ["heads of a byte a second", "readers that never read", "bodies that never come", "silent"];
 
-/// More than the buffers of a socket hold.
+/// A patch larger than the buffers of a socket.
 fn large_patch() -> String {
     format!("{PATCH}?origin=0,0&size=1024,1024&resolution_m={STEP_M}&format=raw")
 }
@@ -635,12 +635,12 @@ fn slow_client(server: &Server, way: usize) -> TcpStream {
     stream
 }
 
-/// The way in which the client of a number is slow: fewer bodies than the requests that one client may have under way.
+/// The kind of the `k`-th slow client. There are fewer bodies than the requests that one client may have open.
 fn way_of(k: usize) -> usize {
     [0, 1, 3, 0, 2, 0, 1, 3, 0, 3][k % 10]
 }
 
-/// Whether the other side has let a client go. Bodies that never come are answered before; of readers that never read their own side cannot tell.
+/// Whether the server has closed a connection. Bodies that never come are answered first; for readers that never read, the client side cannot tell.
 fn is_over(way: usize, stream: &mut TcpStream) -> bool {
     let mut bytes = [0; 4096];
     match stream.read(&mut bytes) {
@@ -654,13 +654,13 @@ fn is_over(way: usize, stream: &mut TcpStream) -> bool {
     }
 }
 
-/// Open connections, as the server counts them.
+/// Number of open connections, as counted by the server.
 fn connections(server: &Server) -> usize {
     let metrics = String::from_utf8(server.get("/metrics").body).unwrap();
     metrics.lines().find_map(|line| line.strip_prefix("sastrugi_connections ")?.parse().ok()).unwrap()
 }
 
-/// A well-behaved client for a second: milliseconds of its answers.
+/// Runs a well-behaved client for a second; returns the times of its answers, ms.
 fn served_meanwhile(server: &Server, truth: &Truth, draws: &mut Draws) -> Vec<f64> {
     let (start, mut client, mut times) = (Instant::now(), server.client().unwrap(), Vec::new());
     while start.elapsed() < Duration::from_secs(1) {
@@ -674,8 +674,8 @@ fn served_meanwhile(server: &Server, truth: &Truth, draws: &mut Draws) -> Vec<f6
     times
 }
 
-/// Slow clients do not keep others from being served, and are let go.
-fn bear_slow_clients(count: usize, to_the_end: bool) {
+/// Slow clients do not keep others from being served, and are disconnected.
+fn hold_slow_clients(count: usize, to_the_end: bool) {
     let folder = area();
     write(folder.path(), "world.toml", QUICK);
     let truth = Truth::of(folder.path());
@@ -690,7 +690,7 @@ fn bear_slow_clients(count: usize, to_the_end: bool) {
     let longest = if to_the_end { HANG } else { Duration::from_secs(3) };
     let (mut most_open, mut open) = (0, count);
     while start.elapsed() < longest && (!slow.is_empty() || open > 4) {
-        // What the closed ones cannot take is counted below.
+        // Closed connections are counted below.
         slow.iter_mut().filter(|(way, _)| *way == 0).for_each(|(_, stream)| drop(stream.write_all(b"x")));
         times.extend(served_meanwhile(&server, &truth, &mut draws));
         slow.retain_mut(|(way, stream)| {
@@ -720,13 +720,13 @@ fn bear_slow_clients(count: usize, to_the_end: bool) {
     );
     for (way, name) in WAYS.iter().enumerate() {
         let all = (0..count).filter(|k| way_of(*k) == way).count();
-        println!("  {name}: {all}, let go {}, the last by {:.0} s", gone[way], last[way]);
+        println!("  {name}: {all}, disconnected {}, the last by {:.0} s", gone[way], last[way]);
     }
-    // 64 kB a connection, and 32 MB.
+    // 64 kB per connection, and 32 MB.
     assert!(most < before + 64 * count as u64 + (1 << 15), "{most} kB, {before} kB before");
     if to_the_end {
-        assert!(slow.is_empty() && open < 5, "{} and {open} are not let go: {gone:?}", slow.len());
-        // What was written to them before does not make three answers.
+        assert!(slow.is_empty() && open < 5, "{} and {open} are not disconnected: {gone:?}", slow.len());
+        // The bytes written to them before do not amount to three answers.
         let mut bytes = Vec::new();
         let (_, mut reader) = readers.into_iter().next().unwrap();
         reader.set_nonblocking(false).unwrap();
@@ -736,12 +736,12 @@ fn bear_slow_clients(count: usize, to_the_end: bool) {
 }
 
 #[test]
-fn val_others_are_served_beside_slow_clients() {
-    bear_slow_clients(200, false);
+fn val_slow_clients_do_not_block_others() {
+    hold_slow_clients(200, false);
 }
 
 #[test]
 #[ignore = "slow: ./test --full"]
-fn val_a_thousand_slow_clients_are_let_go() {
-    bear_slow_clients(1000, true);
+fn val_a_thousand_slow_clients_are_disconnected() {
+    hold_slow_clients(1000, true);
 }

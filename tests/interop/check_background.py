@@ -1,11 +1,11 @@
-"""Backgrounds of fits against local planes in scipy, and textures of the measured covariance laid onto them.
+"""Backgrounds of fits compared with local planes in scipy, and textures with the measured covariance added to them.
 
     check_background.py PROGRAM FOLDER DEM
 
 * `fit --background` of a field on a slope of 60 %, with random holes, a block of them and a jagged border: the same cells
   have a background, and heights agree to 1e-4 of the texture's sigma or the rounding of 32-bit heights.
 * The same for DEM, a measured raster without holes, over windows of 1.5 km.
-* A fit of DEM with model `empirical`, and textures of it on that background: detrended here, and trimmed as the residual was,
+** A fit of DEM with model `empirical`, and textures of it on that background: detrended here, and trimmed like the residual,
   the sum has the measured residual's RMS within 5 %, trimmed and not (mean of 20; one scatters by 0.5 %, so that the mean
   errs by 0.1 %; +1.9 % and -1.3 % measured).
 """
@@ -21,7 +21,7 @@ import rasterio
 import fields
 from common import Mismatch, expect
 
-# Share of the window that must hold data (exclusive), and largest variance of a background over that of a mean.
+# Share of the window that must have data (exclusive), and largest variance of a background over that of a mean.
 FILLED_SHARE_MIN, LEVERAGE_MAX = 0.5, 8.0
 TOLERANCE_SIGMAS = 1e-4
 DEM_OUTER_SCALE_M = 1500.0
@@ -60,7 +60,7 @@ class Program:
 
 
 def usable(half, count, leverage, slack=0.0):
-    """Where a window has data enough, and the plane through it is not extrapolated too far."""
+    """Where a window has enough data, and the plane through it is not extrapolated too far."""
     area = np.prod([2 * h + 1 for h in half])
     return (count > FILLED_SHARE_MIN * area) & (leverage <= LEVERAGE_MAX + slack)
 

@@ -1,4 +1,4 @@
-"""Cloud-optimised GeoTIFFs beside plain ones.
+"""Cloud-optimised GeoTIFFs compared with plain ones.
 
     python check_cog.py (COG PLAIN)...    rio-cogeo finds no error and no warning; rasterio (GDAL) reads the same heights, place and
                                           coordinates, and overviews that are means of the cells with data, or codes of cells
@@ -32,8 +32,10 @@ def check(cog, plain):
         for what in ["transform", "crs", "nodata", "units", "descriptions", "shape"]:
             expect(getattr(ours, what) == getattr(other, what), f"{cog}: {what} is not that of {plain}")
         factors = ours.overviews(1)
+        # Up to 512 cells a side, one level is enough (GDAL's rule, which rio-cogeo checks).
+        expect(factors or max(ours.shape) <= 512, f"{cog}: no overviews")
         heights = ours.read(1, masked=True).astype(float).filled(np.nan)
-        # Codes have no unit, and no means.
+        # Codes have neither a unit nor means.
         less = halved if ours.units[0] else lambda codes: codes[::2, ::2]
     for level, factor in enumerate(factors):
         heights = less(heights)
@@ -45,5 +47,6 @@ def check(cog, plain):
 
 if __name__ == "__main__":
     files = [Path(argument) for argument in sys.argv[1:]]
+    expect(files, "no files to compare")
     for cog, plain in zip(files[::2], files[1::2], strict=True):
         check(cog, plain)

@@ -1,9 +1,9 @@
-"""Decimated meshes of a DEM: the stated error is that of every cell centre, and the triangles cover what they should.
+"""Decimated meshes of a DEM: the stated error holds at every cell centre, and the triangles cover the right area.
 
     check_decimated.py DEM.tif STATED.json FILE...
 
-STATED.json is what `convert --json` printed for one of the files, which are all decimated alike: .obj and .glb by trimesh, .usda by
-OpenUSD. The error is measured triangle by triangle, by barycentric coordinates.
+STATED.json is the output of `convert --json` for one of the files, which are all decimated in the same way: .obj and .glb are read by
+trimesh, .usda by OpenUSD. The error is measured triangle by triangle, in barycentric coordinates.
 """
 
 import json
@@ -33,7 +33,7 @@ def load(path, dem):
 
 
 def errors(dem, vertices, triangles):
-    """Vertical distance of every post from the mesh; NaN where no triangle is."""
+    """Vertical distance of every post from the mesh; NaN where there is no triangle."""
     found = np.full(dem.heights.shape, np.nan)
     for a, b, c in vertices[triangles]:
         low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)

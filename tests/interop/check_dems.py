@@ -1,8 +1,8 @@
-"""Reads rasters with rasterio (GeoTIFF, ESRI ASCII, SRTM) and numpy (.npy) and prints what they hold.
+"""Reads rasters with rasterio (GeoTIFF, ESRI ASCII, SRTM) and numpy (.npy) and prints statistics of them.
 
     python check_dems.py RELEASE    every GeoTIFF of a release; heights must have the manifest's content hash, and
-                                    figures must equal table `terrains`
-    python check_dems.py FILE...    figures only, for comparison with `sastrugi info --json`
+                                    statistics must equal table `terrains`
+    python check_dems.py FILE...    statistics only, for comparison with `sastrugi info --json`
 """
 
 import warnings
@@ -15,7 +15,7 @@ import rasterio
 from common import ContentHash, expect, manifest, run
 
 
-# Units of the rasters beside the heights, and words of their descriptions.
+# Units of the maps that go with heights, and words in their descriptions.
 MAPS = {
     "albedo": ("1", "light"),
     "class": (None, "0 sand, 1 rock"),
@@ -29,7 +29,7 @@ IMAGE = ("1", "brightness")
 
 
 def read(path):
-    """Heights as float64 with NaN for no data, and what the file says of them."""
+    """Heights as float64 with NaN for no data, and their statistics and metadata."""
     if path.suffix == ".npy":
         stored = np.load(path)
         return stored.astype(float), {"dtype": stored.dtype.name, "cell": [1.0, 1.0]}
@@ -93,17 +93,17 @@ def close(a, b):
 def check_against_row(path, found, row):
     """Table `terrains` describes the heights in metres; a geographic raster's cells differ from the file's."""
     for key in ["rows", "cols"]:
-        expect(found[key] == row[key], f"{path}: {key} is {found[key]}, but table terrains says {row[key]}")
+        expect(found[key] == row[key], f"{path}: {key} is {found[key]}, but {row[key]} in table terrains")
     for key in ["height_min_m", "height_max_m", "rms_height_m"]:
-        expect(close(found[key], row[key]), f"{path}: {key} is {found[key]}, but table terrains says {row[key]}")
+        expect(close(found[key], row[key]), f"{path}: {key} is {found[key]}, but {row[key]} in table terrains")
     share = found["valid"] / (found["rows"] * found["cols"])
-    expect(close(share, row["valid_share"]), f"{path}: valid share {share}, but table terrains says {row['valid_share']}")
+    expect(close(share, row["valid_share"]), f"{path}: valid share {share}, but {row['valid_share']} in table terrains")
 
 
 def check_release(release):
     files = sorted((release / "tables" / "terrains").glob("*.parquet"))
     rows = {row["path"]: row for file in files for row in pq.read_table(file).to_pylist()}
-    report = {}
+    report, compared = {}, set()
     for artifact in manifest(release)["artifacts"]:
         path = artifact["path"]
         if not path.endswith(".tif") or path.startswith("dem/"):
@@ -122,7 +122,10 @@ def check_release(release):
         expect(recorded in (None, found["heights_sha256"]), f"{path}: heights do not have the manifest's content hash")
         if path in rows:
             check_against_row(path, found, rows[path])
-    expect(report, f"{release} holds no GeoTIFF")
+            compared.add(path)
+    expect(report, f"{release} has no GeoTIFF")
+    left = sorted(path for path in rows if not path.startswith("dem/") and path not in compared)
+    expect(compared and not left, f"table terrains names heights that were not compared: {left}")
     return report
 
 

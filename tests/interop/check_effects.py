@@ -1,9 +1,9 @@
-"""Elementary effects of perturbed rovers against SALib, from the same designs.
+"""Elementary effects of perturbed rovers compared with SALib's, from the same designs.
 
     check_effects.py RELEASE
 
-For every rover stage and group of terrains: the table `rover_designs` averaged over the worlds is given to SALib's analysis after
-Morris; its mu, mu_star and sigma are per range of a parameter, which is twice the share of its value, and must be those of the
+For every rover stage and group of terrains, the table `rover_designs`, averaged over the worlds, is passed to SALib's Morris
+analysis; its mu, mu_star and sigma are per range of a parameter, which is twice the share of its value, and must agree with the
 table `rover_effects` within 1e-9 of the largest.
 """
 
@@ -37,7 +37,7 @@ def designs_of(rows, measure):
 
 
 def check(effects, rows):
-    """Compares the effects on one measure; the number of parameters."""
+    """Compares the effects on one measure; returns the number of parameters."""
     first = effects[0]
     names, points, values = designs_of(rows, first["measure"])
     expect(names == sorted(e["parameter"] for e in effects), f"parameters {names}")

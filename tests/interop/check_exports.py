@@ -1,11 +1,11 @@
-"""Opens exports for simulators with independent readers: heights, scale and orientation against the DEM as rasterio reads it.
+"""Opens exports for simulators with independent readers and compares heights, scale and orientation with the DEM as read by rasterio.
 
     python check_exports.py DEM.tif FOLDER...    folders that `convert DEM.tif FOLDER --for ...` wrote, and files .glb, .obj, .usda,
                                                  .npy, each of that DEM
 
-Unreal and Unity: the picture or raw file by Pillow and numpy, turned into the program's coordinates by the numbers that the import
-asks for alone. Gazebo: world.sdf and model.sdf by an XML parser, the picture by Pillow, scaled as gz-rendering scales it,
-the collision mesh by trimesh. MuJoCo: its own compiler and its own rays. Isaac Sim: OpenUSD's library. Meshes: trimesh.
+Unreal and Unity: the picture or raw file by Pillow and numpy, converted to the program's coordinates with only the numbers that the
+import dialogue requires. Gazebo: world.sdf and model.sdf by an XML parser, the picture by Pillow, scaled as gz-rendering scales it,
+the collision mesh by trimesh. MuJoCo: its compiler and its rays. Isaac Sim: the OpenUSD library. Meshes: trimesh.
 """
 
 import copy
@@ -48,7 +48,7 @@ class Dem:
         return np.column_stack([x[there], y[there], self.heights[there]])
 
     def window(self, south_west, posts):
-        """The part with so many posts (east, north) from a cell centre on."""
+        """The part with a number of posts (east, north), starting at a cell centre."""
         (col, row), (cols, rows) = [int(np.argmin(np.abs(a - b))) for a, b in zip((self.x, self.y), south_west)], posts
         part = copy.copy(self)
         part.x, part.y = self.x[col : col + cols], self.y[row : row + rows]
@@ -77,8 +77,8 @@ def near(what, found, wanted, tolerance):
 
 
 def check_posts(what, dem, x, y, heights, step, stated):
-    """Posts of a height map, ascending, in scene coordinates: over the DEM's ground; on its bilinear surface, to half a step; and as
-    far from its cell centres as the folder says."""
+    """Posts of a height map, ascending, in scene coordinates: within the DEM's extent; on its bilinear surface, to half a step; and at
+    the distance from its cell centres that the folder states."""
     for name, found, wanted in [("x", x, dem.x), ("y", y, dem.y)]:
         near(f"{what}: outer posts in {name}", [found[0], found[-1]], [wanted[0], wanted[-1]], 1e-6)
     surface = bilinear(dem.x, dem.y, dem.heights, x, y)
@@ -120,7 +120,7 @@ def check_unity(folder, dem, numbers):
 
 
 def check_gazebo(folder, dem, numbers):
-    """Visual by the renderer's rule: size over 2^n spacings, levels by the brightest. Collision: the mesh where its poses put it."""
+    """Visual by the renderer's rule: size over 2^n spacings, levels by the brightest. Collision: the mesh at its pose."""
     model = ElementTree.parse(folder / "model.sdf").getroot().find("model")
     world = ElementTree.parse(folder / "world.sdf").getroot().find("world")
     expect(ElementTree.tostring(world.find("model")) == ElementTree.tostring(model), f"{folder}: world and model differ")
@@ -156,7 +156,7 @@ def check_gazebo(folder, dem, numbers):
 
 
 def check_mujoco(folder, dem, numbers):
-    """Rays from above hit the ground at every post, and on the side that two triangles share, from south-west to north-east."""
+    """Rays from above hit the ground at every post, and on the edge that two triangles share, from south-west to north-east."""
     expect(numbers["fit"]["method"] == "none", f"{folder}: resampled")
     model = mujoco.MjModel.from_xml_path(str(folder / "terrain.xml"))
     data = mujoco.MjData(model)
@@ -170,15 +170,15 @@ def check_mujoco(folder, dem, numbers):
         expect(distance > 0, f"{folder}: no ground at {x}, {y}")
         return top - distance
 
-    # A hair beside each post, inside of the ground and of a triangle: a ray along an edge may pass between two of them. That costs as
-    # much height as the ground is steep.
+    # Slightly off each post, within the ground and a triangle, because a ray along an edge may pass between two triangles. The error in
+    # height is proportional to the slope.
     hair = 1e-7
     x, y, z = dem.points().T
     x_in, y_in = x + np.where(x < x.max(), hair, -hair), y + np.where(y < y.max(), hair, -hair) / 2
     north, east = np.gradient(dem.heights, dem.y, dem.x)
     steep = max(np.abs(north).max(), np.abs(east).max())
     largest = near(f"{folder}: posts", [height(*point) for point in zip(x_in, y_in)], z, SINGLE + 4 * hair * steep)
-    # The middle of four posts lies on the side that both triangles share.
+    # The middle of four posts lies on the edge that both triangles share.
     middles = [(r, c) for r in range(0, len(dem.y) - 1, 7) for c in range(0, len(dem.x) - 1, 7)]
     found = [height((dem.x[c] + dem.x[c + 1]) / 2 + hair, (dem.y[r] + dem.y[r + 1]) / 2) for r, c in middles]
     rising = [(dem.heights[r, c] + dem.heights[r + 1, c + 1]) / 2 for r, c in middles]
@@ -190,7 +190,7 @@ def check_mujoco(folder, dem, numbers):
 
 
 def check_mesh(what, dem, vertices, triangles):
-    """Vertices are the cells with data; triangles look up and cover what lies between three of them."""
+    """Vertices are the cells with data; triangles face up and cover the area between three of them."""
     points = dem.points()
     order = lambda p: p[np.lexsort((np.round(p[:, 0], 4), np.round(p[:, 1], 4)))]
     expect(len(vertices) == len(points), f"{what}: {len(vertices)} vertices, {len(points)} cells with data")
@@ -256,7 +256,7 @@ def resampled(numbers):
 
 
 def check_numbers(folder, dem, numbers):
-    """What all targets state alike, and the matrix against what the target's own numbers came to."""
+    """Statements common to all targets, and the matrix compared with the target's own numbers."""
     scene = numbers["scene"]
     near(f"{folder}: shift", scene["dem_minus_scene_m"], dem.corner, 1e-6)
     near(f"{folder}: south-west post", scene["south_west_post_m"], [dem.x[0], dem.y[0]], 1e-6)

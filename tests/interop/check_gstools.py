@@ -1,4 +1,4 @@
-"""GSTools' covariances of the `gstools` blocks of fit files are ours.
+"""GSTools' covariances for the `gstools` blocks of fit files agree with ours.
 
     check_gstools.py GOLDEN.json FIT.json...
 
@@ -16,14 +16,15 @@ TOLERANCE = 1e-9
 
 
 def model_of(block):
-    """A model from a block, as `docs/formats.md` says."""
+    """A model from a block, as in `docs/formats.md`."""
     arguments = {key: value for key, value in block.items() if key != "model"}
     return getattr(gstools, block["model"])(dim=2, **arguments)
 
 
 def check_golden(path):
-    worst = 0.0
-    for case in json.load(open(path)):
+    worst, cases = 0.0, json.load(open(path))
+    assert cases and all(case["lags_m"] and len(case["lags_m"]) == len(case["covariance_m2"]) for case in cases), path
+    for case in cases:
         model = model_of(case["gstools"])
         sill = model.sill
         for (x, y), ours in zip(case["lags_m"], case["covariance_m2"]):

@@ -1,10 +1,10 @@
-"""Renders the surfaces of a release again with numpy and compares with its images.
+"""Renders the surfaces of a release with numpy and compares the result with its images.
 
     python check_images.py RELEASE
 
-Slopes are central differences for images straight down (one ray a pixel, through the cell's centre), and those of the bilinear patch for
+Slopes are central differences for nadir images (one ray per pixel, through the cell's centre), and those of the bilinear patch for
 others; brightness, shadows and rays are computed here from the surface and the image's JSON alone. Rays and shadows march in steps of a twentieth
-of a cell; a pixel whose shadow or first point hangs on less than a step may differ, others may not.
+of a cell; only pixels whose shadow or first point depends on less than a step may differ.
 """
 
 import json
@@ -18,7 +18,7 @@ from common import Mismatch, expect, table
 
 # Heights and brightness are stored in single precision: slopes differ by 1e-7 m over 0.02 m.
 TOLERANCE = 2e-5
-# Pixels that hang on less than a step.
+# Share of pixels that may depend on less than a step.
 DOUBTFUL_SHARE = 0.002
 STEPS_PER_CELL = 20
 
@@ -109,7 +109,7 @@ def rays(camera):
 
 
 def first_points(ground, origin, direction):
-    """Where rays come down to the ground, NaN where they do not; and how near they came to it before."""
+    """Where rays reach the ground, NaN where they do not; and how close they came to it before."""
     if np.all(direction[2] < -0.999999):
         z = ground.bilinear(ground.z, origin[0], origin[1])
         return np.array([origin[0], origin[1], z]), np.full(z.size, np.inf)

@@ -1,8 +1,8 @@
-"""Burns polygons with rasterio (GDAL) and compares with the cells that we keep.
+"""Burns polygons with rasterio (GDAL) and compares the result with the cells that we keep.
 
     python check_masks.py DEM MASK.geojson MASKED.tif
 
-A cell is kept where GDAL finds its centre inside of a polygon and the DEM has data. Prints the number of cells kept.
+A cell is kept if GDAL finds its centre inside a polygon and the DEM has data. Prints the number of cells kept.
 """
 
 import json
@@ -40,7 +40,7 @@ def check(dem, mask, masked):
         after = heights(raster)
     expected = np.where(inside, before, np.nan)
     differing = int((np.isfinite(expected) != np.isfinite(after)).sum())
-    expect(differing == 0, f"{mask} on {dem}: {differing} cells are kept or dropped that GDAL sees otherwise")
+    expect(differing == 0, f"{mask} on {dem}: {differing} cells are kept or dropped contrary to GDAL")
     expect(np.array_equal(expected, after, equal_nan=True), f"{mask} on {dem}: heights changed")
     return {"kept": int(np.isfinite(after).sum()), "inside": int(inside.sum())}
 

@@ -1,8 +1,8 @@
 """Reads every MCAP with the Python reader: checksums validated, every message decoded from its own schema.
 
-    python check_mcap.py RELEASE    also against tables `missions` and `samples`, the manifest, and the terrain: the mesh
+    python check_mcap.py RELEASE    also compares with tables `missions` and `samples`, the manifest, and the terrain: the mesh
                                     must be the ground under the wheels
-    python check_mcap.py FILE...    figures of single files
+    python check_mcap.py FILE...    statistics of single files
 """
 
 import functools
@@ -19,7 +19,7 @@ TOPICS = {
     "/terrain/mesh", "/terrain/grid", "/vehicle/shape", "/vehicle/path", "/tf", "/vehicle/pose", "/vehicle/state",
     "/imu", "/wheels", "/command", "/events",
 }
-# Every so many samples, the ground under the wheels must lie on the mesh.
+# At every n-th sample, the ground under the wheels must lie on the mesh.
 CONTACT_STEP = 20
 GROUND_TOLERANCE_M = 0.01
 
@@ -50,7 +50,7 @@ def mesh_triangles(path, scene):
 
 
 def off_mesh(triangles, contacts):
-    """Largest vertical distance of the points from the triangles, and how many lie on none."""
+    """Largest vertical distance of the points from the triangles, and the number of points off all triangles."""
     a, u, v = triangles[:, 0], triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0]
     area = u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]
     worst, lost = 0.0, 0
@@ -108,10 +108,12 @@ def figures(path):
         statistics = reader.get_summary().statistics
         metadata = {record.name: dict(record.metadata) for record in reader.iter_metadata()}
     total = sum(counts.values())
-    expect(statistics.message_count == total, f"{path}: {total} messages, but the summary says {statistics.message_count}")
+    expect(statistics.message_count == total, f"{path}: {total} messages, but {statistics.message_count} in the summary")
     expect(set(counts) <= TOPICS, f"{path}: unknown topics {set(counts) - TOPICS}")
+    # The vehicle stands on its wheels at its start.
+    expect(contacts, f"{path}: no wheel touches the ground")
     distance, lost = off_mesh(mesh, contacts)
-    expect(lost == 0, f"{path}: {lost} of {len(contacts)} wheel contacts lie beside the mesh")
+    expect(lost == 0, f"{path}: {lost} of {len(contacts)} wheel contacts lie off the mesh")
     length = sum(math.hypot(b[1] - a[1], b[2] - a[2]) for a, b in zip(states, states[1:]))
     return {
         "messages": total,
@@ -133,15 +135,15 @@ def figures(path):
 
 def check_against_tables(path, found, mission, samples):
     states = found["states"]
-    expect(len(states) == mission["samples"], f"{path}: {len(states)} states, table missions says {mission['samples']}")
-    expect(found["outcome"] == mission["outcome"], f"{path}: {found['outcome']}, table missions says {mission['outcome']}")
+    expect(len(states) == mission["samples"], f"{path}: {len(states)} states, {mission['samples']} in table missions")
+    expect(found["outcome"] == mission["outcome"], f"{path}: {found['outcome']}, {mission['outcome']} in table missions")
     difference = abs(found["path_length_m"] - mission["path_length_m"])
     expect(difference <= 1e-9 * (1 + mission["path_length_m"]), f"{path}: the path is {difference} m longer in the table")
     rows = [(s["time_s"], s["x_m"], s["y_m"], s["z_m"]) for s in samples]
     expect(len(rows) == len(states), f"{path}: {len(states)} states, table samples has {len(rows)}")
     for state, row in zip(states, rows):
-        expect(abs(state[0] - row[0]) <= 1e-9, f"{path}: a state at {state[0]} s, table samples says {row[0]} s")
-        expect(state[1:] == row[1:], f"{path}: the position at {row[0]} s is {state[1:]}, table samples says {row[1:]}")
+        expect(abs(state[0] - row[0]) <= 1e-9, f"{path}: a state at {state[0]} s, {row[0]} s in table samples")
+        expect(state[1:] == row[1:], f"{path}: the position at {row[0]} s is {state[1:]}, {row[1:]} in table samples")
 
 
 def ground(raster, contacts):
@@ -181,7 +183,7 @@ def check_release(release):
             continue
         found = figures(release / path)
         records, content = artifact.get("records"), artifact.get("content_sha256")
-        expect(records in (None, found["messages"]), f"{path}: {found['messages']} messages, the manifest says {records}")
+        expect(records in (None, found["messages"]), f"{path}: {found['messages']} messages, {records} in the manifest")
         expect(content in (None, found["messages_sha256"]), f"{path}: messages do not have the manifest's content hash")
         expect(path in missions, f"{path} is not in table missions")
         mission = missions.pop(path)
@@ -190,7 +192,7 @@ def check_release(release):
         report[path] = public(found)
     missing = sorted(path for path in missions if path)
     expect(not missing, f"table missions names files that are not there: {missing[:3]}")
-    expect(report, f"{release} holds no MCAP")
+    expect(report, f"{release} has no MCAP")
     return report
 
 

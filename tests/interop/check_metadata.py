@@ -1,4 +1,4 @@
-"""Opens the descriptions of a release with the programs they are meant for.
+"""Opens the metadata of a release with the programs for which they are written.
 
     python check_metadata.py RELEASE    croissant.json with mlcroissant (every record of every record set, against the rows of the
                                         tables), ro-crate-metadata.json with rocrate, CITATION.cff with cffconvert, the head of
@@ -22,14 +22,14 @@ from ruamel.yaml import YAML
 
 from common import expect, manifest, run
 
-# Stages that only take files into the release.
+# Stages that only copy files into the release.
 COPIES = {"original", "mask"}
 PARTS = ["train", "validation", "test"]
 # Tables with a file for each terrain.
 LONG = {"samples", "formation_samples", "rover_samples"}
-# Rasters beside the heights.
+# Maps that go with heights.
 MAPS = ["albedo", "class", "flux", "rms-measured", "rms-predicted", "rock-potential"]
-# Tables of more files are a set of files only; their hashes are in the manifest.
+# Tables with more files are only described as a file set; their hashes are in the manifest.
 DESCRIBED_FILES = 64
 
 
@@ -99,7 +99,7 @@ def check_croissant(release):
 
 
 def check_terrain(release, name, rows):
-    """The file of one terrain alone. (A filter changes the data set it is asked of.)"""
+    """Only the file of one terrain. (A filter modifies the data set on which it is called.)"""
     terrain = rows[-1]["terrain_id"]
     wanted = [row for row in rows if row["terrain_id"] == terrain]
     found = list(mlcroissant.Dataset(release / "croissant.json").records(name, filters={f"{name}/terrain_id": terrain}))
@@ -108,10 +108,10 @@ def check_terrain(release, name, rows):
 
 
 def check_references(release, sets):
-    """Every column that names a part refers to the record set of the parts, but for tables with a file for each terrain."""
+    """Every column that names a split refers to the record set of the splits, except in tables with a file for each terrain."""
     described = json.loads((release / "croissant.json").read_text())["recordSet"]
     fields = {field["@id"]: field for record_set in described for field in record_set["field"]}
-    expect("cr:Split" in fields["splits/url"]["dataType"], "croissant.json: the parts are no cr:Split")
+    expect("cr:Split" in fields["splits/url"]["dataType"], "croissant.json: the splits are not of type cr:Split")
     columns = [f"{name}/split" for name in sorted(sets) if f"{name}/split" in fields]
     expect(columns, "croissant.json: no column names a part")
     for column in columns:
@@ -168,7 +168,7 @@ def check_crate(release):
 
 
 def check_provenance(release, actions):
-    """What each action read and made, against the parents in the manifest: all that have a file, and nothing else."""
+    """Inputs and outputs of each action agree with the parents in the manifest: all that have a file, and nothing else."""
     artifacts = manifest(release)["artifacts"]
     stage_of = {artifact["path"]: artifact["stage"] for artifact in artifacts}
     item_of = {a["path"]: f"{a['stage']}/{a['item']}" for a in artifacts if a.get("item")}
@@ -205,7 +205,7 @@ def check_provenance(release, actions):
 
 
 def check_citation(release):
-    """Valid; the licence where the format has it; the creators as Croissant names them, people as people."""
+    """Valid; with the licence if the format allows it; with the creators as in Croissant, people as people."""
     citation = create_citation(str(release / "CITATION.cff"), None)
     citation.validate()
     file = citation.cffobj
@@ -229,7 +229,7 @@ def check_citation(release):
 
 
 def check_zenodo(release):
-    """The creators of Croissant with their ORCID iDs and affiliations; all that Zenodo asks for on deposit, licence and grants as it names them."""
+    """The creators of Croissant with their ORCID iDs and affiliations; everything that Zenodo requires on deposit, with its names for licence and grants."""
     deposit = json.loads((release / ".zenodo.json").read_text())
     known = {
         "title", "upload_type", "description", "creators", "access_right", "license", "publication_date", "version", "keywords",
@@ -273,7 +273,7 @@ def check_card(release):
 
 
 def check_part(release, part, paths):
-    """Every row of the files of a split is in that part; `other` holds those that are in none."""
+    """Every row of the files of a split is in that split; `other` has the rows of no split."""
     if part is None:
         return
     expect(part in [*PARTS, "other"], f"README.md has the split {part}")

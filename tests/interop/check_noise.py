@@ -1,11 +1,11 @@
-"""Fits of numpy fields with the noise of dense image matching, found in a smooth part of the same DEM.
+"""Fits of numpy fields with the noise of dense image matching, estimated in a smooth part of the same DEM.
 
     check_noise.py PROGRAM FOLDER
 
-Sixteen fields: an exponential texture west, a plane road east, both on a slope of 10 %. Matching noise is made as matching makes
-it, white noise averaged over a square patch of 5 cells (its correlation is a triangle, not the Gaussian that the fit takes), with
-white noise beside it. With the road as noise reference sigma and b must be those of the texture, but for what the other shape of
-the correlation does. One field of 256 x 192 cells scatters by 2.6 % and 5.7 %, a mean of sixteen by 0.65 % and 1.4 %. Measured here:
+Sixteen fields: an exponential texture in the west, a plane road in the east, both on a slope of 10 %. Matching noise is simulated as
+it arises in matching, as white noise averaged over a square patch of 5 cells (its correlation is triangular, not the Gaussian that the
+fit assumes), plus white noise. With the road as noise reference, sigma and b must be those of the texture, up to the effect of the
+different correlation. One field of 256 x 192 cells scatters by 2.6 % and 5.7 %, a mean of sixteen by 0.65 % and 1.4 %. Measured here:
 -0.2 % and -5.3 %, so that the shape costs some 4 % of b; the limits are 4 % and 10 %. Without the reference (four fields) sigma is
 too large by more than 5 % (measured: 9 %, and b is 16 % too small).
 """
@@ -60,7 +60,7 @@ class Fitter:
         return fit
 
     def errors(self, number):
-        """Errors of sigma and b, percent, with and without the reference; and the noise that was found."""
+        """Errors of sigma and b, percent, with and without the reference; and the estimated noise."""
         random = np.random.default_rng([1019, number])
         texture = fields.exponential_fields(random)[0]
         texture[:, -ROAD_CELLS:] = 0.0
@@ -84,7 +84,7 @@ def main(program, folder):
     print(f"sigma and b with the reference {mean[:2].round(2)} %, without {mean[2:4].round(2)} %")
     print(f"white noise {mean[4]:.4f} m, correlated {mean[5]:.4f} m over {mean[6]:.3f} m")
     expect(np.all(np.abs(mean[:2]) <= LIMITS_PERCENT), f"sigma and b are off by {mean[:2]} %, limits {LIMITS_PERCENT} %")
-    expect(mean[2] > 5.0, f"noise without a reference moves sigma by {mean[2]} % only")
+    expect(mean[2] > 5.0, f"without a reference, noise changes sigma by only {mean[2]} %")
 
 
 if __name__ == "__main__":

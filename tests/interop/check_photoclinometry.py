@@ -2,8 +2,8 @@
 
     check_photoclinometry.py PROBLEM.json
 
-PROBLEM has shape, cell sizes, slopes and information of every cell (null: none), soft constraints, and the heights that the program found. Heights
-must agree within 1e-6 m.
+PROBLEM has shape, cell sizes, slopes and information matrix of every cell (null: none), soft constraints, and the program's heights. Heights must
+agree within 1e-6 m.
 """
 
 import json

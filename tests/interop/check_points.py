@@ -1,10 +1,10 @@
-"""Grids point clouds with laspy and numpy and compares with our heights.
+"""Grids point clouds with laspy and numpy and compares the result with our heights.
 
     python check_points.py CLOUD CELL_M HEIGHTS.npy
 
-Cells with points must be the same, their mean heights equal to 1e-9 of a metre. Prints shape, points, cells with points,
-and the SHA-256 of the points per cell (32-bit, little-endian, from the north-west), which the tests of the room `store`
-hold as well.
+Cells with points must be the same, and their mean heights equal to 1e-9 m. Prints shape, points, cells with points, and the
+SHA-256 of the points per cell (32-bit, little-endian, from the north-west), with which the tests of the room `store` check measured
+clouds.
 """
 
 import hashlib
@@ -22,7 +22,7 @@ NOISE = [7, 18]
 
 
 def read(path):
-    """Coordinates of the points that are wanted."""
+    """Coordinates of the points that are gridded."""
     cloud = laspy.read(path)
     wanted = ~np.isin(np.asarray(cloud.classification), NOISE) & (np.asarray(cloud.withheld) == 0)
     return [np.asarray(axis)[wanted] for axis in (cloud.x, cloud.y, cloud.z)]
@@ -48,7 +48,7 @@ def check(cloud, cell, heights):
     expect(heights.shape == shape, f"{cloud}: {heights.shape} cells, but laspy's points fill {shape}")
     ours = heights.ravel()
     held = counts > 0
-    expect(np.array_equal(np.isfinite(ours), held), f"{cloud}: other cells hold points")
+    expect(np.array_equal(np.isfinite(ours), held), f"{cloud}: different cells have points")
     worst = float(np.abs(ours - means)[held].max())
     expect(worst <= TOLERANCE_M, f"{cloud}: means differ by up to {worst} m")
     return {

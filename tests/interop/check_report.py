@@ -1,10 +1,10 @@
-"""Follows figures of a report to the rows of the release and to a recording.
+"""Traces numbers of a report to the rows of the release and to a recording.
 
-    python check_report.py RELEASE REPORT    every query that the report states runs in duckdb and gives its numbers, or rows that they
-                                             are computed from: medians, quartiles, shifts and deltas are computed from them once
-                                             more; files that it names are there; a mission ends in its recording as in its row.
-                                             Rovers (one stage for each navigator): efficiencies, arrival, intraclass correlation and distance budgets of each
-                                             group are computed from their rows the obvious way
+    python check_report.py RELEASE REPORT    every query of the report runs in duckdb and returns its numbers, or the rows from which they
+                                             are computed: medians, quartiles, shifts and deltas are recomputed from these rows; files
+                                             that the report names exist; a mission has the same outcome in its recording and its row.
+                                             Rovers (one stage for each navigator): efficiencies, arrival, intraclass correlations and
+                                             distance budgets of each group are recomputed from their rows in the obvious way
 """
 
 import json
@@ -49,23 +49,23 @@ def same_rows(name, ours, theirs):
 
 
 def plain(value):
-    """What is not a number is null in the report; numbers are of one type."""
+    """NaN and infinities are null in the report; numbers have one type."""
     if isinstance(value, float):
         return value if math.isfinite(value) else None
     return float(value) if isinstance(value, int) and not isinstance(value, bool) else value
 
 
 def runs(path, document):
-    """A query runs, and gives the rows of the report or rows for them."""
+    """A query runs and returns the rows of the report, or the rows from which they are computed."""
     rows = [tuple(map(plain, row)) for row in duckdb.sql(document["query"]).fetchall()]
     ours = [tuple(map(plain, row)) for row in document["rows"]]
-    expect(rows or not ours, f"{path.stem}: nothing comes of {document['query']}")
+    expect(rows or not ours, f"{path.stem}: no rows from {document['query']}")
     if document["query_gives"] == "rows":
         outcomes(document, rows) if path.stem in ["outcomes", "summary-outcomes"] else same_rows(path.stem, ours, rows)
 
 
 def compared(document):
-    """Shift and delta of two groups from the rows of the query: the obvious way."""
+    """Shift and delta of two groups from the rows of the query, in the obvious way."""
     names = [column[0] for column in duckdb.sql(document["query"]).description]
     missions = [dict(zip(names, row)) for row in duckdb.sql(document["query"]).fetchall()]
     known = [row for row in document["rows"] if row[4] is not None]
@@ -116,7 +116,7 @@ def of_group(missions, figure, group, blocks):
 
 
 def in_both(first, second):
-    """The missions of pairs that both groups have, block by block."""
+    """Missions of the pairs that both groups have, block by block."""
     pairs = [(block, sorted(first[block].keys() & second[block].keys())) for block in sorted(first.keys() & second.keys())]
     pairs = [(block, ids) for block, ids in pairs if ids]
     return ([[of[block][pair] for pair in ids] for block, ids in pairs] for of in (first, second))
@@ -142,7 +142,7 @@ def quartiles(document):
 
 
 def rovers(report):
-    """Tables on rovers from the rows that their queries give."""
+    """Tables on rovers, from the rows that their queries return."""
     document = lambda name: json.loads((report / "data" / f"{name}.json").read_text())
     efficiency = document("rover-efficiency")
     names = [column[0] for column in duckdb.sql(efficiency["query"]).description]
@@ -190,7 +190,7 @@ def intraclass(rows, value):
 
 
 def budget(rows, share):
-    """Where the share that has arrived (Aalen and Johansen) reaches one; none where it does not."""
+    """Distance at which the share that has arrived (Aalen and Johansen) reaches a share; None if it does not."""
     left, arrived, under_way = len(rows), 0.0, 1.0
     for at in sorted({row["distance_m"] for row in rows}):
         here = [row["outcome"] for row in rows if row["distance_m"] == at]
@@ -204,7 +204,7 @@ def budget(rows, share):
 
 
 def recording():
-    """A mission's row and its recording say the same."""
+    """A mission's row and its recording agree."""
     [(path, outcome, time_s)] = duckdb.sql(
         "select path, outcome, time_s from 'tables/missions/*.parquet' where outcome = 'success' order by path limit 1"
     ).fetchall()
@@ -238,4 +238,4 @@ def check(release):
 
 
 if __name__ == "__main__":
-    run(check, lambda paths: sys.exit(f"{paths[0]} is no release"))
+    run(check, lambda paths: sys.exit(f"{paths[0]} is not a release"))

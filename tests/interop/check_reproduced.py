@@ -1,10 +1,10 @@
-"""A recovered surface must reproduce its images, and one that the inversion has not seen.
+"""A recovered surface must reproduce its images, and one that the inversion did not use.
 
     check_reproduced.py RELEASE
 
-Nothing of the program enters: the published law (35 % Lambert, 65 % Lommel-Seeliger with McEwen's factor of 2) shades the recovered heights by
-finite differences of fourth order, the recovered albedo multiplies it, and the image of every sun in the release is compared. The rms difference
-must stay below 0.2 % of the mean brightness; level ground of the same albedo must be 20 times as far off, else the images would prove nothing.
+Independent of the program: the published law (35 % Lambert, 65 % Lommel-Seeliger with McEwen's factor of 2) shades the recovered heights with
+fourth-order finite differences, the recovered albedo multiplies it, and the result is compared with the image of every sun in the release. The RMS
+difference must stay below 0.2 % of the mean brightness; level ground of the same albedo must differ 20 times as much, otherwise the images prove nothing.
 """
 
 import json
@@ -64,7 +64,7 @@ def main():
         off, level = error(p, q), error(np.zeros_like(p), np.zeros_like(q))
         print(f"{described.stem}: sun {sun}: {100 * off:.3f} % off, level ground {100 * level:.1f} %")
         expect(off < LIMIT, f"{described.stem}: brightness is off by {100 * off:.3f} % (rms)")
-        expect(level > 20 * LIMIT, f"{described.stem}: level ground is off by {100 * level:.3f} % only")
+        expect(level > 20 * LIMIT, f"{described.stem}: level ground is off by only {100 * level:.3f} %")
 
 
 main()

@@ -1,4 +1,4 @@
-"""Recordings of a release as Rerun reads them: check_rerun.py RELEASE.
+"""Recordings of a release, read by Rerun: check_rerun.py RELEASE.
 
 `rerun mcap check --full` finds no issue in any of them; one of them converted has poses, transforms, texts and states.
 """
@@ -28,7 +28,7 @@ SHOWN = {
 
 
 def rerun(*arguments):
-    """Output of Rerun, which keeps what it writes beside its files in a folder of its own."""
+    """Output of Rerun, whose side files are kept in a separate folder."""
     with tempfile.TemporaryDirectory() as home:
         environment = {**os.environ, "HOME": home, "RERUN_TELEMETRY": "0"}
         called = subprocess.run([RERUN, *map(str, arguments)], env=environment, capture_output=True, text=True)
@@ -48,7 +48,7 @@ def check_file(path):
 
 def check_release(release):
     paths = sorted((release / "mcap").glob("**/*.mcap"))
-    expect(paths, f"{release} holds no MCAP")
+    expect(paths, f"{release} has no MCAP")
     topics = sum(check_file(path) for path in paths)
     flavour = "ros2" if (paths[0].parent / "metadata.yaml").exists() else "viewer"
     with tempfile.TemporaryDirectory() as folder:

@@ -1,4 +1,4 @@
-"""ROS 2 bags of a release as rosbags and mcap-ros2-support read them: check_ros2.py RELEASE.
+"""ROS 2 bags of a release, read by rosbags and mcap-ros2-support: check_ros2.py RELEASE.
 
 Every bag opens as a folder, its definitions are the official ones, and its values are those of the tables and the terrain.
 """
@@ -26,9 +26,9 @@ TOPICS = {
     "/cmd_vel": "geometry_msgs/msg/TwistStamped",
     "/events": "rcl_interfaces/msg/Log",
 }
-# Messages said once at the start, kept for late listeners.
+# Messages published once at the start and latched for late subscribers.
 LASTING = {"/tf_static", "/terrain", "/terrain/points"}
-# grid_map_msgs is no part of ROS 2's own distribution; these are its fields in the branch "humble".
+# grid_map_msgs is not part of the ROS 2 distribution; these are its fields in the branch "humble".
 GRID_MAP = {
     "grid_map_msgs/msg/GridMapInfo": [
         ("resolution", "float64"), ("length_x", "float64"), ("length_y", "float64"), ("pose", "geometry_msgs/msg/Pose"),
@@ -40,7 +40,7 @@ GRID_MAP = {
     ],
 }
 CELL_HEIGHT_TOLERANCE_M = 1e-3
-# Most cells along a side of the grid map.
+# Largest number of cells along a side of the grid map.
 GRID_CELLS = 128
 NO_CLASS = 255
 WHEELS = ["front_left_wheel", "front_right_wheel", "rear_left_wheel", "rear_right_wheel"]
@@ -68,7 +68,7 @@ def type_text(field):
 
 
 def embedded_types(reader):
-    """The definitions that an MCAP file carries, by name of the schema."""
+    """The definitions in an MCAP file, by name of the schema."""
     return {schema.name: schema.data.decode() for schema in reader.get_summary().schemas.values()}
 
 
@@ -112,7 +112,7 @@ def read_bag(folder, definitions, topics, lasting):
         counts = {c.topic: c.msgcount for c in bag.connections}
         start, end = bag.start_time, bag.end_time
     read = sum(map(len, messages.values()))
-    expect(read == total, f"{folder}: {read} messages, metadata.yaml says {total}")
+    expect(read == total, f"{folder}: {read} messages, {total} in metadata.yaml")
     for topic, count in counts.items():
         expect(len(messages.get(topic, [])) == count, f"{folder}: metadata.yaml miscounts {topic}")
     times = sorted(time for topic in messages.values() for time, _ in topic)
@@ -153,7 +153,7 @@ def stamp_ns(stamp):
 
 
 def check_same(path, ours, theirs):
-    """Both readers see the same values, on every topic."""
+    """Both readers return the same values on every topic."""
     for topic in ours:
         for (t, a), (u, b) in zip(ours[topic], theirs[topic], strict=True):
             expect(t == u and flat(a) == flat(b), f"{path}: the readers differ on {topic} at {t}")
@@ -168,7 +168,7 @@ def flat(message):
         return [None if x != x else x for x in numbers.tolist()]
     if isinstance(message, (list, tuple)):
         return [x for part in message for x in flat(part)]
-    # One of the readers holds a definition's constants, whose names are upper case, beside its fields.
+    # One of the readers lists a definition's constants, whose names are upper case, with its fields.
     names = [n for n in getattr(message, "__slots__", None) or vars(message) if not n.startswith("__") and not n.isupper()]
     return [x for name in names for x in flat(getattr(message, name))]
 
@@ -185,8 +185,8 @@ def check_motion(path, messages, samples, mission):
         expect(pose == [row[k] for k in ("x_m", "y_m", "z_m", "qx", "qy", "qz", "qw")], f"{path}: a pose at {time}")
         speed = math.dist(values(message.twist.twist.linear), [0, 0, 0])
         expected = math.dist([row[k] for k in ("vx_m_s", "vy_m_s", "vz_m_s")], [0, 0, 0])
-        expect(abs(speed - expected) <= 1e-9 * (1 + expected), f"{path}: {speed} m/s, table samples says {expected}")
-    # Forward in the body's own frame: the twist is no motion in the map.
+        expect(abs(speed - expected) <= 1e-9 * (1 + expected), f"{path}: {speed} m/s, {expected} in table samples")
+    # Forward in the body frame: the twist is not in the map frame.
     forward = np.mean([message.twist.twist.linear.x for _, message in odometry])
     expect(forward > 0 or mission["time_s"] < 2, f"{path}: on the mean it drives backwards ({forward} m/s)")
     for (_, message), (_, tf) in zip(odometry, messages["/tf"], strict=True):
@@ -227,7 +227,7 @@ def check_others(path, messages, samples):
 
 
 def bilinear(heights, col, row):
-    """Heights between the cell centres; beyond the outer ones, and beside cells without data, that of the cell."""
+    """Heights between the cell centres; beyond the outer ones, and next to cells without data, the height of the cell."""
     rows, cols = heights.shape
     i, j = (np.clip(np.floor(at).astype(int), 0, n - 2) for at, n in ((col, cols), (row, rows)))
     u, v = col - i, row - j
@@ -272,7 +272,7 @@ def check_grid_map(path, message, raster, classes):
     # One unit in the last place of single precision; the places are good to far less than 1e-9 m.
     fits = np.isnan(expected) | (off <= np.spacing(np.abs(expected).astype(np.float32)) + 1e-9)
     expect(fits.all(), f"{path}: the grid map is {np.nanmax(off)} m off")
-    # A centre between cells may take either.
+    # A centre between two cells may have the class of either.
     near = [classes[cells_at(row + v, rows), cells_at(col + u, cols)] for u in (-1e-6, 1e-6) for v in (-1e-6, 1e-6)]
     found = np.where(np.isnan(code), NO_CLASS, code)
     expect(np.any([found == one for one in near], axis=0).all(), f"{path}: the grid map has other classes")
@@ -308,7 +308,7 @@ def check_release(release):
     report = {}
     for mission in table(release, "missions"):
         path = release / mission["path"]
-        expect((path.parent / "metadata.yaml").exists(), f"{path.parent} is no bag")
+        expect((path.parent / "metadata.yaml").exists(), f"{path.parent} is not a bag")
         theirs, content, definitions = read_mcap(path)
         expect(artifacts[mission["path"]]["content_sha256"] == content, f"{path}: not the manifest's content hash")
         check_definitions(path, definitions)
@@ -322,7 +322,7 @@ def check_release(release):
         points = check_cloud(path, messages, ground)
         report[mission["path"]] = {"messages": sum(map(len, messages.values())), "points": points,
                                    "grid_map_cell": cells, "bytes": path.stat().st_size}
-    expect(report, f"{release} holds no mission")
+    expect(report, f"{release} has no missions")
     return report
 
 

@@ -1,11 +1,11 @@
-"""Plans routes with the program and computes their costs again with scikit-image and scipy.
+"""Plans routes with the program and recomputes their costs with scikit-image and scipy.
 
     python check_routes.py PROGRAM DEM FOLDER    a small study over the DEM and synthetic terrains, in FOLDER
 
 * Isotropic cost on level ground: scikit-image's MCP_Geometric. A step costs its length times the mean of both cells there, as here; it
   cuts corners of blocked cells, so no cell is blocked.
-* Directional slope cost with limits: scipy's Dijkstra on the explicit digraph of steps. A route exists where its distance is finite.
-* Smoothed routes: cost, lengths and slopes, integrated again in quarter cells over bilinear heights.
+** Directional slope cost with limits: scipy's Dijkstra on the explicit digraph of steps. A route exists if its distance is finite.
+** Smoothed routes: cost, lengths and slopes, integrated independently in quarter cells over bilinear heights.
 """
 
 import json
@@ -102,7 +102,7 @@ def study(dem):
 
 
 class Ground:
-    """Heights of a raster as the planner has them: of single precision, NaN where there are none."""
+    """Heights of a raster as in the planner: single precision, NaN where there are none."""
 
     def __init__(self, path):
         with rasterio.open(path) as raster:
@@ -137,7 +137,7 @@ class Ground:
         z, run_m = self.heights, self.run_m(down, across)
         around = [self.shifted(z, *offset, math.nan) for offset in ((0, across), (down, 0), (down, across))]
         there = around[2]
-        # Bilinear heights along the step; along an axis the cells beside it are its ends.
+        # Bilinear heights along the step; for a step along an axis, the adjacent cells are its ends.
         along = [
             z * (1 - t) ** 2 + (around[0] + around[1]) * t * (1 - t) + there * t**2 if down and across else z + (there - z) * t
             for t in QUARTERS
@@ -189,7 +189,7 @@ class Ground:
 
 
 def close(ours, theirs, what):
-    expect(abs(ours - theirs) <= TOLERANCE * max(abs(theirs), 1.0), f"{what}: {ours}, computed again {theirs}")
+    expect(abs(ours - theirs) <= TOLERANCE * max(abs(theirs), 1.0), f"{what}: {ours}, recomputed {theirs}")
 
 
 def check_slopes(ground, routes, points, found):
@@ -221,7 +221,7 @@ def check_lines(ground, route, forms, what):
     limits = route["max_up_deg"], route["max_down_deg"]
     steepest = route["steepest_up_deg"], route["steepest_down_deg"]
     expect(all(s <= limit + 1e-6 for s, limit in zip(steepest, limits)), f"{what}: steeper than its limits")
-    expect(route["smoothed_cost_m"] <= route["path_cost_m"] * (1 + TOLERANCE), f"{what}: smoothing made it dearer")
+    expect(route["smoothed_cost_m"] <= route["path_cost_m"] * (1 + TOLERANCE), f"{what}: smoothing increased the cost")
 
 
 def check_factors(ground, factors, routes, found):

@@ -1,4 +1,4 @@
-"""Recordings of rovers in both flavours, message by message, against the tables: check_rover.py VIEWER_RELEASE ROS2_RELEASE.
+"""Recordings of rovers in both flavours compared with the tables, message by message: check_rover.py VIEWER_RELEASE ROS2_RELEASE.
 
 Both releases are of one study with `sample_m = 0`, so that `rover_samples` has a row for every cycle.
 """
@@ -38,7 +38,7 @@ ROS2 = {
 LASTING = {"/tf_static", "/terrain", "/terrain/points", "/path", "/markers"}
 AREAS = {"sojourner_like": 5, "schoppers_like": 4, "planner": 4}
 RAYS = {"sojourner_like": 20, "schoppers_like": 0, "planner": 0}
-# Steps of drawn points and of numbers beside poses.
+# Steps of drawn points, and of numbers other than poses.
 STEP = 1 / 1024
 # The plane of four wheels lies off the ground that it spans, by up to a rock lower than a hazard.
 BODY_OFF_GROUND_M = 0.2
@@ -71,7 +71,7 @@ def near(found, expected, step=STEP):
 
 
 def check_state(path, message, row, rover):
-    """A state message holds the row of its cycle."""
+    """A state message has the values of the row of its cycle."""
     exact = {"cycle": "cycle", "x_m": "x_m", "y_m": "y_m", "z_m": "z_m", "believed_x_m": "believed_x_m",
              "believed_y_m": "believed_y_m", "state": "state", "hazards": "hazards"}
     for field, column in exact.items():
@@ -84,7 +84,7 @@ def check_state(path, message, row, rover):
 
 
 def check_view(path, entity, row, navigator):
-    """Areas stand as triangles and rays as lines, red where there is a hazard."""
+    """Areas are drawn as triangles and rays as lines, red where there is a hazard."""
     of = lambda lists: {("red" if part.color.r > part.color.g else "green" if part.color.g > 1.3 * part.color.b else "grey"):
                         part.points for part in lists}
     areas, rays = of(entity.triangles), of(entity.lines)
@@ -138,7 +138,7 @@ def check_viewer(release, rover, rows):
     expected = [values(pose.pose.position) for _, pose in poses]
     expect(np.array_equal(driven, np.array(expected[::10] + ([expected[-1]] if (len(expected) - 1) % 10 else []))), f"{path}: path")
     worst, lost = off_mesh(mesh_triangles(path, messages["/terrain/mesh"][0][1]), [np.array(p) for p in expected[::25]])
-    expect(lost == 0 and worst <= BODY_OFF_GROUND_M, f"{path}: {lost} poses beside the mesh, {worst} m off it")
+    expect(lost == 0 and worst <= BODY_OFF_GROUND_M, f"{path}: {lost} poses off the mesh, {worst} m from it")
     shape = {entity.id: entity for entity in messages["/vehicle/shape"][0][1].entities}
     goal = shape["goal"].spheres[0].pose.position
     expect((goal.x, goal.y) == (rover["goal_x_m"], rover["goal_y_m"]), f"{path}: the goal is at {goal}")
@@ -196,7 +196,7 @@ def main():
             count = check(release, rover, own)
             print(f"{rover['path']}: {count} messages, {rover['outcome']}")
             outcomes.append(rover["outcome"])
-    expect("reached" in outcomes and len(set(outcomes)) > 1, f"outcomes {outcomes}: there must be one that arrives and one that does not")
+    expect("reached" in outcomes and len(set(outcomes)) > 1, f"outcomes {outcomes}: at least one must arrive and one must not")
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Studies against the JSON Schema of the program, by jsonschema and by Taplo, as editors use it.
+"""Studies validated against the program's JSON Schema, by jsonschema and by Taplo, as in editors.
 
 check_schema.py SCHEMA STUDY...
 """
@@ -15,7 +15,7 @@ from jsonschema import Draft202012Validator
 
 
 def broken(study):
-    """Copies of a study with one thing wrong in each, and where."""
+    """Copies of a study with one error each, and its place."""
     for section, tables in study.items():
         table = tables[0] if isinstance(tables, list) else tables
         wrong = {"unknown key": ("no_such_key", 1), "wrong type": ("id" if "id" in table else "seed", ["x"])}

@@ -1,7 +1,7 @@
 """check_server.py HOST:PORT: GDAL's own drivers read what the terrain server serves.
 
 /vsicurl reads a COG by ranges, the TMS mini-driver of WMS and the driver OGCAPI read map tiles, numpy reads .npy and raw samples, Pillow
-decodes PNG; all of them see the same ground. The links of OGC API - Tiles lead to what they say, and morecantile places tiles as the server does.
+decodes PNG; all of them read the same ground. The links of OGC API - Tiles lead to what they describe, and morecantile places tiles as the server does.
 """
 
 import ctypes
@@ -86,9 +86,9 @@ for r, c in [(0, 0), (199, 299), (77, 100), (150, 250)]:
 
 # --- map tiles by the driver OGCAPI ------------------------------------------------------------------------------------------------------
 def ogcapi(window):
-    """What GDAL reads of the first layer, given the address of the collection alone: its own way to the tiles.
+    """What GDAL reads of the first layer, given only the address of the collection: it finds the tiles by itself.
 
-    rasterio's GDAL lacks the driver. pyogrio's has it, but pyogrio opens no rasters: hence the C interface.
+    rasterio's GDAL lacks the driver. pyogrio's has it, but pyogrio does not open rasters: hence the C interface.
     """
     gdal = ctypes.CDLL(pyogrio._io.__file__)
     gdal.GDALOpenEx.restype = ctypes.c_void_p
@@ -114,7 +114,7 @@ met = {}
 
 
 def fetch(href, media):
-    """The body of what a link leads to, which is of the stated type; empty where a tile has no data."""
+    """The body behind a link, which has the stated type; empty if a tile has no data."""
     if (href, media) not in met:
         with urllib.request.urlopen(href) as answer:
             body = answer.read()
@@ -134,7 +134,7 @@ def resources(document):
 
 
 def target(resource, relation):
-    """The one link of that relation."""
+    """The only link with a relation."""
     (link,) = [link for link in resource["links"] if link["rel"] == relation]
     return link
 
@@ -144,7 +144,7 @@ def follow(link):
 
 
 def refusal_of(link, matrix, row, col):
-    """The sentence in which a tile is refused with 404; `None` where it comes, or is empty."""
+    """The sentence with which a tile is refused with 404; `None` if it is served, or empty."""
     try:
         fetch(link["href"].format(tileMatrix=matrix["id"], tileRow=row, tileCol=col), link["type"])
     except urllib.error.HTTPError as refusal:
@@ -153,11 +153,11 @@ def refusal_of(link, matrix, row, col):
 
 
 def fill(link, tile_set):
-    """Fetches the tiles in the middle of the coarsest and the finest level, and asks for those beyond the last row and column."""
+    """Fetches the tiles in the middle of the coarsest and the finest level, and requests those beyond the last row and column."""
     matrices = follow(target(tile_set, OGC + "tiling-scheme"))["tileMatrices"]
     for matrix in [matrices[0], matrices[-1]]:
         rows, cols = matrix["matrixHeight"], matrix["matrixWidth"]
-        # docs/server.md: one packing has a range that is narrower than the relief of a planet.
+        # docs/server.md: one encoding has a range that is narrower than the relief of a planet.
         refusal = refusal_of(link, matrix, rows // 2, cols // 2)
         assert refusal is None or (matrix is matrices[0] and "outside the range of `elevation`" in refusal), refusal
         for row, col in [(rows, 0), (0, cols)]:
@@ -165,7 +165,7 @@ def fill(link, tile_set):
 
 
 def walk(link):
-    """Follows all links behind one."""
+    """Follows all links reachable from one."""
     body = fetch(link["href"], link["type"])
     for resource in resources(json.loads(body)):
         for further in resource["links"]:

@@ -1,8 +1,8 @@
 """Reads every Parquet table with pyarrow and duckdb.
 
-    python check_tables.py RELEASE    rows, columns, units, keys and content hashes against the manifest; the lists of table
-                                      `samples` against the recordings and the vehicle's weight
-    python check_tables.py FILE...    figures of single files
+    python check_tables.py RELEASE    rows, columns, units, keys and content hashes agree with the manifest; the lists of table
+                                      `samples` agree with the recordings and the vehicle's weight
+    python check_tables.py FILE...    statistics of single files
 """
 
 import math
@@ -25,7 +25,7 @@ TYPES = {
     "list<element: float>": "f32_list",
     "list<element: double>": "f64_list",
 }
-# Columns of table `samples` beside the fields of /wheels and /command.
+# Columns of table `samples`, and the fields of /wheels and /command that correspond to them.
 SAME = {
     "chassis_force_n", "wheel_normal_force_n", "wheel_longitudinal_force_n", "wheel_lateral_force_n", "wheel_slip_ratio",
     "wheel_spin_rad_s", "wheel_torque_n_m", "cross_track_m", "distance_to_goal_m",
@@ -34,10 +34,10 @@ CONTACTS = ["wheel_contact_x_m", "wheel_contact_y_m", "wheel_contact_z_m"]
 ANGLES = {"wheel_steering_deg": "steering_rad", "heading_error_deg": "heading_error_rad"}
 # Half a step of 1/32 deg in the table and of 1/1024 rad in the recording.
 ANGLE_TOLERANCE_DEG = 0.5 / 32 + math.degrees(0.5 / 1024) + 1e-6
-# Every so many samples, a row is compared with the recording.
+# At every n-th sample, a row is compared with the recording.
 ROW_STEP = 20
 HUSKY_WEIGHT_N = 56.58 * 9.80665
-# A vehicle that stands this upright carries its weight on the normal forces of its wheels.
+# A vehicle that stands this upright is carried by the normal forces of its wheels.
 UPRIGHT_DEG = 2.0
 
 
@@ -82,7 +82,7 @@ def flat(column):
 
 
 def check_sums(path, table):
-    """duckdb and pyarrow must see the same numbers of rows and values, and the same extremes."""
+    """duckdb and pyarrow must find the same numbers of rows and values, and the same extremes."""
     connection = duckdb.connect()
     source = f"read_parquet('{path}')"
     count = connection.execute(f"select count(*) from {source}").fetchone()[0]
@@ -128,9 +128,9 @@ def check_release(release):
             continue
         found = report[path] = figures(release / path)
         expect(path.split("/")[1] == found["table"], f"{path} holds table {found['table']}")
-        expect(found["rows"] == artifact["records"], f"{path} has {found['rows']} rows, the manifest says {artifact['records']}")
+        expect(found["rows"] == artifact["records"], f"{path} has {found['rows']} rows, {artifact['records']} in the manifest")
         expect(found["rows_sha256"] == artifact["content_sha256"], f"{path}: rows do not have the manifest's content hash")
-    expect(report, f"{release} holds no table")
+    expect(report, f"{release} has no tables")
     for table in {figures["table"] for figures in report.values()}:
         check_parts(release, table, report)
     check_samples(release)
@@ -146,7 +146,7 @@ def check_parts(release, table, report):
 
 
 def check_samples(release):
-    """Rows of the first mission of every terrain against its recording, and of all missions at rest against the weight."""
+    """Compares rows of the first mission of every terrain with its recording, and of all missions at rest with the weight."""
     files = sorted((release / "tables" / "missions").glob("*.parquet"))
     missions = {(m["terrain_id"], m["mission_id"]): m for file in files for m in pq.read_table(file).to_pylist()}
     compared = set()
@@ -176,7 +176,7 @@ def check_weight(file, mission, row):
 
 
 def check_recording(path, rows):
-    """Every so many rows equal the messages of their instant."""
+    """Every n-th row equals the messages at its time."""
     with open(path, "rb") as file:
         reader = make_reader(file, decoder_factories=[DecoderFactory()])
         topics = {"/wheels": [], "/command": []}

@@ -1,6 +1,6 @@
-"""A team's recordings in both flavours and its route, against the recording itself: check_team.py FOLDER.
+"""A team's recordings in both flavours and its route, compared with the original recording: check_team.py FOLDER.
 
-FOLDER holds viewer/run.mcap, ros2/{run.mcap,metadata.yaml}, their content hashes, routes.geojson and recording.json.
+FOLDER contains viewer/run.mcap, ros2/{run.mcap,metadata.yaml}, their content hashes, routes.geojson and recording.json.
 """
 
 import importlib
@@ -36,7 +36,7 @@ ROS2 = {
     "/events": "rcl_interfaces/msg/Log",
 }
 LASTING = {"/tf_static", "/terrain", "/terrain/points", "/team/route", "/team/markers"}
-# Steps of drawn points, and of heights of the mesh beside them.
+# Steps of drawn points, and of heights of the mesh.
 DRAWN_STEP_M = 1 / 1024
 GROUND_TOLERANCE_M = 0.01
 # Lines and vertices are drawn half a radius above the ground.
@@ -117,7 +117,7 @@ def check_viewer(path, messages, recording):
     routes = [(time - epoch, [values(pose.position) for pose in message.poses]) for time, message in messages["/team/route"]]
     check_planned(path, routes, recording)
     worst, lost = off_mesh(triangles, contacts + [np.array(point) for _, route in routes for point in route])
-    expect(lost == 0 and worst <= GROUND_TOLERANCE_M, f"{path}: {lost} points beside the mesh, {worst} m off it")
+    expect(lost == 0 and worst <= GROUND_TOLERANCE_M, f"{path}: {lost} points off the mesh, {worst} m from it")
     graph = {entity.id: entity for entity in messages["/team/graph"][0][1].entities}
     dashes = graph["vertices"].lines[0]
     ends = lifted(dashes.points, dashes.pose.position)
@@ -140,7 +140,7 @@ def check_viewer(path, messages, recording):
 
 
 def check_planned(path, found, recording):
-    """Every route comes at its time and passes its waypoints."""
+    """Every route is published at its time and passes its waypoints."""
     times = [round(route["time_s"] * 1e9) for route in recording["routes"]]
     expect([time for time, _ in found] == times, f"{path}: routes at {[time for time, _ in found]}, not at {times}")
     for (_, points), route in zip(found, recording["routes"]):
@@ -192,7 +192,7 @@ def check_bag(path, messages, recording):
 
 
 def check_routes(path, recording):
-    """The collection's system is one that PROJ knows, its geometry one that GDAL takes, its numbers the recorded ones."""
+    """PROJ knows the collection's reference system, GDAL accepts its geometry, and its numbers are the recorded ones."""
     collection = json.loads(path.read_text())
     epsg = pyproj.CRS.from_user_input(collection["crs"]["properties"]["name"]).to_epsg()
     expect(epsg == 32633, f"{path}: the system is EPSG:{epsg}")

@@ -1,9 +1,9 @@
-"""Our MJCF and URDF of vehicles in MuJoCo: what they weigh, where their wheels are, and how they stand and roll.
+"""Our MJCF and URDF of vehicles in MuJoCo: mass, positions of wheels, and how they stand and roll.
 
     check_vehicles.py FOLDER NAME...
 
-For each name FOLDER holds NAME.xml, NAME.urdf, NAME.json (the vehicle's numbers, as `kinds --json` prints them) and NAME/, a release
-in which our own model drives it over level ground. What is expected is computed from the numbers, not from the exports.
+For each name, FOLDER contains NAME.xml, NAME.urdf, NAME.json (the vehicle's parameters, as printed by `kinds --json`) and NAME/, a
+release in which our own model drives it over level ground. Expected values are computed from the parameters, not from the exports.
 """
 
 import json
@@ -19,14 +19,14 @@ from common import Mismatch, expect
 GRAVITY = 9.80665
 SIDES = ("left", "right")
 AXLES = {2: ("front", "rear"), 3: ("front", "middle", "rear")}
-# MuJoCo's contacts of a standing vehicle give way by 0.2 to 0.6 mm.
+# MuJoCo's contacts yield by 0.2 to 0.6 mm under a standing vehicle.
 HEIGHT_TOLERANCE_M = 1e-3
 SETTLE_S = 6
 STEP_M = 0.1
 
 
 class Vehicle:
-    """What the numbers of a vehicle come to."""
+    """Quantities derived from the parameters of a vehicle."""
 
     def __init__(self, numbers):
         self.numbers = numbers
@@ -48,7 +48,7 @@ class Vehicle:
 
 
 def on_level_ground(spec, step_under=None):
-    """The model over a plane, and where asked with a block under a wheel."""
+    """The model over a plane, optionally with a block under a wheel."""
     spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_PLANE, size=[0, 0, 1])
     if step_under is not None:
         half = [0.2, 0.1, STEP_M / 2]
@@ -77,7 +77,7 @@ def check_parts(what, model, vehicle):
         expect(np.abs(found - hub).max() < 1e-9, f"{what}: {name} at {found}, not {hub}")
         geoms = [g for g in range(model.ngeom) if model.geom_bodyid[g] == body and model.geom_contype[g]]
         (geom,) = geoms
-        expect(model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER, f"{what}: {name} is no cylinder")
+        expect(model.geom_type[geom] == mujoco.mjtGeom.mjGEOM_CYLINDER, f"{what}: {name} is not a cylinder")
         radius, half_width, _ = model.geom_size[geom]
         expect(abs(radius - wheels["radius_m"]) < 1e-9 and abs(2 * half_width - wheels["width_m"]) < 1e-9, f"{what}: {name} {radius}")
         axis = data.geom_xmat[geom].reshape(3, 3)[:, 2]
@@ -113,7 +113,7 @@ def rest_height(release):
 
 
 def check_rest(what, model, vehicle, ours):
-    """At rest as high as our model, but for the sag of its tyres: wheels are rigid here."""
+    """At rest, as high as our model except for the sag of its tyres: wheels are rigid here."""
     data = mujoco.MjData(model)
     base = model.body("base_link").id
     data.qpos[2] = vehicle.numbers["wheels"]["radius_m"] - vehicle.numbers["wheels"]["axle_z_m"] + 0.005
@@ -140,7 +140,7 @@ def check_drive(what, model, data, vehicle, speed=0.4):
 
 
 def check_differential(what, path, vehicle):
-    """With a block under one front wheel the rockers turn by opposite angles, and the chassis by half of what it would."""
+    """With a block under one front wheel, the rockers turn by opposite angles, and the chassis by half of what it would otherwise."""
     hub = vehicle.hubs["front_left_wheel"]
     model = on_level_ground(mujoco.MjSpec.from_file(str(path)), hub)
     data = mujoco.MjData(model)
@@ -152,7 +152,7 @@ def check_differential(what, path, vehicle):
 
 
 def floating(path, vehicle):
-    """A URDF model as its comments ask: its root is not fixed to the world, and wheels do not collide with the chassis."""
+    """A URDF model as its comments require: its root is not fixed to the world, and wheels do not collide with the chassis."""
     spec = mujoco.MjSpec.from_file(str(path))
     spec.body("base_link").add_freejoint()
     for name in vehicle.hubs:
@@ -161,7 +161,7 @@ def floating(path, vehicle):
 
 
 def add_springs(model, vehicle):
-    """What the comments of the URDF state, from the numbers."""
+    """Statements in the comments of the URDF, from the parameters."""
     springs = vehicle.numbers["suspension"]
     if springs["kind"] != "independent":
         return

@@ -1,4 +1,4 @@
-"""What the interop checks share: reporting, the content hash, and the files of a release."""
+"""Shared by the interop checks: reporting, the content hash, and the files of a release."""
 
 import hashlib
 import json
@@ -11,7 +11,7 @@ import rasterio
 
 
 class Mismatch(Exception):
-    """An independent reader does not see what the release says."""
+    """An independent reader disagrees with the release."""
 
 
 def expect(condition, sentence):
@@ -67,7 +67,7 @@ def is_release(path):
 
 
 def run(check_release, check_files):
-    """Checks the release or the files named on the command line and prints the figures as JSON."""
+    """Checks the release or the files named on the command line and prints the results as JSON."""
     paths = [Path(argument) for argument in sys.argv[1:]]
     if not paths:
         sys.exit(f"usage: {sys.argv[0]} RELEASE | FILE...")

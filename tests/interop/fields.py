@@ -1,4 +1,4 @@
-"""Snow-like fields on slopes and their local planes, in numpy and scipy alone: nothing here is ours.
+"""Snow-like fields on slopes and their local planes, with numpy and scipy only, independent of the program.
 
 Heights are arrays (rows, cols) in m, row 0 in the north, NaN where there is no data; slopes are rise over run, azimuths
 clockwise from north.
@@ -17,8 +17,8 @@ TREES, TREE_HEIGHT_M, TREE_RADIUS_M = 6, 0.5, 0.6
 def exponential_fields(random):
     """Two independent Gaussian fields of covariance SIGMA_M^2 exp(-lag / RANGE_M), by circulant embedding.
 
-    The torus is twice as wide as the fields; its covariance is that of the shortest lag, and its modes are complex and
-    normal, so that real and imaginary part are independent.
+    The torus is twice as wide as the fields; its covariance uses the shortest lag, and its modes are complex and normal, so
+    that real and imaginary part are independent.
     """
     torus = 2 * SIDE_CELLS
     lag_m = CELL_M * np.minimum(np.arange(torus), torus - np.arange(torus))
@@ -37,7 +37,7 @@ def places_m():
 
 
 def along_m(azimuth_deg):
-    """How far every cell lies towards an azimuth, m."""
+    """Distance of every cell along an azimuth, m."""
     east, north = places_m()
     azimuth = np.radians(azimuth_deg)
     return east * np.sin(azimuth) + north * np.cos(azimuth)
@@ -74,8 +74,8 @@ def half_windows(window_m, cells_m):
 
 
 def local_planes(heights, half):
-    """Least-squares plane through the data of the window about each cell, at its centre, m; the number of those data; and
-    the variance of the plane there over that of their mean. NaN where there is no one plane.
+    """Least-squares plane through the data of the window around each cell, at its centre, m; the number of these data; and
+    the variance of the plane there over that of their mean. NaN where the plane is not unique.
 
     Windows reach `half` = [east, south] cells. By normal equations whose sums are separable correlations.
     """

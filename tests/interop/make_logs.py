@@ -1,7 +1,7 @@
-"""Logs by other writers, and the figures that numpy takes from the same motion: make_logs.py FOLDER.
+"""Logs by other writers, and the metrics that numpy computes from the same motion: make_logs.py FOLDER.
 
-A vehicle drives along a circle of 20 m at 1 m/s over a wave; 50 Hz poses with jittered stamps, an IMU at 200 Hz. Printed as
-JSON: for each log the figures expected of `analyze`.
+A vehicle drives along a circle of 20 m at 1 m/s over a wave; 50 Hz poses with jittered stamps, an IMU at 200 Hz. Prints as JSON,
+for each log, the metrics expected from `analyze`.
 """
 
 import json
@@ -129,7 +129,7 @@ def write_bag(folder, stamps, positions, quaternions):
 
 
 def write_split_bag(folder, messages, parts=11):
-    """A bag of several files, whose order is not that of their names' letters."""
+    """A bag of several files, whose order is not alphabetical."""
     folder.mkdir()
     names = [f"split_{k}.mcap" for k in range(parts)]
     size = -(-len(messages) // parts)
@@ -153,7 +153,7 @@ def write_foxglove(path, stamps, positions, quaternions):
 
 
 def write_foxglove_tf(path, stamps, positions, quaternions):
-    """map -> odom stands 3 m up; odom -> base_link moves."""
+    """map -> odom is static, 3 m up; odom -> base_link moves."""
     with open(path, "wb") as stream, ProtobufWriter(stream) as writer:
         for k, (ns, p, q) in enumerate(zip(stamps, positions, quaternions)):
             message = FrameTransforms()

@@ -1,12 +1,12 @@
-//! The page of the terrain server: that a browser shows what the server says, and that the bundle in the program is built from its
-//! sources. Takes node >= 18, the packages in `.cache/page` (`./test` installs them) and, for the browser, Chromium.
+//! The page of the terrain server: a browser shows the server's values, and the bundle in the program is built from its sources.
+//! Requires node >= 18, the packages in `.cache/page` (`./test` installs them) and, for the browser, Chromium.
 
 use super::{area, called, sastrugi_in, write};
 use sastrugi_tests::server::Server;
 use std::path::{Path, PathBuf};
 use std::process::Command;
 
-/// Where `smoke.mjs` looks for a browser after the variable `CHROMIUM`.
+/// Paths where `smoke.mjs` looks for a browser, after the variable `CHROMIUM`.
 const BROWSERS: [&str; 3] = ["/usr/bin/chromium", "/usr/bin/chromium-browser", "/usr/bin/google-chrome"];
 const NODE_MIN: u32 = 18;
 
@@ -53,12 +53,12 @@ radius_m = 5.0
 distance_limit_m = 60.0
 "#;
 
-/// The browser's readout, colours, profile, tracks and playback are those of the server, on a world and on a release.
+/// The browser's readout, colours, profile, tracks and playback agree with the server, on a world and on a release.
 #[test]
 fn val_the_page_agrees_with_the_server() {
     let Some(page) = page() else { return };
     if !has_browser() {
-        // No test installs a browser: without one it is as with `.ci/look`.
+        // No test installs a browser; without one, this test is skipped, as in `.ci/look`.
         return eprintln!("SKIPPED: Chromium is not installed, and CHROMIUM does not name it");
     }
     let folder = area();
@@ -73,7 +73,7 @@ fn val_the_page_agrees_with_the_server() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// The committed bundle, byte for byte.
+/// The committed bundle is that of the sources, byte for byte.
 #[test]
 fn gold_the_bundle_is_that_of_the_sources() {
     let Some(page) = page() else { return };
@@ -81,12 +81,12 @@ fn gold_the_bundle_is_that_of_the_sources() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// A copy of the page's folder that finds the installed packages; `None` (after a message) where they or node are missing.
+/// A copy of the page's folder with access to the installed packages; `None` (after a message) if they or node are missing.
 fn page() -> Option<tempfile::TempDir> {
     let root = sastrugi_fixtures::workspace_root();
     let packages = root.join(".cache/page/node_modules");
     if !packages.join("puppeteer-core").exists() {
-        skipped("the packages of the server's page are not installed; ./test does it");
+        skipped("the packages of the server's page are not installed; ./test installs them");
         return None;
     }
     if node_version().is_none_or(|version| version < NODE_MIN) {
@@ -111,7 +111,7 @@ fn copy(from: &Path, to: &Path) {
     }
 }
 
-/// The first number of `v20.1.0`; `None` where there is no node.
+/// The major version, such as 20 of `v20.1.0`; `None` without node.
 fn node_version() -> Option<u32> {
     let output = Command::new("node").arg("--version").output().ok()?;
     let text = String::from_utf8(output.stdout).ok()?;
@@ -123,7 +123,7 @@ fn has_browser() -> bool {
     named.into_iter().chain(BROWSERS.map(PathBuf::from)).any(|path| path.exists())
 }
 
-/// Says so; in CI a check that does not run must not pass.
+/// Prints a message; in CI, a check that does not run must not pass.
 fn skipped(why: &str) {
     assert!(std::env::var_os("CI").is_none(), "{why}");
     eprintln!("SKIPPED: {why}");

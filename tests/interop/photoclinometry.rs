@@ -1,4 +1,4 @@
-//! Heights from slopes against scipy's sparse solver; recovered surfaces against their images, shaded by numpy.
+//! Heights from slopes compared with scipy's sparse solver; recovered surfaces, shaded by numpy, compared with their images.
 
 use crate::{check, python};
 use sastrugi_imaging::direction;
@@ -7,10 +7,10 @@ use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_tests::{area, sastrugi_in, write};
 use serde_json::json;
 
-/// Slopes of a saddle with noise, information over two decades with covariances, holes, cells that are not square; free, and held by three points.
-/// The script builds the equations from their definition and solves them directly; heights agree within 1e-6 m.
+/// Slopes of a saddle with noise, weights over two decades with covariances, holes and non-square cells; unconstrained, and constrained by three
+/// points. The script builds the equations from their definition and solves them directly; heights agree within 1e-6 m.
 #[test]
-fn val_heights_from_slopes_are_those_of_a_sparse_solver() {
+fn val_heights_from_slopes_agree_with_a_sparse_solver() {
     let Some(python) = python() else { return };
     let folder = area();
     let g = Geometry { rows: 37, cols: 46, cell: [2.0, 1.5], origin: [100.0, -20.0] };
@@ -58,7 +58,7 @@ fn val_heights_from_slopes_are_those_of_a_sparse_solver() {
 }
 
 /// Smooth hills in cells of 0.25 m, rendered from above in pixels of 1 m under four suns, recovered from three. numpy shades the recovered heights by the
-/// published law and finite differences: with the recovered albedo they give all four images back, the fourth of which the inversion has not seen.
+/// published law and finite differences: with the recovered albedo they reproduce all four images, including the fourth, which the inversion has not seen.
 #[test]
 fn val_a_recovered_surface_reproduces_its_images() {
     let Some(python) = python() else { return };

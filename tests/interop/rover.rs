@@ -1,4 +1,4 @@
-//! A study of rovers that arrive and that do not, recorded in both flavours, and the script that reads it.
+//! A study of rovers, some of which arrive, recorded in both flavours, and the script that reads it.
 
 use super::{check, python};
 use sastrugi_tests::{area, sastrugi_in, write};
@@ -53,7 +53,7 @@ radius_m = 6.0
 sample_m = 0.0
 "#;
 
-/// Recordings of rovers as mcap-protobuf-support and rosbags read them: every cycle, pose, plan and event, beside the rows of the tables.
+/// Recordings of rovers, read by mcap-protobuf-support and rosbags: every cycle, pose, plan and event agrees with the rows of the tables.
 #[test]
 fn val_readers_agree_with_rovers() {
     let Some(python) = python() else { return };

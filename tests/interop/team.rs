@@ -1,4 +1,4 @@
-//! A small team's run, written in both flavours with its route, and the script that reads it.
+//! The run of a small team with its route, written in both flavours, and the script that reads it.
 
 use super::{check, python};
 use sastrugi_numeric::{Geometry, Grid, Surface};
@@ -16,7 +16,7 @@ use std::path::Path;
 const CORNER: [f64; 2] = [400_000.0, 5_000_000.0];
 const SAMPLES: usize = 201;
 
-/// A saddle of 60 m, in cells of 0.5 m.
+/// A saddle of 60 m with cells of 0.5 m.
 fn saddle() -> Grid {
     let geometry = Geometry { rows: 120, cols: 120, cell: [0.5; 2], origin: CORNER };
     let height = |row: usize, col: usize| 1e-3 * (col as f64 - 50.0) * (row as f64 - 70.0);
@@ -75,8 +75,8 @@ fn run(dem: &Grid) -> TeamRecording {
     }
 }
 
-/// Recordings of a team as mcap-protobuf-support, rosbags, mcap-ros2-support and Rerun read them, and routes as GDAL and PROJ do: the
-/// recorded numbers, of a route that was planned before and of routes that are planned on the way.
+/// Recordings of a team, read by mcap-protobuf-support, rosbags, mcap-ros2-support and Rerun, and routes, read by GDAL and PROJ: the
+/// recorded numbers, for a route that was planned in advance and for routes that are planned on the way.
 #[test]
 fn val_readers_agree_with_a_team() {
     let Some(python) = python() else { return };
@@ -91,7 +91,7 @@ fn val_readers_agree_with_a_team() {
     }
 }
 
-/// What check_team.py reads.
+/// Writes the files that check_team.py reads.
 fn write_files(folder: &Path, dem: &Grid, recording: &TeamRecording) {
     let terrain = TerrainView::new(dem, None).unwrap();
     let record = BTreeMap::from([("run_id".to_owned(), "team-0001".to_owned())]);

@@ -2,7 +2,7 @@
 
     compare.py RELEASE PEER.json
 
-Prints a table and, as its last line, the figures that the test holds against its bounds as JSON.
+Prints a table and, as its last line, the numbers that the test compares with its bounds, as JSON.
 """
 
 import json
@@ -23,13 +23,13 @@ FIGURES = {
 
 
 def mcnemar_exact(only_ours, only_theirs):
-    """Two-sided p of as uneven a split of the missions on which only one succeeds."""
+    """Two-sided p of a split at least as uneven, among the missions on which only one engine succeeds."""
     n, k = only_ours + only_theirs, min(only_ours, only_theirs)
     return min(1.0, 2 * sum(math.comb(n, i) for i in range(k + 1)) / 2**n)
 
 
 def agreement(ours, theirs):
-    """Share of same outcomes (success or not), Cohen's kappa, McNemar's exact p."""
+    """Share of equal outcomes (success or not), Cohen's kappa, McNemar's exact p."""
     same = float(np.mean(ours == theirs))
     chance = ours.mean() * theirs.mean() + (1 - ours.mean()) * (1 - theirs.mean())
     kappa = (same - chance) / (1 - chance) if chance < 1 else float("nan")
@@ -38,7 +38,7 @@ def agreement(ours, theirs):
 
 
 def check_figures(release, rows):
-    """Largest relative difference of the release's own figures from those of its samples by the peer's formulas."""
+    """Largest relative difference of the release's metrics from those of its samples by the peer's formulas."""
     worst = 0.0
     for terrain in sorted({row["terrain_id"] for row in rows}):
         poses = release_files.samples(release, terrain)

@@ -1,4 +1,4 @@
-"""Drives the missions of a release in MuJoCo and prints what became of them as JSON.
+"""Drives the missions of a release in MuJoCo and prints their outcomes as JSON.
 
     drive.py RELEASE VEHICLE.toml [--processes N] [--terrain ID] [--mission ID --poses FILE.csv]
 
@@ -33,7 +33,7 @@ class Course:
         self.simulation = engine.Simulation(engine.spec(vehicle, rules, terrain).compile())
 
     def largest_height_error(self):
-        """MuJoCo's ground, by rays cast down, less the DEM: at cell centres, and between them, m."""
+        """MuJoCo's ground, by rays cast down, minus the DEM: at cell centres, and between them, m."""
         rows, cols = self.terrain.heights.shape
         mujoco.mj_kinematics(self.simulation.model, self.simulation.data)
         generator = np.random.default_rng(1)
@@ -51,7 +51,7 @@ class Course:
         return top - mujoco.mj_rayHfield(model, data, model.geom("terrain").id, np.array([x, y, top]), down, None)
 
     def put_down(self, mission):
-        """The vehicle at rest on the start: fitted to the ground under its hubs, dropped with locked wheels."""
+        """The vehicle at rest at the start: fitted to the ground under its hubs, dropped with locked wheels."""
         wheels = self.vehicle["wheels"]
         heading = math.radians(mission["heading_deg"])
         cos, sin = math.cos(heading), math.sin(heading)
@@ -122,7 +122,7 @@ def course_of(release, terrain_id, vehicle_file):
 
 
 def drive_terrain(release, terrain_id, vehicle_file):
-    """Every mission of a terrain, and how the work went."""
+    """Every mission of a terrain, and statistics of the computation."""
     course, missions = course_of(release, terrain_id, vehicle_file)
     at_centres, between = course.largest_height_error()
     driven, simulated, start = [], 0.0, time.process_time()

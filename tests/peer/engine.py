@@ -2,9 +2,9 @@
 
 *Tyre.* A sphere meets every prism of the height field under it at once, so a spring and a damper for each contact would grow
 with their number. Tyres are therefore springs and dampers between hub and chassis, along the body's z axis, with the stiffness
-and damping of ours. The sphere itself is as hard as the time step allows, its contact critically damped. As in our model the
-wheels' mass is carried by the tyres, but for a part that keeps the wheel steady at this time step. What differs: the tyre
-gives way along z only, and has no tread that bends.
+and damping of ours. The sphere itself is as hard as the time step allows, its contact critically damped. As in our model, the
+wheels' mass is carried by the tyres, except for a part that keeps the wheel stable at this time step. Differences: the tyre
+yields only along z, and has no flexible tread.
 
 *Chassis.* A contact with impedance `d` seeks the acceleration `(1 - d) a0 - d (b v + k depth)`, with `a0` that without contact,
 however many share it. `k` and `b` are those of ten of our points, which carry the vehicle, over its mass; their damping (Hunt and
@@ -16,16 +16,16 @@ import numpy as np
 
 GRAVITY = 9.80665
 IMPEDANCE = 0.95
-# Time constant of the contact of wheels, s: MuJoCo asks for two steps of 1/500 s or more.
+# Time constant of the contact of wheels, s: MuJoCo requires two steps of 1/500 s or more.
 WHEEL_CONTACT_S = 0.005
 # Rate at which sliding dies out in a contact that sticks, 1/s: at 250 a wheel at rest on a slope of 30 deg chatters.
 STICKING_RATE = 100.0
 # Normal over tangential compliance: the locked vehicle creeps down 30 deg by 1.5 mm/s, 5 cm in the 30 s of a stuck one.
 IMPRATIO = 10.0
-# Part of a wheel's mass below its tyre; with less, spring and step no longer go together.
+# Part of a wheel's mass below its tyre; with less, the spring is unstable at this time step.
 UNSPRUNG = 0.3
 CHASSIS_POINTS = 10
-# Prisms reach this far below the lowest post, so that no contact leaves through their bottom, m.
+# Prisms extend this far below the lowest post, so that no contact leaves through their bottom, m.
 BASE_M = 2.0
 BRAKE_GAIN = 1e4
 SIDES = ("left", "right")
@@ -143,7 +143,7 @@ class Simulation:
         self.motors = [model.actuator(side).id for side in SIDES]
 
     def place(self, position, quaternion):
-        """At rest there, raised until nothing touches."""
+        """At rest at a place, raised until nothing touches."""
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[:7] = [*position, *quaternion]
         while True:

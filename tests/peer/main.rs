@@ -1,9 +1,9 @@
-//! An independent engine, MuJoCo, drives the missions of a release on its terrains; outcomes and figures are compared. GRASS GIS plans
-//! walks where our routes lead.
+//! An independent engine, MuJoCo, drives the missions of a release on its terrains; outcomes and metrics are compared. GRASS GIS plans
+//! walks between the ends of our routes.
 //!
-//! The engine lives in `.cache/peer`, which `./test --full` sets up. Without it the test is skipped with a message; with CI
-//! set that is a failure. Damping and controller are shared with our model, so this is a cross-check of the mechanics and
-//! their numerics, no independent truth; nothing of our model is tuned to it.
+//! The engine is installed in `.cache/peer` by `./test --full`. Without it, the test is skipped with a message; with CI set, that
+//! is a failure. Damping and controller are shared with our model, so this is a cross-check of the mechanics and their numerics,
+//! not an independent truth; nothing in our model is tuned to it.
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
@@ -20,7 +20,7 @@ const GROUPS: [&str; 3] = ["2.30", "2.45", "2.60"];
 const TERRAINS_PER_GROUP: usize = 4;
 const MISSIONS_PER_TERRAIN: usize = 20;
 
-/// Four terrains for each fractal dimension, 20 missions each, from a seed that nothing else uses.
+/// Four terrains for each fractal dimension with 20 missions each, from a seed that is used only here.
 fn study() -> String {
     let mut text = "[study]\nname = \"peer\"\nseed = 20261122\ndate = \"2026-11-21\"\n".to_owned();
     for group in GROUPS {
@@ -41,7 +41,7 @@ fn study() -> String {
     text
 }
 
-/// The peer's Python; `None` (after a message) where there is none.
+/// The peer's Python; `None` (after a message) if it is missing.
 fn python() -> Option<PathBuf> {
     sastrugi_tests::python("peer", "./test --full")
 }
@@ -55,9 +55,9 @@ fn script(python: &Path, name: &str, arguments: &[&Path]) -> Called {
     call
 }
 
-/// Same outcome (success or not) on 80 % of 240 missions, medians of pitch and roll rate of the missions on
-/// which both succeed within 10 %. The bounds are agreed ones, and no statistical test: one seed, bit for
-/// bit the same on our side every time.
+/// The same outcome (success or not) on 80 % of 240 missions, and medians of pitch and roll rate within 10 %, over
+/// the missions on which both succeed. The bounds are agreed ones, not a statistical test: the seed is fixed, and our
+/// side is the same every time, bit for bit.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn val_an_independent_engine_drives_the_same_missions() {
@@ -83,15 +83,15 @@ fn val_an_independent_engine_drives_the_same_missions() {
     }
 }
 
-/// r.walk of GRASS GIS on the measured catchment, 12 pairs: with the coefficients of our linear cost, and slopes so small that lengths in plan and
-/// on the ground agree, the same least costs. On true slopes ours cost more, by the length on the ground; and no route of ours beats r.walk
-/// by its own default coefficients. GRASS is a Debian package (`grass-core`), which nothing here installs.
+/// r.walk of GRASS GIS on the measured catchment, 12 pairs: with the coefficients of our linear cost, and slopes so small that plan length equals
+/// ground length, the least costs are the same. On the true slopes ours cost more, because of the ground length; and none of our routes is cheaper
+/// than r.walk's under its default coefficients. GRASS is a Debian package (`grass-core`), which nothing here installs.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn val_r_walk_finds_the_same_least_costs() {
     let Some(python) = sastrugi_tests::python("readers", "./test") else { return };
     if Command::new("grass").arg("--version").output().is_err() {
-        eprintln!("SKIPPED: GRASS GIS is not installed; apt-get install grass-core does it");
+        eprintln!("SKIPPED: GRASS GIS is not installed; apt-get install grass-core installs it");
         return;
     }
     let folder = area();
@@ -105,7 +105,7 @@ fn val_r_walk_finds_the_same_least_costs() {
     assert!(ratio("/langmuir_on_our_route/least") > 1.0 - 1e-9, "{told}");
 }
 
-/// The data that our vehicle is made of.
+/// The data file of our vehicle.
 fn vehicle_file() -> PathBuf {
     sastrugi_fixtures::workspace_root().join("pipeline/mobility/src/vehicle/models/husky_a200.toml")
 }

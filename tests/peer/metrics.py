@@ -1,4 +1,4 @@
-"""Figures of a traverse from poses at a fixed rate, written anew from their definition in docs/traversal.md."""
+"""Metrics of a traverse from poses at a fixed rate, implemented independently from their definition in docs/traversal.md."""
 
 import numpy as np
 

@@ -1,4 +1,4 @@
-"""What the peer reads of a release: terrains, missions, parameters, and the poses that our model recorded."""
+"""Reads the peer's input from a release: terrains, missions, parameters, and the poses that our model recorded."""
 
 import json
 import tomllib
@@ -15,7 +15,7 @@ def missions(release):
 
 
 def parameters(release, row):
-    """The full checked parameters of a mission's traverse, as its recording states them."""
+    """The complete checked parameters of a mission's traverse, as stated in its recording."""
     with open(release / row["path"], "rb") as file:
         records = {record.name: record.metadata for record in make_reader(file).iter_metadata()}
     return json.loads(records["vehicle"]["parameters"])

@@ -1,16 +1,16 @@
-//! Schemathesis generates requests from the description of the terrain server's API and judges the answers by it.
+//! Schemathesis generates requests from the description of the terrain server's API and validates the answers against it.
 
 use sastrugi_tests::server::{Server, WORLD};
 use sastrugi_tests::{area, called, write};
 use std::process::Command;
 
-/// Generated requests of each operation and phase.
+/// Generated requests for each operation and phase.
 const EXAMPLES: &str = "200";
-/// Requests that are right, and answered with 200, at least: refusals alone would say little about the answers.
+/// Least number of valid requests that are answered with 200: refusals alone would test little of the answers.
 const RIGHT_MIN: u64 = 500;
 
-/// No answer is other than described, and none is a fault of the server: several thousand requests, the same every time. One check is left out:
-/// that whatever the description allows is accepted. It cannot say that `origin` and `center` exclude each other, nor where ground ends.
+/// Every answer is as described, and none is a server error: several thousand requests, the same every time. One check is left out: that everything
+/// the description allows is accepted. The description cannot state that `origin` and `center` exclude each other, nor where ground ends.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn val_answers_are_as_described() {
@@ -30,5 +30,5 @@ fn val_answers_are_as_described() {
     assert!(!metrics.contains("status=\"500\""), "{metrics}");
     let right = metrics.lines().filter(|line| line.contains("requests_total") && line.contains("status=\"200\""));
     let right: u64 = right.filter_map(|line| line.rsplit(' ').next()?.parse::<u64>().ok()).sum();
-    assert!(right > RIGHT_MIN, "of all requests only {right} were answered with 200: {metrics}");
+    assert!(right > RIGHT_MIN, "only {right} requests were answered with 200: {metrics}");
 }

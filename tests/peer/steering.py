@@ -1,4 +1,4 @@
-"""Pure pursuit and wheel speeds, written anew from docs/traversal.md; parameters from the release."""
+"""Pure pursuit and wheel speeds, implemented independently from docs/traversal.md; parameters come from the release."""
 
 import math
 
@@ -24,7 +24,7 @@ class PurePursuit:
         return math.hypot(self.goal[0] - x, self.goal[1] - y)
 
     def update(self, x, y, yaw, period_s):
-        """Sets speed and yaw rate for the coming period."""
+        """Sets speed and yaw rate for the next period."""
         steering, (cos, sin) = self.rules["controller"], self.direction
         along = (x - self.start[0]) * cos + (y - self.start[1]) * sin
         ahead = min(along + steering["lookahead_m"], self.length)

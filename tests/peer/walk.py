@@ -1,14 +1,14 @@
-"""Least costs of the program against r.walk of GRASS GIS, on the largest part of a DEM without holes.
+"""Least costs of the program compared with r.walk of GRASS GIS, on the largest part of a DEM without holes.
 
     python walk.py PROGRAM DEM FOLDER
 
 r.walk charges a step of plan length d that rises by h with `a d + b h` uphill, `a d + c h` downhill, and `a d + d h` downhill where the slope
-is below its slope factor (Langmuir, 1984). With `a = 1`, `b = up_weight` and `c = d = -down_weight` that is our cost but for the length, which
-we measure on the ground. r.walk has no limits of slope.
+is below its slope factor (Langmuir, 1984). With `a = 1`, `b = up_weight` and `c = d = -down_weight`, that is our cost except for the length,
+which we measure on the ground. r.walk has no slope limits.
 
-* flat: heights a thousandth, weights thousandfold. Lengths in plan and on the ground agree, and so must the costs.
-* true: heights and weights as they are.
-* langmuir: the default coefficients of r.walk, what its walk along our route takes, and what Knight's move gains.
+** flat: heights divided and weights multiplied by a thousand. Lengths in plan and on the ground agree, and so must the costs.
+* true: unchanged heights and weights.
+* langmuir: the default coefficients of r.walk, the cost of its walk along our route, and the gain of Knight's move.
 """
 
 import json
@@ -34,7 +34,7 @@ SEED = 20261123
 
 
 def crop(dem, folder):
-    """The part without holes, as it is and flatter."""
+    """The part without holes, unchanged and flattened."""
     row, col, rows, cols = WINDOW
     with rasterio.open(dem) as raster:
         window = Window(col, row, cols, rows)
@@ -82,7 +82,7 @@ def walks(folder, pairs):
 
 
 def route(program, folder, name, ends, weights):
-    """Figures and line of our route."""
+    """Costs and line of our route."""
     (x0, y0), (x1, y1) = ends
     sets = {"neighbours": 8, "max_up_deg": 89.0, "max_down_deg": 89.0, "up_weight": weights[0], "down_weight": weights[1]}
     output = folder / "release"
@@ -95,7 +95,7 @@ def route(program, folder, name, ends, weights):
 
 
 def langmuir_s(line, raster, heights):
-    """What a walk along steps takes by the default coefficients."""
+    """Cost of a walk along steps with the default coefficients."""
     a, b, c, d = LANGMUIR
     places = [rowcol(raster.transform, *xy) for xy in line]
     total = 0.0

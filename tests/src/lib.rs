@@ -1,4 +1,4 @@
-//! What the tests of the whole program share: the built binary, work areas of their own, small studies.
+//! Shared by the tests of the complete program: the built binary, temporary folders, small studies.
 
 #![allow(clippy::expect_used, reason = "a test may end where it stands")]
 
@@ -12,19 +12,19 @@ use std::path::{Path, PathBuf};
 use std::process::{Command, Output, Stdio};
 use std::time::Duration;
 
-/// The program built beside this test.
+/// The program built with this test.
 ///
 /// # Panics
-/// When it is not there: `./test` builds it first.
+/// When it is missing: `./test` builds it first.
 pub fn program() -> PathBuf {
     let test = std::env::current_exe().expect("the test has a path");
-    let folder = test.parent().and_then(Path::parent).expect("tests lie in target/<profile>/deps");
+    let folder = test.parent().and_then(Path::parent).expect("tests are in target/<profile>/deps");
     let program = folder.join("sastrugi");
     assert!(program.is_file(), "{} is missing: build the workspace first (./test does)", program.display());
     program
 }
 
-/// A call of the program with its result.
+/// Result of a call of the program.
 pub struct Called {
     /// Exit code.
     pub code: i32,
@@ -42,7 +42,7 @@ pub fn sastrugi_in(folder: &Path, arguments: &[&str]) -> Called {
     called(Command::new(program()).args(arguments).current_dir(folder))
 }
 
-/// Runs a prepared command to its end.
+/// Runs a prepared command until it exits.
 ///
 /// # Panics
 /// When it cannot be started.
@@ -55,10 +55,10 @@ pub fn called(command: &mut Command) -> Called {
     }
 }
 
-/// A folder of its own, gone with the value.
+/// A temporary folder, removed when dropped.
 ///
 /// # Panics
-/// When none can be made.
+/// When it cannot be created.
 pub fn area() -> tempfile::TempDir {
     tempfile::tempdir().expect("a temporary folder")
 }
@@ -72,7 +72,7 @@ pub fn sums(release: &Path) -> BTreeMap<String, String> {
     text.lines().filter_map(|l| l.split_once("  ")).map(|(sum, path)| (path.to_owned(), sum.to_owned())).collect()
 }
 
-/// Writes a study and runs it to the folder's `release`; the checksums of that.
+/// Writes a study and runs it to the folder's `release`; returns the checksums of the release.
 ///
 /// # Panics
 /// When the run fails.
@@ -83,10 +83,10 @@ pub fn run_study(folder: &Path, study: &str, more: &[&str]) -> BTreeMap<String, 
     sums(&folder.join("release"))
 }
 
-/// Runs a study file in two shards beside it and merges them; the checksums of what comes out.
+/// Runs a study file in two shards next to it and merges them; returns the checksums of the merged release.
 ///
 /// # Panics
-/// When a shard fails or they do not merge.
+/// When a shard or the merge fails.
 pub fn run_in_shards(folder: &Path, study: &str) -> BTreeMap<String, String> {
     for (shard, name) in [("1/2", "part-1"), ("2/2", "part-2")] {
         let call = sastrugi_in(folder, &["run", study, "-o", name, "--shard", shard, "--quiet"]);
@@ -97,11 +97,11 @@ pub fn run_in_shards(folder: &Path, study: &str) -> BTreeMap<String, String> {
     sums(&folder.join("merged"))
 }
 
-/// Runs a study to the folder's `release`, killed with SIGKILL after each of the pauses and started again, and lets it finish; the checksums
-/// of what comes out. A release that is there after a kill must be the `whole` one.
+/// Runs a study to the folder's `release`, killed with SIGKILL after each of the pauses and restarted, and lets it finish; returns the
+/// checksums of the release. A release that exists after a kill must be the `whole` one.
 ///
 /// # Panics
-/// When half of a release is there, or the last run fails.
+/// When a partial release exists, or the last run fails.
 pub fn run_with_kills(
     folder: &Path,
     study: &str,
@@ -120,13 +120,13 @@ pub fn run_with_kills(
         std::thread::sleep(Duration::from_millis(*pause_ms));
         child.kill().and_then(|()| child.wait()).expect("the program ends");
         if folder.join("release").exists() {
-            assert_eq!(differing(whole, &sums(&folder.join("release"))), Vec::<String>::new(), "half of a release");
+            assert_eq!(differing(whole, &sums(&folder.join("release"))), Vec::<String>::new(), "a partial release");
         }
     }
     run_study(folder, study, &[])
 }
 
-/// Paths whose sums differ, or that only one side has.
+/// Paths whose checksums differ, or that only one side has.
 pub fn differing(a: &BTreeMap<String, String>, b: &BTreeMap<String, String>) -> Vec<String> {
     let paths: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
     paths.into_iter().filter(|p| a.get(*p) != b.get(*p)).cloned().collect()
@@ -194,7 +194,7 @@ missions = "short"
     )
 }
 
-/// The small study with routes: missions along them, and teams that plan on what they see.
+/// The small study with routes: missions along them, and teams that plan with limited sensing.
 pub fn routed_study() -> String {
     small_study()
         + r#"
@@ -236,7 +236,7 @@ drawn_losses = 1
 /// One row of a table: values by column; text, numbers, or null.
 pub type Row = BTreeMap<String, serde_json::Value>;
 
-/// The rows of a table of a release, in order; none where it has no file.
+/// The rows of a table of a release, in order; empty if it has no file.
 ///
 /// # Panics
 /// When a file of the table cannot be read.
@@ -277,16 +277,16 @@ pub fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
     path
 }
 
-/// Python of the environment `.cache/<environment>`, which `command` sets up; `None` (after a message) where there is none.
+/// Python of the environment `.cache/<environment>`, which `command` sets up; `None` (after a message) if it is missing.
 ///
 /// # Panics
-/// Where there is none and CI is set: a check that does not run must not pass there.
+/// When it is missing and CI is set: a check that does not run must not pass there.
 pub fn python(environment: &str, command: &str) -> Option<PathBuf> {
     let python = sastrugi_fixtures::workspace_root().join(".cache").join(environment).join("bin/python");
     if python.exists() {
         return Some(python);
     }
-    assert!(std::env::var_os("CI").is_none(), "{environment}: not installed; run {command} with a network");
-    eprintln!("SKIPPED: {environment} is not installed; {command} does it");
+    assert!(std::env::var_os("CI").is_none(), "{environment}: not installed; run {command} with network access");
+    eprintln!("SKIPPED: {environment} is not installed; {command} installs it");
     None
 }

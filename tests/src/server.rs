@@ -7,7 +7,7 @@ use std::path::Path;
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-/// A small world with most of what worlds have.
+/// A small world with most features of worlds.
 pub const WORLD: &str = r#"
 kind = "planetary"
 seed = 11
@@ -30,7 +30,7 @@ pub struct Server {
     pub address: String,
 }
 
-/// What a server answered.
+/// Answer of a server.
 #[derive(Clone, Debug)]
 pub struct Answer {
     /// Status.
@@ -50,7 +50,7 @@ impl Answer {
     /// The body as JSON.
     ///
     /// # Panics
-    /// When it is none.
+    /// When it is not JSON.
     pub fn json(&self) -> serde_json::Value {
         serde_json::from_slice(&self.body).expect("the body is JSON")
     }
@@ -62,31 +62,31 @@ impl Answer {
 }
 
 impl Server {
-    /// Starts the program in a folder with `serve` and these arguments, at a free port.
+    /// Starts the program in a folder with `serve` and these arguments, on a free port.
     ///
     /// # Panics
-    /// When it does not come up.
+    /// When it does not start.
     pub fn start(folder: &Path, arguments: &[&str], environment: &[(&str, &str)]) -> Self {
         let mut command = Command::new(program());
         command.args(["serve", "--listen", "127.0.0.1:0"]).args(arguments);
         Self::start_command(command.current_dir(folder).envs(environment.iter().copied()))
     }
 
-    /// Starts a server by a command that becomes it.
+    /// Starts a server with a command that turns into it (`exec`).
     ///
     /// # Panics
-    /// When it does not come up.
+    /// When it does not start.
     pub fn start_command(command: &mut Command) -> Self {
         let mut process = command.stdout(Stdio::piped()).spawn().expect("the program starts");
         let mut line = String::new();
         let out = process.stdout.take().expect("it prints");
         BufReader::new(out).read_line(&mut line).expect("it prints its address");
         let address = line.trim().trim_start_matches("http://").trim_end_matches('/').to_owned();
-        assert!(!address.is_empty(), "the server did not come up");
+        assert!(!address.is_empty(), "the server did not start");
         Self { process, address }
     }
 
-    /// `GET` with more headers, as `name: value`.
+    /// `GET` with additional headers, as `name: value`.
     ///
     /// # Panics
     /// When there is no answer.
@@ -119,47 +119,47 @@ impl Server {
         answer(&bytes)
     }
 
-    /// A connection that is kept.
+    /// A persistent connection.
     ///
     /// # Errors
-    /// There is no server any more, or it takes no connection.
+    /// The server is gone or accepts no connection.
     pub fn client(&self) -> io::Result<Client> {
         Client::connect(&self.address)
     }
 
-    /// A figure of its process in kB, as `VmHWM`, the most memory that it has held, or `VmRSS`, what it holds.
+    /// Memory of its process in kB: `VmHWM`, the peak, or `VmRSS`, the current resident memory.
     ///
     /// # Panics
-    /// Where the system does not tell.
+    /// When the system does not report it.
     pub fn memory_kb(&self, figure: &str) -> u64 {
         let status = std::fs::read_to_string(format!("/proc/{}/status", self.process.id())).expect("the server runs");
         let line = status.lines().find_map(|line| line.strip_prefix(figure)?.strip_prefix(':'));
-        line.and_then(|line| line.split_whitespace().next()?.parse().ok()).expect("the system knows the figure")
+        line.and_then(|line| line.split_whitespace().next()?.parse().ok()).expect("the system reports the value")
     }
 
-    /// Processor time of its process so far, s.
+    /// CPU time of its process so far, s.
     ///
     /// # Panics
-    /// Where the system does not tell.
+    /// When the system does not report it.
     pub fn processor_s(&self) -> f64 {
         let text = std::fs::read_to_string(format!("/proc/{}/stat", self.process.id())).expect("the server runs");
         let after = text.rsplit(')').next().unwrap_or_default();
         let ticks = after.split_whitespace().skip(11).take(2).filter_map(|word| word.parse::<f64>().ok());
-        // Linux counts hundredths here on every machine.
+        // Linux counts hundredths of a second here on every machine.
         ticks.sum::<f64>() / 100.0
     }
 
-    /// Kills it at once.
+    /// Kills it immediately.
     pub fn kill(&mut self) {
-        // It may be gone already.
+        // It may have exited already.
         drop(self.process.kill());
         drop(self.process.wait());
     }
 
-    /// Asks it to end; its exit code.
+    /// Terminates it with SIGTERM and returns its exit code.
     ///
     /// # Panics
-    /// When it does not end within 20 s.
+    /// When it does not exit within 20 s.
     pub fn terminate(&mut self) -> Option<i32> {
         let id = self.process.id().to_string();
         Command::new("kill").args(["-TERM", &id]).status().expect("kill is there");
@@ -168,7 +168,7 @@ impl Server {
             if let Some(status) = self.process.try_wait().expect("its state is known") {
                 return status.code();
             }
-            assert!(start.elapsed() < Duration::from_secs(20), "the server does not end");
+            assert!(start.elapsed() < Duration::from_secs(20), "the server does not exit");
             std::thread::sleep(Duration::from_millis(20));
         }
     }
@@ -180,7 +180,7 @@ impl Drop for Server {
     }
 }
 
-/// A connection that is kept from one request to the next. It gives whole answers or none.
+/// A connection that persists between requests. It returns complete answers or none.
 pub struct Client {
     stream: BufReader<TcpStream>,
 }
@@ -189,7 +189,7 @@ impl Client {
     /// Connects.
     ///
     /// # Errors
-    /// Nobody listens.
+    /// There is no listener.
     pub fn connect(address: &str) -> io::Result<Self> {
         let stream = TcpStream::connect(address)?;
         stream.set_nodelay(true)?;
@@ -197,7 +197,7 @@ impl Client {
         Ok(Self { stream: BufReader::with_capacity(1 << 16, stream) })
     }
 
-    /// The stream, for what is no request.
+    /// The stream, to send anything but a regular request.
     pub fn stream(&mut self) -> &mut TcpStream {
         self.stream.get_mut()
     }
@@ -205,27 +205,27 @@ impl Client {
     /// `GET`.
     ///
     /// # Errors
-    /// The connection ends before the answer is whole.
+    /// The connection ends before the answer is complete.
     pub fn get(&mut self, path: &str) -> io::Result<Answer> {
         let mut body = Vec::new();
         let (status, head) = self.get_into(path, &mut body)?;
         Ok(Answer { status, head, body })
     }
 
-    /// `GET`, with the body in memory that is there; status and head, lower case.
+    /// `GET` into an existing buffer; returns status and head, lower case.
     ///
     /// # Errors
-    /// The connection ends before the answer is whole.
+    /// The connection ends before the answer is complete.
     pub fn get_into(&mut self, path: &str, body: &mut Vec<u8>) -> io::Result<(u16, String)> {
         let request = format!("GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n");
         self.stream.get_mut().write_all(request.as_bytes())?;
         self.answer_into(body)
     }
 
-    /// The answer to what was written to [`Client::stream`].
+    /// The answer to data written to [`Client::stream`].
     ///
     /// # Errors
-    /// The connection ends before the answer is whole.
+    /// The connection ends before the answer is complete.
     pub fn answer_into(&mut self, body: &mut Vec<u8>) -> io::Result<(u16, String)> {
         let mut head = String::new();
         while !head.ends_with("\r\n\r\n") {

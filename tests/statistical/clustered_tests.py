@@ -1,8 +1,8 @@
-"""Values behind the tests of `sastrugi-statistics` for values that come in clusters: scipy 1.17.1, lifelines 0.30.3.
+"""Reference values for the tests of `sastrugi-statistics` on clustered values: scipy 1.17.1, lifelines 0.30.3.
 
     pip install scipy lifelines; python3 tests/statistical/clustered_tests.py
 
-Quantiles come from scipy, curves from lifelines (ties set apart by 1e-9); the rest is written out the obvious way.
+Quantiles come from scipy, curves from lifelines (ties separated by 1e-9); the rest is computed in the obvious way.
 """
 
 import numpy as np

@@ -1,9 +1,9 @@
-"""Values behind the tests of `sastrugi-statistics` for groups of terrains: scipy 1.17.1, statsmodels 0.15.0, numpy.
+"""Reference values for the tests of `sastrugi-statistics` on groups of terrains: scipy 1.17.1, statsmodels 0.15.0, numpy.
 
     python3 tests/statistical/nested_tests.py
 
 Each line names the function it comes from. The mixed logistic model is maximised here by a general minimiser on a likelihood whose
-integrals come from adaptive quadrature (`scipy.integrate.quad`), so that nothing is shared with the Rust program but the model.
+integrals come from adaptive quadrature (`scipy.integrate.quad`), so that only the model is shared with the Rust program.
 """
 
 import itertools

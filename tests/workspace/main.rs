@@ -1,101 +1,127 @@
-//! The rooms: who may import whom, as docs/ARCHITECTURE.md states it.
+//! The rooms: who may import whom, as `docs/ARCHITECTURE.md` states it.
 
-#![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
+#![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
+
+mod walk;
 
 use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
-/// `docs/ARCHITECTURE.md`, "Who may import whom", as data.
-fn allowed() -> BTreeMap<&'static str, BTreeSet<&'static str>> {
-    let stages = "schemas numeric roughness statistics terrain texture mobility navigation imaging store report";
-    let table = [
-        ("schemas", ""),
-        ("numeric", ""),
-        ("roughness", "numeric"),
-        ("statistics", "numeric"),
-        ("terrain", "numeric schemas roughness"),
-        ("texture", "numeric schemas roughness statistics"),
-        ("mobility", "numeric schemas roughness statistics"),
-        ("navigation", "numeric schemas roughness statistics"),
-        ("imaging", "numeric schemas"),
-        ("store", "numeric schemas"),
-        ("report", "statistics store imaging numeric schemas"),
-        ("stages", stages),
-        ("server", "stages terrain imaging store numeric schemas"),
-        ("cli", "stages server report store schemas"),
-        ("fixtures", "numeric"),
-        ("tests", "schemas numeric statistics terrain mobility imaging store stages server fixtures"),
-        (
-            "benches",
-            "schemas numeric roughness statistics terrain texture mobility navigation imaging store stages report fixtures",
-        ),
-    ];
-    table.into_iter().map(|(room, uses)| (room, uses.split_whitespace().collect())).collect()
+/// Rooms, and what each may import; `any` is one of these words.
+type Rules = BTreeMap<String, BTreeSet<String>>;
+
+/// Rooms whose dependencies on external crates are free: they check or measure what the others do.
+const OBSERVERS: [&str; 2] = ["tests", "benches"];
+
+/// The code blocks of ARCHITECTURE with arrows, the first of rooms, the second of external crates: `a, b -> c, d` on each line.
+fn rules() -> [Rules; 2] {
+    let page = std::fs::read_to_string(sastrugi_fixtures::workspace_root().join("docs/ARCHITECTURE.md")).unwrap();
+    let section = page.split("Who may import whom").nth(1).unwrap().split("\n## ").next().unwrap();
+    let blocks: Vec<Rules> = section.split("```").skip(1).step_by(2).map(block).collect();
+    blocks.try_into().unwrap_or_else(|blocks: Vec<Rules>| panic!("{} blocks of rules, not 2", blocks.len()))
 }
 
-/// Crates that only one room may name.
-const SOLE_USERS: [(&str, &str); 18] = [
-    ("arrow-array", "store"),
-    ("arrow-schema", "store"),
-    ("parquet", "store"),
-    ("mcap", "store"),
-    ("foxglove", "store"),
-    ("prost", "store"),
-    ("geotiff-reader", "store"),
-    ("geotiff-writer", "store"),
-    ("tiff", "store"),
-    ("tar", "store"),
-    ("axum", "server"),
-    ("hyper", "server"),
-    ("tokio", "server"),
-    ("tower-http", "server"),
-    ("ureq", "server"),
-    ("clap", "cli"),
-    ("indicatif", "cli"),
-    ("miette", "cli"),
-];
+fn block(text: &str) -> Rules {
+    let names = |list: &str| -> BTreeSet<String> { list.split(',').map(|name| name.trim().to_owned()).collect() };
+    let mut rules = Rules::new();
+    for line in text.trim().lines() {
+        let (rooms, uses) = line.split_once("->").unwrap_or_else(|| panic!("{line}: no arrow"));
+        for room in names(rooms) {
+            assert!(rules.insert(room.clone(), names(uses)).is_none(), "{room} has two lines");
+        }
+    }
+    rules
+}
 
-/// Direct dependencies of each room: `(room, dependency, is a dev-dependency)`.
-fn dependencies() -> Vec<(String, String, bool)> {
+/// A direct dependency of a room.
+struct Dependency {
+    room: String,
+    on: String,
+    is_dev: bool,
+}
+
+/// The rooms of the workspace and their dependencies.
+fn workspace() -> (BTreeSet<String>, Vec<Dependency>) {
     let output = Command::new(env!("CARGO"))
         .args(["metadata", "--format-version", "1", "--no-deps", "--offline"])
         .current_dir(sastrugi_fixtures::workspace_root())
         .output()
         .unwrap();
     let metadata: serde_json::Value = serde_json::from_slice(&output.stdout).unwrap();
-    let mut all = Vec::new();
+    let mut rooms = BTreeSet::new();
+    let mut dependencies = Vec::new();
     for package in metadata["packages"].as_array().unwrap() {
         let room = package["name"].as_str().unwrap().trim_start_matches("sastrugi-").to_owned();
+        rooms.insert(room.clone());
         for dependency in package["dependencies"].as_array().unwrap() {
-            let name = dependency["name"].as_str().unwrap().to_owned();
-            all.push((room.clone(), name, dependency["kind"].as_str() == Some("dev")));
+            let on = dependency["name"].as_str().unwrap().to_owned();
+            dependencies.push(Dependency {
+                room: room.clone(),
+                on,
+                is_dev: dependency["kind"].as_str() == Some("dev"),
+            });
         }
     }
-    all
+    (rooms, dependencies)
+}
+
+/// Dependencies that the rules do not allow, as `room -> crate`.
+fn violations(dependencies: &[Dependency], [rooms, sole]: &[Rules; 2]) -> Vec<String> {
+    let allows = |dependency: &Dependency| match dependency.on.strip_prefix("sastrugi-") {
+        Some(other) => {
+            let may = &rooms[&dependency.room];
+            let may_in_tests = dependency.is_dev && rooms["dev-dependencies of any room"].contains(other);
+            may.contains("any") || may.contains(other) || may_in_tests
+        }
+        None => {
+            let owner = sole.iter().find(|(_, crates)| crates.contains(&dependency.on));
+            OBSERVERS.contains(&dependency.room.as_str()) || owner.is_none_or(|(room, _)| *room == dependency.room)
+        }
+    };
+    dependencies.iter().filter(|d| !allows(d)).map(|d| format!("{} -> {}", d.room, d.on)).collect()
 }
 
 #[test]
-fn val_rooms_import_only_what_they_may() {
-    let allowed = allowed();
-    let mut wrong = Vec::new();
-    for (room, dependency, dev) in dependencies() {
-        let Some(other) = dependency.strip_prefix("sastrugi-") else { continue };
-        let may = allowed.get(room.as_str()).unwrap_or_else(|| panic!("room {room} is not in the table"));
-        let dev_may = dev && ["statistics", "fixtures"].contains(&other);
-        if !may.contains(other) && !dev_may {
-            wrong.push(format!("{room} -> {other}"));
-        }
-    }
-    assert_eq!(wrong, Vec::<String>::new());
+fn val_rooms_import_only_what_architecture_allows() {
+    let (rooms, dependencies) = workspace();
+    let rules = rules();
+    let named: BTreeSet<&String> = rules[0].keys().filter(|room| !room.contains(' ')).collect();
+    assert_eq!(named, rooms.iter().collect(), "rooms of ARCHITECTURE and of the workspace");
+    assert_eq!(violations(&dependencies, &rules), Vec::<String>::new());
 }
 
+/// Every rule about an external crate is about one that is used; the rules would refuse the contrary of what they say.
 #[test]
-fn val_file_formats_and_terminals_have_one_room() {
-    let wrong: Vec<String> = dependencies()
-        .into_iter()
-        .filter(|(room, _, _)| !["benches", "tests"].contains(&room.as_str()))
-        .filter(|(room, name, _)| SOLE_USERS.iter().any(|(krate, user)| krate == name && user != room))
-        .map(|(room, name, _)| format!("{room} -> {name}"))
-        .collect();
-    assert_eq!(wrong, Vec::<String>::new());
+fn val_the_rules_can_be_broken() {
+    let (_, dependencies) = workspace();
+    let rules = rules();
+    for (room, crates) in &rules[1] {
+        for name in crates {
+            assert!(dependencies.iter().any(|d| d.room == *room && d.on == *name), "{room} does not use {name}");
+        }
+    }
+    let broken =
+        [("numeric", "sastrugi-store", false), ("terrain", "sastrugi-texture", true), ("report", "parquet", false)];
+    for (room, on, is_dev) in broken {
+        let dependency = Dependency { room: room.to_owned(), on: on.to_owned(), is_dev };
+        assert_eq!(violations(&[dependency], &rules), [format!("{room} -> {on}")]);
+    }
+}
+
+/// `fuzz/` is a workspace of its own; it exercises the versions that the program ships.
+#[test]
+fn val_fuzz_targets_use_the_locked_versions() {
+    let versions = |file: &str| -> BTreeSet<(String, String)> {
+        let text = std::fs::read_to_string(sastrugi_fixtures::workspace_root().join(file)).unwrap();
+        let value = |line: &str, key: &str| line.strip_prefix(key).map(|rest| rest.trim_matches('"').to_owned());
+        let lines: Vec<&str> = text.lines().collect();
+        let pair = |w: &[&str]| Some((value(w[0], "name = ")?, value(w[1], "version = ")?));
+        lines.windows(2).filter_map(pair).collect()
+    };
+    let ours = versions("Cargo.lock");
+    let names: BTreeSet<&String> = ours.iter().map(|(name, _)| name).collect();
+    let fuzz = versions("fuzz/Cargo.lock");
+    assert!(fuzz.len() > 100, "{}", fuzz.len());
+    let other: Vec<_> = fuzz.iter().filter(|pair| names.contains(&pair.0) && !ours.contains(*pair)).collect();
+    assert!(other.is_empty(), "copy Cargo.lock to fuzz/ and run `cargo update --workspace` there: {other:?}");
 }

@@ -1,4 +1,4 @@
-//! What a question answers with: text, figures and tables, each with the numbers behind it.
+//! Content of an answer: text, figures and tables, each with the numbers behind it.
 
 use crate::render::svg::Svg;
 use sastrugi_schemas::{Cell, Record};
@@ -21,24 +21,24 @@ pub struct Section {
 /// A part of a section.
 #[derive(Clone, Debug)]
 pub enum Block {
-    /// A smaller heading.
+    /// A subheading.
     Heading(String),
     /// A paragraph.
     Text(String),
-    /// A sentence the reader must not miss.
+    /// A sentence that the reader must not miss.
     Warning(String),
-    /// Several such sentences, one click away under words that say what they are about.
+    /// Several such sentences, folded under a summary.
     Warnings {
-        /// What they are about.
+        /// Their subject.
         summary: String,
         /// Sentences.
         sentences: Vec<String>,
     },
     /// Figures side by side.
     Figures(Vec<Figure>),
-    /// A table that is shown.
+    /// A visible table.
     Table(TableBlock),
-    /// A table that is folded away.
+    /// A folded table.
     FoldedTable(TableBlock),
 }
 
@@ -57,24 +57,24 @@ impl Block {
 /// A table with its caption.
 #[derive(Clone, Debug)]
 pub struct TableBlock {
-    /// Name of its file under `data/`, without ending.
+    /// Name of its file under `data/`, without extension.
     pub id: String,
     /// Caption.
     pub caption: String,
-    /// What it holds.
+    /// Its numbers.
     pub numbers: Numbers,
 }
 
 /// A figure.
 #[derive(Clone, Debug)]
 pub struct Figure {
-    /// Name of its files, without ending.
+    /// Name of its files, without extension.
     pub id: String,
     /// Title.
     pub title: String,
-    /// What is seen, how it was made, what to mind.
+    /// What is shown, how it was computed, and its caveats.
     pub caption: String,
-    /// The same in words for those who do not see it: the main figures.
+    /// Text alternative with the main numbers.
     pub description: String,
     /// Drawing.
     pub svg: Svg,
@@ -83,29 +83,43 @@ pub struct Figure {
 }
 
 /// Numbers behind a figure or in a table, and where in the release they come from.
+///
+/// ```
+/// use sastrugi_report::content::{Numbers, number, text};
+///
+/// let query = "select surface_id, sq_m from 'tables/surfaces/*.parquet'";
+/// let mut numbers = Numbers::new(query, &[("surface_id", ""), ("sq_m", "m")]);
+/// numbers.row([text("snow"), number(0.05)]);
+/// numbers.row([text("ice"), number(f64::NAN)]);
+///
+/// // The file under `data/`: an unknown number is null, never NaN.
+/// let file = numbers.to_json("heights", "RMS heights");
+/// assert_eq!(file["rows"], serde_json::json!([["snow", 0.05], ["ice", null]]));
+/// assert_eq!((&file["query"], &file["columns"][1]["unit"]), (&query.into(), &"m".into()));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Numbers {
-    /// Query of duckdb in the folder of the release, or a file.
+    /// DuckDB query in the folder of the release, or a file.
     pub query: String,
-    /// What the query gives.
+    /// What the query returns.
     pub gives: Gives,
     /// Name and unit of each column.
     pub columns: Vec<Heading>,
     /// Rows, each as long as `columns`.
     pub rows: Vec<Vec<Cell>>,
-    /// True where the rows of a column have units of their own: each figure is then set by its own digits.
+    /// True if the rows of a column have different units, so that each number is set with its own digits.
     pub mixed: bool,
 }
 
-/// What a query gives.
+/// What a query returns.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Gives {
     /// The rows themselves, in any order.
     Rows,
-    /// What they are computed from.
+    /// The input from which they are computed.
     Input,
-    /// It is a file.
+    /// Nothing: it is a file.
     File,
 }
 
@@ -119,36 +133,36 @@ pub struct Heading {
 }
 
 impl Numbers {
-    /// No rows yet.
+    /// Without rows yet.
     pub fn new(query: impl Into<String>, columns: &[(&str, &str)]) -> Self {
         let columns = columns.iter().map(|&(name, unit)| Heading { name: name.into(), unit: unit.into() }).collect();
         Self { query: query.into(), gives: Gives::Rows, columns, rows: Vec::new(), mixed: false }
     }
 
-    /// No rows yet, which are computed from what the query gives.
+    /// Without rows yet; they are computed from what the query returns.
     pub fn computed(query: impl Into<String>, columns: &[(&str, &str)]) -> Self {
         Self { gives: Gives::Input, ..Self::new(query, columns) }
     }
 
-    /// No rows yet, about a file.
+    /// Without rows yet, about a file.
     pub fn of_file(path: impl Into<String>, columns: &[(&str, &str)]) -> Self {
         Self { gives: Gives::File, ..Self::new(path, columns) }
     }
 
-    /// The same for rows that have units of their own.
+    /// The same for rows that have different units.
     pub fn with_mixed_units(self) -> Self {
         Self { mixed: true, ..self }
     }
 
-    /// Columns of the rows of a table of the release that meet a condition (all where it is empty), with the names and units of the
+    /// Columns of the rows of a table of the release that meet a condition (all rows if it is empty), with the names and units of the
     /// contract.
     ///
     /// # Panics
-    /// When the table has no column of such a name (a bug of the caller).
+    /// When the table lacks one of the columns (a bug of the caller).
     pub fn select<'a, R: Record + 'a>(condition: &str, rows: impl IntoIterator<Item = &'a R>, names: &[&str]) -> Self {
         let all = R::TABLE.columns;
         let indices: Vec<usize> = names.iter().filter_map(|n| R::TABLE.position(n)).collect();
-        assert_eq!(indices.len(), names.len(), "table {} has not all columns of {names:?}", R::TABLE.name);
+        assert_eq!(indices.len(), names.len(), "table {} lacks some of the columns {names:?}", R::TABLE.name);
         let columns: Vec<(&str, &str)> = indices.iter().map(|&i| (all[i].name, all[i].unit)).collect();
         let quoted = |name: &str| if name == "group" { "\"group\"".to_owned() } else { name.to_owned() };
         let list = columns.iter().map(|c| quoted(c.0)).collect::<Vec<_>>().join(", ");
@@ -178,7 +192,7 @@ pub fn text(value: impl Into<String>) -> Cell {
     Cell::Text(value.into())
 }
 
-/// Number cell; what is not finite is null.
+/// Number cell; null for a value that is not finite.
 pub fn number(value: f64) -> Cell {
     if value.is_finite() { Cell::F64(value) } else { Cell::Null }
 }
@@ -188,7 +202,7 @@ pub fn count(n: usize) -> Cell {
     i64::try_from(n).map_or(Cell::Null, Cell::I64)
 }
 
-/// Text as a part of a file name and of an anchor: [a-z0-9.-], everything else a hyphen; no two points in a row.
+/// Text as a part of a file name and of an anchor: [a-z0-9.-], with everything else replaced by hyphens; no two dots in a row.
 pub fn slug(text: &str) -> String {
     let plain = |c: char| if c.is_ascii_alphanumeric() || c == '.' { c.to_ascii_lowercase() } else { '-' };
     let slug: String = text.chars().take(96).map(plain).collect();
@@ -207,7 +221,7 @@ fn value(cell: &Cell) -> Value {
     }
 }
 
-/// Floats as an array; what is not finite is null.
+/// Floats as an array, with null for values that are not finite.
 fn list(values: impl Iterator<Item = f64>) -> Value {
     values.map(|v| value(&number(v))).collect()
 }
@@ -215,10 +229,10 @@ fn list(values: impl Iterator<Item = f64>) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sastrugi_schemas::tables::PsdRow;
+    use sastrugi_schemas::tables::{PsdRow, TerrainRow};
 
     #[test]
-    fn val_lists_are_arrays_with_null_for_what_is_absent() {
+    fn val_lists_are_arrays_with_null_for_absent_values() {
         assert_eq!(value(&Cell::F32List(vec![0.5, f32::NAN])), json!([0.5, null]));
         assert_eq!(value(&Cell::F64List(vec![f64::INFINITY, -2.25])), json!([null, -2.25]));
         assert_eq!(value(&Cell::F64List(vec![])), json!([]));
@@ -241,5 +255,41 @@ mod tests {
         assert_eq!(numbers.columns[1].unit, "m4");
         let json = numbers.to_json("x", "t");
         assert_eq!(json["rows"][0], json!([4, null, "a"]));
+        assert_eq!((&json["id"], &json["title"], &json["query_gives"]), (&json!("x"), &json!("t"), &json!("rows")));
+    }
+
+    /// `group` is a word of SQL; without a condition, all rows are selected.
+    #[test]
+    fn val_queries_quote_words_of_sql() {
+        let none: [&TerrainRow; 0] = [];
+        let numbers = Numbers::select("", none, &["terrain_id", "group"]);
+        assert_eq!(numbers.query, "select terrain_id, \"group\" from 'tables/terrains/*.parquet'");
+        assert_eq!((numbers.gives, numbers.rows.len(), numbers.mixed), (Gives::Rows, 0, false));
+        let names: Vec<&str> = numbers.columns.iter().map(|c| c.name.as_str()).collect();
+        assert_eq!(names, ["terrain_id", "group"]);
+    }
+
+    #[test]
+    #[should_panic(expected = "table psd lacks some of the columns")]
+    fn val_unknown_columns_are_a_bug() {
+        let none: [&PsdRow; 0] = [];
+        Numbers::select("", none, &["modes", "modus"]);
+    }
+
+    #[test]
+    fn val_blocks_without_content_are_empty() {
+        let table = |rows: usize| {
+            let mut numbers = Numbers::new("", &[("n", "1")]);
+            (0..rows).for_each(|n| numbers.row([count(n)]));
+            TableBlock { id: "t".into(), caption: "c".into(), numbers }
+        };
+        assert!(Block::Table(table(0)).is_empty() && Block::FoldedTable(table(0)).is_empty());
+        assert!(!Block::Table(table(1)).is_empty() && !Block::FoldedTable(table(1)).is_empty());
+        let warnings = |sentences: &[&str]| {
+            let sentences = sentences.iter().map(|s| (*s).to_owned()).collect();
+            Block::Warnings { summary: "s".into(), sentences }
+        };
+        assert!(warnings(&[]).is_empty() && !warnings(&["w"]).is_empty());
+        assert!(Block::Figures(Vec::new()).is_empty() && !Block::Heading("h".into()).is_empty());
     }
 }

@@ -1,7 +1,7 @@
-//! What the page is made from: the rows and files of one assembled release, read through `sastrugi-store` alone.
+//! Input of the page: the rows and files of one assembled release, read only through `sastrugi-store`.
 //!
-//! Tables are read once; rasters and samples when a figure asks for them, one at a time. What a release lacks is an
-//! empty table or `None`: only a file that is there and cannot be read is an error.
+//! Tables are read once; rasters and samples are read one at a time, when a figure needs them. Whatever a release lacks is an
+//! empty table or `None`: only a file that exists but cannot be read is an error.
 
 use crate::ReportError;
 use sastrugi_numeric::Grid;
@@ -16,7 +16,7 @@ use sastrugi_schemas::tables::{
 };
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Files of a release that are read on demand. Paths are relative to the release; `None` where there is no such file.
+/// Files of a release that are read on demand. Paths are relative to the release; `None` if there is no such file.
 pub trait Files {
     /// Heights or residuals, NaN where there is no data.
     fn grid(&self, path: &str) -> Result<Option<Grid>, ReportError>;
@@ -43,7 +43,7 @@ pub struct Artifact {
     pub bytes: u64,
 }
 
-/// `[study]` of the study file, as far as a page shows it.
+/// `[study]` of the study file, as far as the page shows it.
 #[derive(Clone, Debug, Default)]
 pub struct Study {
     /// Short name.
@@ -58,11 +58,11 @@ pub struct Study {
     pub date: String,
     /// Licence of the release.
     pub license: String,
-    /// People or groups that made it.
+    /// Names of its creators.
     pub creators: Vec<String>,
-    /// Claims that it states.
+    /// Declared hypotheses.
     pub hypotheses: Vec<HypothesisItem>,
-    /// How its heightfields are classified.
+    /// Settings of the roughness classes.
     pub roughness: RoughnessSection,
 }
 
@@ -72,11 +72,11 @@ pub struct Data {
     pub study: Study,
     /// SHA-256 of the release's `study.toml`.
     pub study_sha256: String,
-    /// Version of the program that made the release.
+    /// Version of the program that wrote the release.
     pub version: String,
     /// Data files of the release, by path.
     pub artifacts: Vec<Artifact>,
-    /// Items that failed, as far as the release says so: it lists them once it is sealed.
+    /// Items that failed. A release lists them once it is sealed.
     pub failed: Vec<FailedItem>,
     /// Heightfields.
     pub terrains: Vec<TerrainRow>,
@@ -84,13 +84,13 @@ pub struct Data {
     pub fits: Vec<FitRow>,
     /// Covariance bins.
     pub covariance: Vec<CovarianceRow>,
-    /// Models that fits tried.
+    /// Candidate models of the fits.
     pub candidates: Vec<CandidateRow>,
-    /// Their curves in the bins.
+    /// Their curves at the bins.
     pub candidate_curves: Vec<CandidateCurveRow>,
-    /// How likelihoods fall away along the range.
+    /// Profile likelihoods over the range.
     pub likelihood_profile: Vec<LikelihoodProfileRow>,
-    /// Figures of surfaces.
+    /// Surface parameters.
     pub surfaces: Vec<SurfaceRow>,
     /// Structure functions.
     pub structure: Vec<StructureRow>,
@@ -106,7 +106,7 @@ pub struct Data {
     pub scoreboard_covariance: Vec<ScoreCovarianceRow>,
     /// Missions.
     pub missions: Vec<MissionRow>,
-    /// Starts of missions that have several.
+    /// Starts of missions with several starts.
     pub replicates: Vec<ReplicateRow>,
     /// Routes.
     pub routes: Vec<RouteRow>,
@@ -118,19 +118,19 @@ pub struct Data {
     pub photoclinometry_bands: Vec<PhotoclinometryBandRow>,
     /// Runs of teams.
     pub formations: Vec<FormationRow>,
-    /// What happened on these runs.
+    /// Events of these runs.
     pub formation_events: Vec<FormationEventRow>,
-    /// Rovers that made their own way.
+    /// Rovers.
     pub rovers: Vec<RoverRow>,
     /// Effects of their perturbed parameters.
     pub rover_effects: Vec<RoverEffectRow>,
-    /// Every number of every run.
+    /// Every parameter of every run.
     pub parameters: Vec<ParameterRow>,
     /// Hashes of decoded content by path, once the release is sealed.
     pub contents: BTreeMap<String, String>,
-    /// Another release that this one is compared with.
+    /// Another release to compare this one with.
     pub against: Option<Against>,
-    /// Analysed logs that the missions are compared with; `None` where none were asked for.
+    /// Analysed logs to compare the missions with; `None` if none were given.
     pub logs: Option<Vec<LogRow>>,
     /// Files read on demand.
     pub files: Box<dyn Files>,
@@ -140,45 +140,45 @@ pub struct Data {
 pub struct Against {
     /// Name of its folder.
     pub name: String,
-    /// What it holds.
+    /// Its data.
     pub data: Box<Data>,
 }
 
-/// What carries one label and is compared with other groups.
+/// Rows with one label, which are compared with other groups.
 #[derive(Clone, Debug)]
 pub struct Group<'a, R> {
-    /// Label, with the run where the release has several.
+    /// Label, with the run if the release has several.
     pub name: String,
     /// Label alone.
     pub label: String,
-    /// Id of the run, of missions.
+    /// Id of the run, for missions.
     pub run: Option<String>,
-    /// Number among all groups of the release: its colour.
+    /// Number among all groups of the release, which sets its colour.
     pub index: usize,
     /// Its rows, in the order of the table.
     pub rows: Vec<&'a R>,
 }
 
 impl Data {
-    /// Generated terrains by group, groups in natural order: the plain ones, all where every one is a variant.
+    /// Generated terrains by group, groups in natural order: the plain terrains, or all if every one is a variant.
     pub fn terrain_groups(&self) -> Vec<Group<'_, TerrainRow>> {
         let all: Vec<&TerrainRow> = self.of_stage("terrain").collect();
         self.grouped(plain(all, |t| t.variant.is_none()).into_iter().map(|t| ((label(t), None), t)))
     }
 
-    /// Missions of the plain run by group, groups in natural order; all missions where every one belongs to a variant.
+    /// Missions of the plain run by group, groups in natural order; all missions if every one belongs to a variant.
     pub fn mission_groups(&self) -> Vec<Group<'_, MissionRow>> {
         self.groups_of(plain(self.missions.iter().collect(), |m| m.variant.is_none()))
     }
 
-    /// Missions by group, groups in natural order. Where the release has several runs each is a group of its own: other vehicles or
-    /// other ways are no repetitions.
+    /// Missions by group, groups in natural order. If the release has several runs, each is a separate group, because other vehicles
+    /// or other paths are not repetitions.
     pub fn groups_of<'a>(&'a self, missions: Vec<&'a MissionRow>) -> Vec<Group<'a, MissionRow>> {
         let names = self.names();
         self.grouped(missions.into_iter().map(|m| (names(m), m)))
     }
 
-    /// Label and run of any mission.
+    /// Function that returns label and run of a mission.
     fn names<'a>(&'a self) -> impl Fn(&MissionRow) -> Of<'a> {
         let kinds: BTreeMap<&str, &str> = self.terrains.iter().map(|t| (t.terrain_id.as_str(), label(t))).collect();
         let labels: BTreeSet<&str> = self.missions.iter().filter_map(|m| m.group.as_deref()).collect();
@@ -190,7 +190,7 @@ impl Data {
         }
     }
 
-    /// Ids of the runs: those of the plain missions, to which variants belong.
+    /// Ids of the runs of the plain missions; variants belong to these.
     fn runs(&self) -> Vec<&str> {
         let plain = plain(self.missions.iter().collect(), |m| m.variant.is_none());
         let ids: BTreeSet<&str> = plain.into_iter().map(|m| m.traverse_id.as_str()).collect();
@@ -202,7 +202,7 @@ impl Data {
         self.runs().len() > 1
     }
 
-    /// Rows by label and run; both have the same number whatever is grouped.
+    /// Rows by label and run; a group has the same number whatever is grouped.
     fn grouped<'a, R>(&'a self, rows: impl Iterator<Item = (Of<'a>, &'a R)>) -> Vec<Group<'a, R>> {
         let runs = self.runs();
         let named = |label: &str, run: Option<&str>| match run {
@@ -230,22 +230,22 @@ impl Data {
         groups.into_iter().map(group).collect()
     }
 
-    /// Heightfields that a stage made.
+    /// Heightfields of a stage.
     pub fn of_stage<'a>(&'a self, stage: &'a str) -> impl Iterator<Item = &'a TerrainRow> {
         self.terrains.iter().filter(move |t| t.stage == stage)
     }
 
-    /// The heightfield of that id.
+    /// The heightfield with an id.
     pub fn terrain(&self, id: &str) -> Option<&TerrainRow> {
         self.terrains.iter().find(|t| t.terrain_id == id)
     }
 
-    /// Missions of the plain run on a terrain; all where every one belongs to a variant.
+    /// Missions of the plain run on a terrain; all missions if every one belongs to a variant.
     pub fn missions_on(&self, terrain_id: &str) -> Vec<&MissionRow> {
         plain(of_key(&self.missions, |m| &m.terrain_id, terrain_id).iter().collect(), |m| m.variant.is_none())
     }
 
-    /// Starts of a mission, the drawn one first; none where it has only that.
+    /// Starts of a mission, the drawn one first; empty if it has only that.
     pub fn starts_of(&self, mission: &MissionRow) -> &[ReplicateRow] {
         let on_terrain = of_key(&self.replicates, |r| &r.terrain_id, &mission.terrain_id);
         of_key(on_terrain, |r| &r.mission_id, &mission.mission_id)
@@ -257,7 +257,7 @@ impl Data {
         of_key(&self.psd, |r| &r.surface_id, id).iter().filter(usable).collect()
     }
 
-    /// Figures of a surface.
+    /// Parameters of a surface.
     pub fn surface(&self, id: &str) -> Option<&SurfaceRow> {
         self.surfaces.iter().find(|s| s.surface_id == id)
     }
@@ -274,18 +274,18 @@ impl Data {
         of_key(&self.profile_psd, |r| &r.surface_id, id).iter().filter(usable).collect()
     }
 
-    /// Models that a fit tried, the best first.
+    /// Candidate models of a fit, the best first.
     pub fn candidates_of(&self, fit: &str) -> &[CandidateRow] {
         of_key(&self.candidates, |r| &r.fit_id, fit)
     }
 
-    /// Curve of a candidate in the bins.
+    /// Curve of a candidate at the bins.
     pub fn candidate_curve(&self, fit: &str, rank: i64) -> Vec<&CandidateCurveRow> {
         let usable = |r: &&CandidateCurveRow| r.rank == rank && r.model_m2.is_finite();
         of_key(&self.candidate_curves, |r| &r.fit_id, fit).iter().filter(usable).collect()
     }
 
-    /// Profile of a fit's likelihood.
+    /// Profile likelihood of a fit.
     pub fn profile_of(&self, fit: &str) -> Vec<&LikelihoodProfileRow> {
         let usable = |r: &&LikelihoodProfileRow| r.range_m > 0.0 && r.chi2_rise.is_finite();
         of_key(&self.likelihood_profile, |r| &r.fit_id, fit).iter().filter(usable).collect()
@@ -297,7 +297,7 @@ impl Data {
     }
 }
 
-/// The plain ones among rows; all of them when there is none.
+/// The plain rows; all of them if none is plain.
 fn plain<R>(mut rows: Vec<&R>, is_plain: impl Fn(&R) -> bool) -> Vec<&R> {
     if rows.iter().any(|r| is_plain(r)) {
         rows.retain(|r| is_plain(r));
@@ -305,21 +305,30 @@ fn plain<R>(mut rows: Vec<&R>, is_plain: impl Fn(&R) -> bool) -> Vec<&R> {
     rows
 }
 
-/// The run that a mission or its plain one belongs to: values of a sweep add to its id after a point.
+/// The run that a mission, or its plain counterpart, belongs to. A sweep appends its values to the id after a hyphen; other tables are
+/// variants of a run if their ids begin with it in the same way (`husky-torque`).
 fn run<'a>(runs: &[&'a str], mission: &MissionRow) -> Option<&'a str> {
     let belongs = |run: &&&str| {
-        mission.traverse_id.strip_prefix(**run).is_some_and(|rest| rest.is_empty() || rest.starts_with('.'))
+        mission.traverse_id.strip_prefix(**run).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
     };
     runs.iter().filter(belongs).max_by_key(|run| run.len()).copied()
 }
 
-/// The rows of one key in a table that is sorted by it.
+/// The rows with one key, in a table sorted by it.
+///
+/// ```
+/// use sastrugi_report::data::of_key;
+///
+/// let rows = [("a", 1), ("b", 2), ("b", 3), ("d", 4)];
+/// assert_eq!(of_key(&rows, |row| row.0, "b"), [("b", 2), ("b", 3)]);
+/// assert!(of_key(&rows, |row| row.0, "c").is_empty());
+/// ```
 pub fn of_key<'a, R>(rows: &'a [R], key: impl Fn(&R) -> &str, id: &str) -> &'a [R] {
     let from = rows.partition_point(|r| key(r) < id);
     &rows[from..][..rows[from..].partition_point(|r| key(r) <= id)]
 }
 
-/// The group a heightfield belongs to: its label, or its generator where it has none.
+/// The group of a heightfield: its label, or its generator if it has none.
 pub fn label(terrain: &TerrainRow) -> &str {
     terrain.group.as_deref().unwrap_or(&terrain.kind)
 }
@@ -327,17 +336,25 @@ pub fn label(terrain: &TerrainRow) -> &str {
 /// Label and run.
 type Of<'a> = (&'a str, Option<&'a str>);
 
-/// Sorting key of a label (numbers before words, numbers by value), and the label.
+/// Sort key of a label (numbers before words, numbers by value), and the label.
 pub type Natural = (Vec<(u64, String)>, String);
 
-/// A key under which `d2.3` < `d2.45` < `d10`: runs of digits and points compare by their value.
+/// A key under which `d2.3` < `d2.45` < `d10`: runs of digits and dots compare by value.
+///
+/// ```
+/// use sastrugi_report::data::natural;
+///
+/// let mut labels = ["d10", "d2.45", "rough", "d2.3"];
+/// labels.sort_by_key(|label| natural(label));
+/// assert_eq!(labels, ["d2.3", "d2.45", "d10", "rough"]);
+/// ```
 pub fn natural(label: &str) -> Natural {
     let numeric = |c: &char| c.is_ascii_digit() || *c == '.';
     let chars: Vec<char> = label.chars().collect();
     let part = |run: &[char]| {
         let text: String = run.iter().collect();
         match text.parse::<f64>() {
-            // The bits of numbers that are not negative sort as the numbers do.
+            // The bits of non-negative floats sort as their values do.
             Ok(n) if run.iter().all(numeric) => (n.to_bits(), String::new()),
             _ => (u64::MAX, text),
         }
@@ -345,7 +362,7 @@ pub fn natural(label: &str) -> Natural {
     (chars.chunk_by(|a, b| numeric(a) == numeric(b)).map(part).collect(), label.to_owned())
 }
 
-/// Text of a key in the JSON parameters of a heightfield, as `fit` of a texture.
+/// Text of a key in the JSON parameters of a heightfield, such as `fit` of a texture.
 pub fn parameter(terrain: &TerrainRow, key: &str) -> Option<String> {
     let params: serde_json::Value = serde_json::from_str(&terrain.params).ok()?;
     params.get(key)?.as_str().map(str::to_owned)
@@ -356,9 +373,27 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_labels_sort_as_people_do() {
+    fn val_labels_sort_naturally() {
         let mut labels = ["d10", "2.6", "d2", "10", "2.45", "rough", "", "inf"];
         labels.sort_by_key(|l| natural(l));
         assert_eq!(labels, ["", "2.45", "2.6", "10", "d2", "d10", "inf", "rough"]);
+    }
+
+    #[test]
+    fn val_plain_rows_come_first_or_all() {
+        let [one, two, three] = [1, 2, 3];
+        assert_eq!(plain(vec![&one, &two, &three], |n| *n != 2), [&1, &3]);
+        assert_eq!(plain(vec![&one, &two], |_| false), [&1, &2]);
+    }
+
+    /// A variant belongs to the run whose id it extends after a hyphen, the longest of several; other ids are no runs.
+    #[test]
+    fn val_variants_belong_to_their_run() {
+        let missions = crate::tests::made_up::full(1, 24).missions;
+        let of =
+            |id: &str| run(&["husky", "husky-soft"], &MissionRow { traverse_id: id.into(), ..missions[0].clone() });
+        assert_eq!([of("husky"), of("husky-friction-0.5")], [Some("husky"); 2]);
+        assert_eq!([of("husky-soft"), of("husky-soft-0.5")], [Some("husky-soft"); 2]);
+        assert_eq!([of("huskies"), of("rover")], [None, None]);
     }
 }

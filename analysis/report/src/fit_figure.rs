@@ -1,13 +1,13 @@
 //! The picture of one fit: measured covariance and structure function with the fitted model, and the covariance by
 //! direction.
 //!
-//! * Covariance by lag, in rings. `model, detrended` is the model after the detrending and trimming that the data went
-//!   through, which is what the bins are compared with; `model of the surface` is the model before them.
-//! * Structure function (mean square increment) `D(h) = 2 [C(0) - C(h)]`, m², of the same three, on logarithmic axes: a
+//! * Covariance by lag, in rings. `model, detrended` is the model after the same detrending and trimming as the data, with
+//!   which the bins are compared; `model of the surface` is the model before them.
+//! * Structure function (mean squared increment) `D(h) = 2 [C(0) - C(h)]`, m², of the same three, on logarithmic axes: a
 //!   self-affine surface is a straight line of slope 2 H.
-//! * Covariance by direction, in sectors of azimuth clockwise from north, where the fit has them.
+//! * Covariance by direction, in sectors of azimuth clockwise from north, if the fit has them.
 //!
-//! Everything is read from the fit file; nothing is computed but the differences above.
+//! Everything is read from the fit file; only the differences above are computed.
 
 use crate::ReportError;
 use crate::content::slug;
@@ -20,7 +20,7 @@ use sastrugi_schemas::fit::{DirectionBin, FitFile, Quoted};
 
 /// Size of a panel, px.
 const PANEL: (f64, f64) = (470.0, 340.0);
-/// Free space about and between the panels, px.
+/// Free space around and between the panels, px.
 const GAP: f64 = 14.0;
 /// Size of the title, px.
 const TITLE: f64 = 15.0;
@@ -28,16 +28,31 @@ const TITLE: f64 = 15.0;
 const HEAD: f64 = 52.0;
 /// Room of the explanation below the panels, px.
 const FOOT: f64 = 24.0;
-/// Highest model of the surface that the frame makes room for, over the largest of what is measured: a long range lifts it far
-/// above.
+/// Largest model of the surface, over the largest measured value, that still sets the height of the frame: with a long range it
+/// can lie far above.
 pub(crate) const SURFACE_MAX: f64 = 2.0;
 /// Smallest measured increment that is drawn, over the largest.
 const INCREMENT_MIN: f64 = 1e-6;
-/// Marks that tell directions apart without colour.
+/// Marks that distinguish directions without colour.
 const SYMBOLS: [Symbol; 6] =
     [Symbol::Disc, Symbol::Square, Symbol::Triangle, Symbol::Diamond, Symbol::Ring, Symbol::Frame];
 
-/// A fit as an SVG picture; `name` is what was fitted, as its title says it.
+/// A fit as an SVG picture; `name` is the surface, as in the title.
+///
+/// ```
+/// use sastrugi_schemas::fit::FitFile;
+///
+/// let fit = FitFile {
+///     model: "exponential".into(),
+///     parameters: [("sigma_m".to_owned(), 0.05), ("range_m".to_owned(), 0.28)].into(),
+///     lags_m: vec![0.0, 0.28, 0.56],
+///     covariance_m2: vec![25.0e-4, 9.2e-4, 3.4e-4],
+///     ..FitFile::default()
+/// };
+/// let svg = sastrugi_report::fit_svg(&fit, "snow.tif");
+/// assert!(svg.starts_with("<svg") && svg.contains("snow.tif: exponential model"));
+/// assert!(svg.contains("σ = 0.0500 m,  b = 0.280 m"));
+/// ```
 pub fn fit_svg(fit: &FitFile, name: &str) -> String {
     let id = slug(&format!("fit-{name}"));
     let mut panels = vec![covariance(fit, &format!("{id}-covariance")), structure(fit, &format!("{id}-structure"))];
@@ -62,7 +77,24 @@ pub fn fit_svg(fit: &FitFile, name: &str) -> String {
 /// The same as a PNG file.
 ///
 /// # Errors
-/// When it cannot be drawn, for want of memory.
+/// When it cannot be drawn, for lack of memory.
+///
+/// ```
+/// use sastrugi_schemas::fit::FitFile;
+///
+/// let fit = FitFile {
+///     model: "exponential".into(),
+///     parameters: [("sigma_m".to_owned(), 0.05), ("range_m".to_owned(), 0.28)].into(),
+///     lags_m: vec![0.0, 0.28, 0.56],
+///     covariance_m2: vec![25.0e-4, 9.2e-4, 3.4e-4],
+///     ..FitFile::default()
+/// };
+/// let png = sastrugi_report::fit_png(&fit, "snow.tif")?;
+/// assert!(png.starts_with(b"\x89PNG"));
+/// // Two panels of 470 px with 14 px around each, at two pixels of the file per pixel of the figure.
+/// assert_eq!(png[16..20], (2 * (14 + 2 * (470 + 14)) as u32).to_be_bytes());
+/// # Ok::<(), sastrugi_report::ReportError>(())
+/// ```
 pub fn fit_png(fit: &FitFile, name: &str) -> Result<Vec<u8>, ReportError> {
     raster::png(&fit_svg(fit, name))
 }
@@ -74,7 +106,7 @@ fn model_words(fit: &FitFile) -> String {
     }
 }
 
-/// Every parameter with its unit and the interval to quote; a lower limit where the search for the range ended at its bound.
+/// Every parameter with its unit and the interval to quote; only a lower limit if the search for the range ended at its bound.
 fn parameters(fit: &FitFile) -> String {
     let level = fit.quoted_intervals().map_or_else(String::new, |(i, _)| set::plain(100.0 * i.level, 3));
     let end = |end: Option<f64>| end.map_or_else(|| "open".to_owned(), |v| set::significant(v, 3));
@@ -91,14 +123,14 @@ fn parameters(fit: &FitFile) -> String {
             }
         }
     };
-    // Sigma and b first, whatever else the model has.
+    // Sigma and b come first.
     let place = |name: &str| ["sigma", "range"].iter().position(|start| name.starts_with(start)).unwrap_or(2);
     let mut all: Vec<(&String, &f64)> = fit.parameters.iter().collect();
     all.sort_by_key(|(name, _)| place(name));
     all.into_iter().map(one).collect::<Vec<_>>().join(",  ")
 }
 
-/// Symbol and unit of a parameter as it is set in text.
+/// Symbol and unit of a parameter, as set in text.
 fn symbol(name: &str) -> (String, &'static str) {
     let units = [("_m2", "m²"), ("_m", "m"), ("_deg", "°")];
     let (stem, unit) =
@@ -119,10 +151,10 @@ fn explanation(fit: &FitFile) -> String {
     let trim = fit.trim.filter(|t| t.level > 0.0);
     let trim = trim.map_or_else(String::new, |t| format!(", {} of the residuals trimmed", set::percent(t.level, 1)));
     let model = match fit.mode.as_str() {
-        "paper" => "The published fit compares the model with the data as it is.",
-        _ => "The model, detrended, went through the same as the data.",
+        "paper" => "The published method fits the model without detrending it.",
+        _ => "\"Model, detrended\" has the same detrending and trimming as the data.",
     };
-    format!("Measured: heights less a moving average{window}{trim}. {model}")
+    format!("Measured: heights minus a moving average{window}{trim}. {model}")
 }
 
 fn seen() -> Stroke {
@@ -142,12 +174,12 @@ fn legend(fit: &FitFile) -> Vec<Entry> {
     ]
 }
 
-/// Lags with a value each.
+/// Lags with their finite values.
 fn curve(lags_m: &[f64], values: &[f64]) -> Vec<(f64, f64)> {
     lags_m.iter().copied().zip(values.iter().copied()).filter(|(x, y)| x.is_finite() && y.is_finite()).collect()
 }
 
-/// Least and largest of values, zero among them.
+/// Smallest and largest of the values and zero.
 fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
     values.filter(|v| v.is_finite()).fold((0.0, 0.0), |(low, high), v| (f64::min(low, v), f64::max(high, v)))
 }
@@ -179,7 +211,7 @@ fn covariance(fit: &FitFile, id: &str) -> Plot {
     plot
 }
 
-/// Mean square increments `2 [C(0) - C(h)]` at lags above zero; none without a lag of zero.
+/// Mean squared increments `2 [C(0) - C(h)]` at lags above zero; empty without a lag of zero.
 fn increments(lags_m: &[f64], covariance_m2: &[f64]) -> Vec<(f64, f64)> {
     let Some((&0.0, &variance_m2)) = lags_m.first().zip(covariance_m2.first()) else { return Vec::new() };
     let of = |(lag, covariance): (f64, f64)| (lag, 2.0 * (variance_m2 - covariance));
@@ -276,7 +308,7 @@ mod tests {
     #[test]
     fn val_increments_are_twice_the_loss_of_covariance() {
         assert_eq!(increments(&[0.0, 1.0, 2.0], &[1.0, 0.75, 0.5]), [(1.0, 0.5), (2.0, 1.0)]);
-        // Without a variance there is no increment, and covariances above it have none.
+        // No increments without a variance, nor for covariances above it.
         assert!(increments(&[1.0, 2.0], &[1.0, 0.5]).is_empty());
         assert!(increments(&[0.0, 1.0], &[1.0, 1.5]).is_empty());
     }
@@ -295,10 +327,10 @@ mod tests {
         assert_well_formed(&svg);
         let words = ["snow &amp; ice.tif", "lag, m", "covariance, m²", "structure function, m²", "90°", "σ = 1.00 m"];
         words.into_iter().for_each(|word| assert!(svg.contains(word), "{word}"));
-        assert!(svg.contains("9.00 m², above the frame"), "a surface model beyond the frame is said");
+        assert!(svg.contains("9.00 m², above the frame"), "a surface model beyond the frame is noted");
     }
 
-    /// A range at the bound of the search is a lower limit where the quoted interval has one, else not identified.
+    /// A range at the bound of the search is a lower limit if the quoted interval has one, otherwise not identified.
     #[test]
     fn val_a_range_at_the_bound_is_not_drawn_as_an_estimate() {
         let ends = |low| [("range_m".to_owned(), [low, None])].into();

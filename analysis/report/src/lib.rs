@@ -1,17 +1,46 @@
 //! The report of a release: one self-contained HTML page that needs no network, every figure as an SVG file, and the
 //! numbers behind every figure as JSON.
 //!
+//! [`render`](fn@render) and [`render_with`] write a report:
+//!
+//! 1. [`data::Data::open`] reads the tables of the release; rasters and samples follow when a figure needs them.
+//! 2. Each question of [`questions::ALL`] answers with [`content::Block`]s: text, figures and tables with their
+//!    [`content::Numbers`], and the query that returns these numbers. A question without data has no section.
+//! 3. [`render::html::page`](render::html::page()) sets the page; every figure also goes to `figures/*.svg`, its numbers to
+//!    `data/*.json`.
+//! 4. The folder is completed under another name and put in place at the end, so that a report is complete or absent.
+//!
+//! ```
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let folder = tempfile::tempdir()?;
+//! let [release, report] = ["release", "report"].map(|name| folder.path().join(name));
+//! std::fs::create_dir(&release)?;
+//! std::fs::write(release.join("study.toml"), "[study]\nname = \"snow\"\ntitle = \"Snow & ice\"\nseed = 7\n")?;
+//!
+//! let summary = sastrugi_report::render(&release, &report, &|step| println!("{step}"))?;
+//! let page = std::fs::read_to_string(report.join("index.html"))?;
+//! assert!(page.contains("<h1>Snow &amp; ice</h1>"));
+//! // Nothing was measured, generated or driven: a head without sections, figures and numbers.
+//! assert!(!page.contains("<section"));
+//! assert_eq!((summary.files.len(), summary.bytes), (1, page.len() as u64));
+//! # Ok(())
+//! # }
+//! ```
+//!
+//! Modules and other pictures:
+//!
 //! * [`questions`]: one folder per question that the page answers (query, figure, table), listed in one registry.
-//! * [`papers`]: published figures as data.
-//! * [`releases`]: two releases beside each other, for the page and for the verb `compare`.
+//! * [`papers`]: published values as data.
+//! * [`releases`]: comparison of two releases, for the page and for the verb `compare`.
 //! * [`fit_svg`] and [`fit_png`]: the picture of one fit file, for the verb `fit`.
-//! * [`RoutePicture`]: that of one route, for the verb `navigate`.
-//! * [`mod@render`]: drawing, which knows nothing of what it draws.
-//! * [`data`]: the only way to the release's rows and files.
+//! * [`RoutePicture`]: the picture of one route, for the verb `navigate`.
+//! * [`mod@render`]: drawing, independent of what is drawn.
+//! * [`data`]: the only access to the release's rows and files.
 //!
 //! No kernel runs here: spectra, histograms, covariances, backgrounds, residuals, images and class maps are read as a stage
-//! stored them; shading and rendering a thinned relief, and the difference of two stored rasters on the cells of one, count as drawing. Medians and intervals come from `sastrugi-statistics`. The same release gives the same bytes:
-//! there is no clock in this room, and threads change no byte.
+//! stored them. Shading and rendering a thinned relief, and differencing two stored rasters on the cells of one, count as
+//! drawing. Medians and intervals come from `sastrugi-statistics`. The same release gives the same bytes: this crate reads no
+//! clock, and its output does not depend on threads.
 
 pub mod content;
 pub mod data;
@@ -31,9 +60,9 @@ pub use fit_figure::{fit_png, fit_svg};
 pub use route_figure::RoutePicture;
 pub use write::{Summary, render, render_with};
 
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 
-/// What a release is compared with in its report.
+/// Data with which the report compares a release.
 #[derive(Clone, Debug, Default)]
 pub struct Companions {
     /// Another release.
@@ -42,30 +71,30 @@ pub struct Companions {
     pub logs: Vec<PathBuf>,
 }
 
-/// Why a report could not be made.
+/// Why a report could not be written.
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The folder holds neither a study file nor tables.
-    #[error("{path}: no release: there is neither study.toml nor tables/ in it")]
+    #[error("{path} is not a release: it has neither study.toml nor tables/")]
     NotARelease {
         /// The folder.
         path: PathBuf,
     },
-    /// The folder is a part of a release.
-    #[error("{path}: one shard of a release; join the shards first: `sastrugi merge SHARD... -o RELEASE`")]
+    /// The folder is one shard of a release.
+    #[error("{path} is one shard of a release; merge the shards first: `sastrugi merge SHARD... -o RELEASE`")]
     Shard {
         /// The folder.
         path: PathBuf,
     },
-    /// The folder to write holds other files, and is left alone.
-    #[error("{}: it holds {}, which is not of a report; choose another folder with -o", path.display(), file.display())]
+    /// The output path is a file, or a folder that contains other files; it is left alone.
+    #[error("{}; choose another folder with -o", occupied(path, file.as_deref()))]
     Occupied {
-        /// The folder.
+        /// The folder, or the file in its place.
         path: PathBuf,
-        /// What is in the way.
-        file: PathBuf,
+        /// What is in the way in the folder; `None` if `path` is a file.
+        file: Option<PathBuf>,
     },
-    /// The report could not be given its name.
+    /// The report could not be moved into place.
     #[error(transparent)]
     Place(#[from] sastrugi_store::release::ReleaseError),
     /// A file could not be written.
@@ -73,10 +102,10 @@ pub enum ReportError {
     Write {
         /// The file.
         path: PathBuf,
-        /// What the system said.
+        /// The system's error.
         source: std::io::Error,
     },
-    /// A file of the release is there but cannot be read.
+    /// A file of the release exists but cannot be read.
     #[error("read {path} of the release: {reason}")]
     Read {
         /// Path in the release.
@@ -84,16 +113,16 @@ pub enum ReportError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The release to compare with is there but cannot be used.
-    #[error("{path}, which the release is compared with: {reason}")]
+    /// The release to compare with exists but cannot be used.
+    #[error("compare with the release {path}: {reason}")]
     Other {
         /// Its folder.
         path: PathBuf,
         /// What is wrong with it.
         reason: String,
     },
-    /// A file is no table of analysed logs.
-    #[error("{reason}; `--logs` takes the table `logs` that `sastrugi analyze -o LOGS.parquet` writes")]
+    /// A file is not a table of analysed logs.
+    #[error("{reason}; `--logs` takes tables written by `sastrugi analyze -o LOGS.parquet`")]
     Logs {
         /// The file, and what is wrong with it.
         reason: String,
@@ -101,13 +130,13 @@ pub enum ReportError {
     /// A picture could not be encoded.
     #[error("encode a picture: {0}")]
     Picture(#[from] png::EncodingError),
-    /// A figure could not be drawn as pixels.
+    /// A figure could not be rasterised.
     #[error("draw a figure as PNG: {0}")]
     Raster(String),
 }
 
 impl ReportError {
-    /// True when the release is the cause (missing or unusable), not the place of the report.
+    /// True when the cause is a missing or unusable input, not the output folder.
     pub fn unusable_input(&self) -> bool {
         matches!(
             self,
@@ -115,13 +144,21 @@ impl ReportError {
         )
     }
 
-    /// The same about the release to compare with.
-    fn of_other(self, path: &std::path::Path) -> Self {
+    /// The same error, about the release to compare with.
+    fn of_other(self, path: &Path) -> Self {
         match self {
             Self::Read { path: file, reason } => {
                 Self::Other { path: path.to_owned(), reason: format!("{file}: {reason}") }
             }
             other => other,
         }
+    }
+}
+
+/// What is in the way of a report.
+fn occupied(path: &Path, file: Option<&Path>) -> String {
+    match file {
+        Some(file) => format!("{} contains {}, which is not part of a report", path.display(), file.display()),
+        None => format!("{} is a file, not a folder", path.display()),
     }
 }

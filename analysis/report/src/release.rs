@@ -1,4 +1,4 @@
-//! Reading of an assembled release, sealed or not: the only file that calls `sastrugi-store` for reading.
+//! Reading of an assembled release, sealed or not. This is the only file that reads through `sastrugi-store`.
 
 use crate::data::{Against, Artifact, Data, Files, Study};
 use crate::{Companions, ReportError};
@@ -14,7 +14,7 @@ use std::fmt::Display;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
 
-/// Folders that hold data: what a page counts is the same before and after sealing.
+/// Folders with data, so that the counts on the page are the same before and after sealing.
 const DATA_FOLDERS: [&str; 10] =
     ["classes", "dem", "fit", "image", "mcap", "photoclinometry", "route", TABLES, "terrain", "texture"];
 const STUDY: &str = "study.toml";
@@ -23,7 +23,8 @@ impl Data {
     /// Reads the tables of a release.
     ///
     /// # Errors
-    /// [`ReportError::NotARelease`] for a folder that is none, [`ReportError::Shard`] for a part of one; a file that is there but cannot be read.
+    /// [`ReportError::NotARelease`] for a folder that is not a release, [`ReportError::Shard`] for a shard of one; a file that exists but
+    /// cannot be read.
     pub fn open(folder: &Path) -> Result<Self, ReportError> {
         let release = Release { folder: folder.to_owned() };
         if folder.join(SHARD).is_file() {
@@ -79,7 +80,7 @@ impl Data {
     /// Reads a release and what it is compared with.
     ///
     /// # Errors
-    /// As [`Self::open`], for either release; a file that is no table of logs.
+    /// As [`Self::open`], for either release; a file that is not a table of logs.
     pub fn open_with(folder: &Path, companions: &Companions) -> Result<Self, ReportError> {
         let name = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let other = |path: &PathBuf| -> Result<Against, ReportError> {
@@ -98,7 +99,7 @@ impl Data {
     }
 }
 
-/// The manifest, checked; none before a release is sealed.
+/// The manifest, checked; `None` before a release is sealed.
 fn manifest_in(folder: &Path) -> Result<Option<Manifest>, ReportError> {
     if !folder.join(MANIFEST).is_file() {
         return Ok(None);
@@ -107,7 +108,7 @@ fn manifest_in(folder: &Path) -> Result<Option<Manifest>, ReportError> {
     Ok(Some(sealed.manifest().clone()))
 }
 
-/// Path and hash of a file whose content is hashed.
+/// Path and content hash of a file; `None` if its content is not hashed.
 fn content(artifact: &manifest::Artifact) -> Option<(String, String)> {
     Some((artifact.path.clone(), artifact.origin.content_sha256.clone()?))
 }
@@ -148,7 +149,7 @@ impl Files for Release {
 }
 
 impl Release {
-    /// Reads a file if it is there. A path that would leave the release is no file of it.
+    /// Reads a file if it exists. A path that leads out of the release counts as missing.
     fn read<T, E: Display>(&self, path: &str, read: impl Fn(&Path) -> Result<T, E>) -> Result<Option<T>, ReportError> {
         let inside = Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));
         let file = self.folder.join(path);
@@ -167,13 +168,13 @@ impl Release {
         self.text(path)?.map(parse).transpose()
     }
 
-    /// Rows of a terrain in a table with a file for each; none when the release does not have it.
+    /// Rows of a terrain, in a table with one file per terrain; empty if the release does not have the file.
     fn rows_of<R: Record>(&self, terrain_id: &str) -> Result<Vec<R>, ReportError> {
         let path = format!("{TABLES}/{}/part-{terrain_id}.parquet", R::TABLE.name);
         Ok(self.read(&path, parquet::read_table)?.unwrap_or_default())
     }
 
-    /// All rows of a table, sorted by key; none when the release does not have it.
+    /// All rows of a table, sorted by key; empty if the release does not have it.
     fn rows<R: Record>(&self) -> Result<Vec<R>, ReportError> {
         let mut rows = Vec::new();
         let files = self.files_below(&format!("{TABLES}/{}", R::TABLE.name))?;
@@ -194,7 +195,7 @@ impl Release {
         Ok(artifacts)
     }
 
-    /// Paths of the files below a folder, in order; none when there is no such folder.
+    /// Paths of the files below a folder, in order; empty if there is no such folder.
     fn files_below(&self, folder: &str) -> Result<Vec<String>, ReportError> {
         let full = self.folder.join(folder);
         if !full.is_dir() {
@@ -219,7 +220,7 @@ fn read_error(path: &str, error: impl Display) -> ReportError {
     ReportError::Read { path: path.to_owned(), reason: error.to_string() }
 }
 
-/// `[study]`, `[roughness]` and the hypotheses of a study file; what it does not say is empty.
+/// `[study]`, `[roughness]` and the hypotheses of a study file; keys that it lacks are empty.
 fn study(toml: &str) -> Result<Study, String> {
     let document: toml_edit::DocumentMut = toml.parse().map_err(|e: toml_edit::TomlError| e.to_string())?;
     let item = |key: &str| document.get("study").and_then(|s| s.get(key));
@@ -237,7 +238,7 @@ fn study(toml: &str) -> Result<Study, String> {
     })
 }
 
-/// Names of creators, which are texts or tables.
+/// Names of creators, which are strings or tables.
 fn creators(item: &toml_edit::Item) -> Vec<String> {
     let name = |value: &toml_edit::Value| {
         let named = value.as_inline_table().and_then(|table| table.get("name"));
@@ -248,7 +249,7 @@ fn creators(item: &toml_edit::Item) -> Vec<String> {
     values.chain(tables.filter_map(|table| Some(table.get("name")?.as_str()?.to_owned()))).collect()
 }
 
-/// `[roughness]` of a study file; keys that it does not state are the defaults.
+/// `[roughness]` of a study file; keys that it lacks have their defaults.
 fn roughness(document: &toml_edit::DocumentMut) -> Result<RoughnessSection, String> {
     let table = document.get("roughness").and_then(|item| item.as_table_like());
     let stated = table.into_iter().flat_map(|table| table.iter());
@@ -269,7 +270,7 @@ fn hypotheses(document: &toml_edit::DocumentMut) -> Result<Vec<HypothesisItem>, 
     tables.map(item).collect()
 }
 
-/// A value of a hypothesis: text, number, list of these.
+/// A value of a hypothesis: string, number, or list of these.
 fn json(value: &toml_edit::Value) -> serde_json::Value {
     match value {
         toml_edit::Value::String(v) => v.value().as_str().into(),

@@ -1,11 +1,11 @@
-//! Two releases beside each other, figure by figure and group by group: what the verb `compare` and the report's section on another
-//! release both say.
+//! Comparison of two releases, quantity by quantity and group by group, for the verb `compare` and for the report's section on
+//! another release.
 //!
-//! Terrains are the units: a terrain's value is the mean over its missions (of success: of all; of other figures: of the
-//! successful ones). Where all terrains of the smaller group are in both releases, with equal heights or from the same random draws
-//! under one id, these are compared in pairs; other groups as independent samples. Tests and shifts are
-//! those of [`Difference`], adjusted by Holm over all figures; a difference of means whose interval of coverage `1 - 2 alpha` lies
-//! within the margin is none that matters (two one-sided tests).
+//! Terrains are the units: a terrain's value is the mean over its missions (success: all missions; other metrics: successful
+//! missions only). If all terrains of the smaller group are in both releases, with equal heights or from the same random draws
+//! under one id, they are compared in pairs; other groups are compared as independent samples. Tests and shifts are those of
+//! [`Difference`], with Holm's adjustment over all quantities. A difference of means whose interval of coverage `1 - 2 alpha` lies
+//! within the margin does not matter (two one-sided tests).
 
 use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::study::Statistic;
@@ -17,13 +17,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Name of the random streams.
 pub const STREAMS: &str = "compare";
-/// Margin of equivalence: a share of the other release's mean; of success and the shares of classes, of one.
+/// Margin of equivalence: a share of the other release's mean; for success and class shares, a share of one.
 pub const MARGIN: f64 = 0.05;
 
-/// A figure of a terrain: column, scale of the margin, value.
+/// A quantity of a terrain: column, scale of the margin, value.
 type OfTerrain = (&'static str, Option<f64>, fn(&TerrainRow) -> f64);
 
-/// Figures of a terrain, with the scale of the margin where it is not the mean.
+/// Quantities of a terrain, with the scale of the margin if it is not the mean.
 const OF_TERRAINS: [OfTerrain; 7] = [
     ("relief_m", None, |t| t.relief_m),
     ("rms_height_m", None, |t| t.rms_height_m),
@@ -34,31 +34,31 @@ const OF_TERRAINS: [OfTerrain; 7] = [
     ("psd_slope", None, |t| t.psd_slope),
 ];
 
-/// How figures are judged.
+/// Settings of the verdicts.
 #[derive(Clone, Copy, Debug)]
 pub struct Settings {
-    /// Difference of means that counts as none, as [`MARGIN`].
+    /// Difference of means that does not matter, as [`MARGIN`].
     pub margin: f64,
     /// Probability of any false "different", and of each false "same".
     pub alpha: f64,
 }
 
-/// A figure of a group in two releases, A and B. Values are one per terrain; differences are B less A.
+/// A quantity of a group in two releases, A and B. There is one value per terrain; differences are B minus A.
 #[derive(Clone, Debug, Serialize)]
 pub struct Quantity {
     /// Table.
     pub table: &'static str,
-    /// Label of the group, with the variant and the run where there are several.
+    /// Label of the group, with the variant, and with the run if there are several.
     pub group: String,
     /// Column, or `success`.
     pub figure: &'static str,
-    /// Unit of the figure.
+    /// Unit of the column.
     pub unit: &'static str,
-    /// Terrains in A and B that were compared.
+    /// Number of terrains in A and B that were compared.
     pub terrains: [usize; 2],
     /// True when terrains are compared in pairs.
     pub paired: bool,
-    /// Terrains of A and B that have no partner and were left out.
+    /// Number of terrains in A and B that have no partner and were left out.
     pub left_out: [usize; 2],
     /// True when all terrains have the same values in both.
     pub equal: bool,
@@ -66,21 +66,21 @@ pub struct Quantity {
     pub a: f64,
     /// Mean of B.
     pub b: f64,
-    /// Hodges and Lehmann's shift, with an interval of coverage `1 - alpha`; an end that the terrains do not tell is null.
+    /// Hodges and Lehmann's shift, with an interval of coverage `1 - alpha`; an unbounded end is null.
     pub shift: Option<[f64; 3]>,
     /// Cliff's delta, with an interval of coverage `1 - alpha`.
     pub delta: Option<[f64; 3]>,
     /// Difference of means.
     pub difference: f64,
-    /// Its interval with coverage `1 - 2 alpha`, by which `same` is decided.
+    /// Its interval with coverage `1 - 2 alpha`, which decides `same`.
     pub interval: Option<[f64; 2]>,
-    /// Differences of means up to this count as none.
+    /// Largest difference of means that does not matter.
     pub margin: Option<f64>,
-    /// Of the rank test.
+    /// p of the rank test.
     pub p: Option<f64>,
-    /// The same after Holm, over all figures of the comparison.
+    /// The same after Holm's adjustment over all quantities of the comparison.
     pub p_adjusted: Option<f64>,
-    /// Of the two one-sided tests.
+    /// p of the two one-sided tests.
     pub p_equivalence: Option<f64>,
     /// Same: equal, or within the margin. Different: by the adjusted `p`, and not shown to be the same.
     pub answer: Answer,
@@ -89,7 +89,7 @@ pub struct Quantity {
 /// Sum and number of finite values.
 type Mean = (f64, usize);
 
-/// Where rows are compared.
+/// Key under which rows are compared.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 struct Place {
     table: &'static str,
@@ -98,23 +98,23 @@ struct Place {
     run: Option<String>,
 }
 
-/// Values of a figure.
+/// Values of a quantity.
 #[derive(Clone, Debug)]
 struct Figure {
     unit: &'static str,
-    /// Scale of the margin, where it is not the mean.
+    /// Scale of the margin, if it is not the mean.
     scale: Option<f64>,
     by_terrain: BTreeMap<String, Mean>,
 }
 
-/// Figures by column.
+/// Quantities by column.
 type ByFigure = BTreeMap<&'static str, Figure>;
 
-/// Figures of a release, summed row by row: memory grows with the terrains, not with the missions.
+/// Quantities of a release, summed row by row: memory grows with the terrains, not with the missions.
 #[derive(Clone, Debug, Default)]
 pub struct Figures {
     values: BTreeMap<Place, ByFigure>,
-    /// Label, hash of the heights and words of the random streams of every terrain.
+    /// Label, hash of the heights and name of the random stream of every terrain.
     terrains: BTreeMap<String, Terrain>,
 }
 
@@ -126,7 +126,7 @@ struct Terrain {
 }
 
 impl Figures {
-    /// Adds a terrain, with the hash of its heights where the release states it. Before the missions on it.
+    /// Adds a terrain, with the hash of its heights if the release states it. Must precede the missions on it.
     pub fn add_terrain(&mut self, row: &TerrainRow, content: Option<&str>) {
         let (table, label) = (TerrainRow::TABLE.name, crate::data::label(row).to_owned());
         let place = Place { table, label: label.clone(), variant: row.variant.clone(), run: None };
@@ -179,13 +179,13 @@ impl Figures {
         places.len() < self.values.len()
     }
 
-    /// Figures by place; without its run where there is one alone.
+    /// Quantities by place, without the run unless `with_runs`.
     fn by_place(&self, with_runs: bool) -> BTreeMap<Place, &ByFigure> {
         let of = |place: &Place| Place { run: place.run.clone().filter(|_| with_runs), ..place.clone() };
         self.values.iter().map(|(place, figures)| (of(place), figures)).collect()
     }
 
-    /// True when a terrain is the same in both, or made from the same random draws.
+    /// True when a terrain is the same in both, or comes from the same random draws.
     fn shares_ground(&self, other: &Self, terrain: &str) -> bool {
         let same = |a: &Option<String>, b: &Option<String>| a.is_some() && a == b;
         let both = self.terrains.get(terrain).zip(other.terrains.get(terrain));
@@ -201,7 +201,7 @@ impl Place {
     }
 }
 
-/// Every figure that both releases have, and the groups that only A and only B has.
+/// Every quantity that both releases have, and the groups that only A and only B has.
 pub fn compare(a: &Figures, b: &Figures, settings: Settings, streams: &Streams) -> (Vec<Quantity>, [Vec<String>; 2]) {
     let with_runs = a.has_several_runs() || b.has_several_runs();
     let (of_a, of_b) = (a.by_place(with_runs), b.by_place(with_runs));
@@ -233,7 +233,7 @@ pub fn compare(a: &Figures, b: &Figures, settings: Settings, streams: &Streams) 
     (quantities, [alone(&of_a, &of_b), alone(&of_b, &of_a)])
 }
 
-/// Values of both releases: of the terrains that they share, or of each.
+/// Values of both releases: of the terrains that they share, or of all.
 struct Sides {
     first: Vec<f64>,
     second: Vec<f64>,
@@ -262,7 +262,7 @@ fn unit<R: Record>(column: &str) -> &'static str {
     R::TABLE.columns.iter().find(|c| c.name == column).map_or("1", |c| c.unit)
 }
 
-/// A figure without its answer, which needs all of them.
+/// A quantity without its answer, which needs all of them.
 fn quantity(
     place: &Place,
     (name, figure): (&'static str, &Figure),
@@ -310,7 +310,7 @@ fn quantity(
     }
 }
 
-/// Answers: equal values are the same; so are means within the margin; other figures are different by the adjusted `p`.
+/// Sets the answers: equal values are the same, and so are means within the margin; other quantities are different by the adjusted `p`.
 fn judge(quantities: &mut [Quantity], alpha: f64) {
     let p: Vec<f64> = quantities.iter().map(|q| q.p.unwrap_or(f64::NAN)).collect();
     for (quantity, adjusted) in quantities.iter_mut().zip(holm(&p)) {
@@ -329,7 +329,7 @@ mod tests {
 
     const COLUMNS: [&str; 4] = ["a", "b", "c", "d"];
 
-    /// Normal values of mean 10 of four figures on terrains whose random streams are named by `seed`, raised by `shift`.
+    /// Normal values with mean 10 of four quantities, on terrains whose random streams are named by `seed`, raised by `shift`.
     fn drawn(terrains: usize, seed: u64, shift: f64) -> Figures {
         let mut stream = Streams::for_seed(seed, "drawn").stream("values");
         let mut figures = Figures::default();
@@ -349,11 +349,11 @@ mod tests {
         compare(a, b, Settings { margin: 0.05, alpha: 0.05 }, &Streams::for_seed(1, "compare")).0
     }
 
-    /// Null: both releases have normal values of one distribution, 7 terrains each, four figures. Statistic: comparisons
+    /// Null: both releases have normal values from one distribution, 7 terrains each, four quantities. Statistic: comparisons
     /// with any "different" among 200, each with probability 0.05 at most. More than 27 have a probability below 1e-6; a
-    /// test that took the figures one by one (rate 0.19) would give some 37.
+    /// test without adjustment (rate 0.19) would give about 37.
     #[test]
-    fn stat_any_difference_is_found_seldom_where_there_is_none() {
+    fn stat_differences_are_rarely_found_under_the_null() {
         let any = |k: u64| {
             let found = compared(&drawn(7, 2 * k + 10, 0.0), &drawn(7, 2 * k + 11, 0.0));
             found.iter().any(|q| q.answer == Answer::Different)
@@ -379,7 +379,7 @@ mod tests {
         // Two of 2^20 arrangements of signs are as extreme; of the 9999 that are drawn none is expected.
         assert!(above.iter().all(|q| q.paired && q.p.is_some_and(|p| p <= 3e-4)), "{above:?}");
         assert!(all(above, Answer::Different) && all(below, Answer::Same));
-        // Other terrains: too few to tell, far apart, and a single one.
+        // Different terrains: too few to tell, far apart, and a single one.
         assert!(all(compared(&drawn(4, 2, 0.0), &drawn(4, 3, 0.0)), Answer::CannotTell));
         let apart = compared(&a, &drawn(20, 2, 5.0));
         assert!(apart.iter().all(|q| !q.paired) && all(apart, Answer::Different));
@@ -387,7 +387,38 @@ mod tests {
         assert!(one.iter().all(|q| q.p == Some(1.0) && q.p_equivalence.is_none()) && all(one, Answer::CannotTell));
     }
 
-    /// A release with more terrains than the other, and one in which a figure lacks on a terrain: those that both have are pairs.
+    /// Two of three missions arrive, with pitch rates of 10 and 20 deg/s: success is 200 / 3 %, the pitch rate 15 deg/s, whatever the rate
+    /// of the mission that was stuck. Margins are 5 points of success and 5 % of the mean.
+    #[test]
+    fn val_a_terrain_counts_by_the_mean_of_its_missions() {
+        let mut data = crate::tests::made_up::full(1, 24);
+        let (terrain, mission) = (data.terrains.swap_remove(0), data.missions.swap_remove(0));
+        let mission = MissionRow { variant: None, ..mission };
+        let figures = |pitch: [f64; 3]| {
+            let mut figures = Figures::default();
+            figures.add_terrain(&terrain, Some("hash"));
+            for (outcome, rms_pitch_rate_deg_s) in ["success", "success", "stuck"].into_iter().zip(pitch) {
+                let (terrain_id, outcome, group) = (terrain.terrain_id.clone(), outcome.into(), Some("g".into()));
+                let row = MissionRow { terrain_id, outcome, group, rms_pitch_rate_deg_s, ..mission.clone() };
+                figures.add_mission(&row);
+            }
+            figures
+        };
+        let of = |quantities: &[Quantity], name: &str| quantities.iter().find(|q| q.figure == name).unwrap().clone();
+        let same = compared(&figures([10.0, 20.0, 90.0]), &figures([10.0, 20.0, 30.0]));
+        assert!(same.iter().all(|q| q.equal && q.answer == Answer::Same), "{same:?}");
+        let (success, pitch) = (of(&same, "success"), of(&same, "rms_pitch_rate_deg_s"));
+        assert!((success.a - 200.0 / 3.0).abs() < 1e-12 && (pitch.a - 15.0).abs() < 1e-12, "{success:?} {pitch:?}");
+        assert!((success.margin.unwrap() - 5.0).abs() < 1e-12 && (pitch.margin.unwrap() - 0.75).abs() < 1e-12);
+        assert_eq!((success.table, success.group.as_str(), success.unit, pitch.unit), ("missions", "g", "%", "deg/s"));
+        let relief = of(&same, "relief_m");
+        assert_eq!((relief.table, relief.a, relief.unit), ("terrains", terrain.relief_m, "m"));
+        // Differences are B minus A.
+        let pitch = of(&compared(&figures([10.0, 20.0, 0.0]), &figures([16.0, 20.0, 0.0])), "rms_pitch_rate_deg_s");
+        assert!((pitch.difference - 3.0).abs() < 1e-12 && pitch.terrains == [1, 1] && pitch.paired && !pitch.equal);
+    }
+
+    /// A release with more terrains than the other, and one that lacks a value on one terrain: terrains that both have are pairs.
     #[test]
     fn val_shared_terrains_are_pairs() {
         let (few, more) = (drawn(12, 1, 0.0), drawn(20, 1, 0.0));
@@ -404,17 +435,17 @@ mod tests {
         assert_eq!(found, [(true, 11, false), (true, 12, true), (true, 12, true), (true, 12, true)]);
     }
 
-    /// One terrain in common of many: the others are not left out.
+    /// Only one terrain of many in common: the others are not left out.
     #[test]
-    fn val_groups_that_share_few_terrains_are_apart() {
+    fn val_groups_that_share_few_terrains_are_not_paired() {
         let (a, mut b) = (drawn(20, 1, 0.0), drawn(20, 2, 0.0));
         b.terrains.insert("t-0000".into(), a.terrains["t-0000"].clone());
         assert!(compared(&a, &b).iter().all(|q| !q.paired && q.terrains == [20, 20] && !q.equal));
     }
 
-    /// Every terrain later by the same little: a difference that is found, within the margin.
+    /// Every terrain is raised by the same small amount: a significant difference, but within the margin.
     #[test]
-    fn val_a_constant_difference_within_the_margin_is_none() {
+    fn val_a_constant_difference_within_the_margin_counts_as_the_same() {
         let (a, mut b) = (drawn(20, 1, 0.0), drawn(20, 1, 0.0));
         for figure in b.values.values_mut().flat_map(BTreeMap::values_mut) {
             figure.by_terrain.values_mut().for_each(|(sum, _)| *sum += 0.05);
@@ -424,9 +455,9 @@ mod tests {
         }
     }
 
-    /// Runs of other names are one another's while there is one in each release, and are told apart where there are two.
+    /// Runs with different names are compared if each release has one, and are kept separate if there are two.
     #[test]
-    fn val_runs_are_told_apart_where_there_are_several() {
+    fn val_several_runs_are_kept_separate() {
         let renamed = |run: &str| {
             let mut figures = drawn(5, 1, 0.0);
             let old = std::mem::take(&mut figures.values);

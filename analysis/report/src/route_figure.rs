@@ -1,4 +1,4 @@
-//! The picture of one route: the path as the search found it and as it was smoothed, on the shaded relief, with obstacles.
+//! The picture of one route: the searched and the smoothed path over the shaded relief, with obstacles.
 
 use crate::ReportError;
 use crate::content::slug;
@@ -11,27 +11,27 @@ use sastrugi_numeric::Grid;
 
 /// Width of the map, px.
 const WIDTH: f64 = 640.0;
-/// Free space about the map, px.
+/// Free space around the map, px.
 const GAP: f64 = 14.0;
-/// Room of title and figures above the map, px.
+/// Room for title and numbers above the map, px.
 const HEAD: f64 = 52.0;
 /// Size of the title, px.
 const TITLE: f64 = 15.0;
-/// Most pixels of the relief along a side.
+/// Largest number of pixels of the relief along a side.
 const PIXELS: usize = 900;
 /// Marks on maps do not follow the theme.
 const DARK: Paint = Paint::Fixed([0x1b, 0x20, 0x26]);
 const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
 const BLOCKED: Paint = Paint::Fixed([0x8a, 0x1f, 0x1f]);
 
-/// What is drawn. Points are in the coordinates of the heights, m.
+/// Content of the picture. Points are in the coordinates of the heights, m.
 #[derive(Clone, Copy, Debug)]
 pub struct RoutePicture<'a> {
     /// Heights, m.
     pub heights: &'a Grid,
-    /// RMS slope of the heights, by which the relief is exaggerated.
+    /// RMS slope of the heights, which sets the exaggeration of the relief.
     pub rms_slope: f64,
-    /// The path as the search found it.
+    /// The path before smoothing.
     pub searched: &'a [[f64; 3]],
     /// The smoothed path.
     pub smoothed: &'a [[f64; 3]],
@@ -39,7 +39,7 @@ pub struct RoutePicture<'a> {
     pub obstacles: &'a [Vec<[f64; 2]>],
     /// Title.
     pub title: &'a str,
-    /// Length, cost and slopes, in a line.
+    /// Length, cost and slopes, in one line.
     pub words: &'a str,
 }
 
@@ -48,6 +48,28 @@ impl RoutePicture<'_> {
     ///
     /// # Errors
     /// When the relief cannot be drawn.
+    ///
+    /// ```
+    /// use sastrugi_numeric::{Geometry, Grid};
+    /// use sastrugi_report::RoutePicture;
+    ///
+    /// let heights = Grid::filled(Geometry::square(20, 30, 1.0), 5.0);
+    /// let path = [[2.5, 2.5, 5.0], [22.5, 17.5, 5.0]];
+    /// let picture = RoutePicture {
+    ///     heights: &heights,
+    ///     rms_slope: 0.0,
+    ///     searched: &path,
+    ///     smoothed: &path,
+    ///     obstacles: &[],
+    ///     title: "level ground",
+    ///     words: "25 m",
+    /// };
+    /// let svg = picture.svg()?;
+    /// assert!(svg.contains(">level ground<") && svg.contains(">start<"));
+    /// // The legend names only what is drawn.
+    /// assert!(!svg.contains(">obstacle<"));
+    /// # Ok::<(), sastrugi_report::ReportError>(())
+    /// ```
     pub fn svg(&self) -> Result<String, ReportError> {
         let range = self.heights.range().unwrap_or((0.0, 0.0));
         let picture = picture::relief(self.heights, range, exaggeration(self.rms_slope), PIXELS)?;

@@ -1,4 +1,4 @@
-//! From a release to the files of its report.
+//! Writes the files of a report.
 
 use crate::content::{Block, Figure, Numbers, Section, TableBlock, slug};
 use crate::data::Data;
@@ -9,10 +9,11 @@ use crate::{Companions, ReportError};
 use sastrugi_store::atomic::{self, Draft};
 use sastrugi_store::release::Staging;
 use std::collections::BTreeSet;
+use std::fs::DirEntry;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-/// What a report consists of.
+/// Files of a report.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct Summary {
     /// Names of the figures: each is `figures/<name>.svg` and `data/<name>.json`.
@@ -24,20 +25,36 @@ pub struct Summary {
 }
 
 /// Writes the report of the release at `release` into the folder `out`: `index.html`, `figures/*.svg`, `data/*.json`.
-/// The release need not be sealed. The folder appears whole or not at all; a report that is there is replaced.
-/// `progress` hears a few words before each part.
+/// The release need not be sealed. The folder is written completely or not at all; an existing report is replaced.
+/// `progress` is called with a few words before each part.
 ///
 /// # Errors
-/// A folder `out` that holds anything but a report; a file of the release that is there but cannot be read; a file that cannot be written. What a release does not have is
-/// no error: the page leaves it out.
+/// A file `out`, or a folder that contains anything but a report; a file of the release that exists but cannot be read; a file that
+/// cannot be written. Missing parts of a release are not an error: the page leaves them out.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_report::{ReportError, render};
+///
+/// let folder = tempfile::tempdir()?;
+/// std::fs::write(folder.path().join("study.toml"), "[study]\nname = \"snow\"\n")?;
+/// let thesis = tempfile::tempdir()?;
+/// std::fs::write(thesis.path().join("thesis.tex"), "mine")?;
+///
+/// let refused = render(folder.path(), thesis.path(), &|_| ()).unwrap_err();
+/// assert!(matches!(refused, ReportError::Occupied { .. }) && refused.to_string().contains("thesis.tex"));
+/// assert_eq!(std::fs::read_to_string(thesis.path().join("thesis.tex"))?, "mine");
+/// # Ok(())
+/// # }
+/// ```
 pub fn render(release: &Path, out: &Path, progress: &dyn Fn(&str)) -> Result<Summary, ReportError> {
     render_with(release, &Companions::default(), out, progress)
 }
 
-/// As [`render`], with sections that compare the release with others.
+/// As [`render`], with sections that compare the release with another release and with logs.
 ///
 /// # Errors
-/// As [`render`]; a companion that is missing or is not what it should be.
+/// As [`render`]; a companion that is missing or unusable.
 pub fn render_with(
     release: &Path,
     companions: &Companions,
@@ -48,7 +65,7 @@ pub fn render_with(
     write(&Data::open_with(release, companions)?, out, progress)
 }
 
-/// The report of rows that are already read.
+/// Writes the report of data that are already read.
 pub(crate) fn write(data: &Data, out: &Path, progress: &dyn Fn(&str)) -> Result<Summary, ReportError> {
     let out = &std::path::absolute(out).map_err(|source| ReportError::Write { path: out.to_owned(), source })?;
     check_place(out)?;
@@ -73,17 +90,12 @@ pub(crate) fn write(data: &Data, out: &Path, progress: &dyn Fn(&str)) -> Result<
     Ok(summary)
 }
 
-/// Refuses a place that holds anything but a report.
+/// Refuses a file, and a folder that contains anything but a report.
 fn check_place(out: &Path) -> Result<(), ReportError> {
-    let occupied = |file: PathBuf| ReportError::Occupied { path: out.to_owned(), file };
-    let entries = |folder: &Path| match std::fs::read_dir(folder) {
-        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Vec::new()),
-        Err(e) if e.kind() == ErrorKind::NotADirectory => Err(occupied(PathBuf::new())),
-        listed => listed
-            .and_then(Iterator::collect::<Result<Vec<_>, _>>)
-            .map_err(|source| ReportError::Write { path: folder.to_owned(), source }),
-    };
-    for entry in entries(out)? {
+    let occupied = |file: PathBuf| ReportError::Occupied { path: out.to_owned(), file: Some(file) };
+    // The output path, or the folder that it should be in, is a file.
+    let file = || out.ancestors().find(|path| path.exists()).unwrap_or(out).to_owned();
+    for entry in entries(out)?.ok_or_else(|| ReportError::Occupied { path: file(), file: None })? {
         let name = entry.file_name();
         let ending = match name.to_str() {
             Some("index.html") if entry.path().is_file() => continue,
@@ -91,13 +103,23 @@ fn check_place(out: &Path) -> Result<(), ReportError> {
             Some("data") => "json",
             _ => return Err(occupied(name.into())),
         };
-        let foreign =
-            entries(&entry.path())?.into_iter().find(|e| e.path().extension().is_none_or(|own| own != ending));
+        let inside = entries(&entry.path())?.ok_or_else(|| occupied(name.clone().into()))?;
+        let foreign = inside.into_iter().find(|e| e.path().extension().is_none_or(|own| own != ending));
         if let Some(foreign) = foreign {
             return Err(occupied(Path::new(&name).join(foreign.file_name())));
         }
     }
     Ok(())
+}
+
+/// Entries of a folder, none if it does not exist; `None` if the path is that of a file, or leads through one.
+fn entries(folder: &Path) -> Result<Option<Vec<DirEntry>>, ReportError> {
+    match std::fs::read_dir(folder).and_then(Iterator::collect::<Result<Vec<_>, _>>) {
+        Ok(entries) => Ok(Some(entries)),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(Some(Vec::new())),
+        Err(e) if e.kind() == ErrorKind::NotADirectory => Ok(None),
+        Err(source) => Err(ReportError::Write { path: folder.to_owned(), source }),
+    }
 }
 
 /// The folder being written.
@@ -137,7 +159,7 @@ impl Folder<'_> {
     }
 }
 
-/// Gives every figure and table a name that is a file name and occurs once.
+/// Gives every figure and table a unique name that is valid as a file name.
 fn name_once(sections: &mut [Section]) {
     let mut taken = BTreeSet::new();
     let mut rename = |id: &mut String| {
@@ -165,7 +187,7 @@ fn head(data: &Data) -> Head {
         ("licence", study.license.clone()),
         ("creators", study.creators.join(", ")),
         ("program", data.version.clone()),
-        ("hash of the study", data.study_sha256.clone()),
+        ("SHA-256 of the study", data.study_sha256.clone()),
     ];
     let known = facts.into_iter().filter(|(_, value)| !value.is_empty());
     Head {
@@ -176,8 +198,8 @@ fn head(data: &Data) -> Head {
     }
 }
 
-/// What is in the release, in figures; kinds it does not hold are left out. Of files those that hold data alone: the report is none of
-/// its own counts, and documents come when the release is sealed.
+/// Counts of what the release has; kinds that it lacks are left out. Only data files are counted: the report is not part of its own
+/// counts, and documents are added when the release is sealed.
 fn key_figures(data: &Data) -> Vec<(String, String)> {
     let stage = |name: &str| data.of_stage(name).count();
     let recordings = data.artifacts.iter().filter(|a| a.path.ends_with(".mcap")).count();
@@ -187,16 +209,12 @@ fn key_figures(data: &Data) -> Vec<(String, String)> {
         (data.fits.len(), "covariance fit"),
         (stage("texture"), "texture"),
         (data.routes.len(), "route"),
-        (data.formations.len(), "run of a team"),
+        (data.formations.len(), "team run"),
         (data.missions.len(), "mission"),
         (recordings, "MCAP recording"),
         (data.artifacts.len(), "data file"),
     ];
-    let plural = |n: usize, what: &str| match what {
-        _ if n == 1 => what.to_owned(),
-        "run of a team" => "runs of teams".to_owned(),
-        _ => format!("{what}s"),
-    };
+    let plural = |n: usize, what: &str| if n == 1 { what.to_owned() } else { format!("{what}s") };
     let named = |(n, what): (usize, &str)| (set::count(n), plural(n, what));
     let mut figures: Vec<(String, String)> = counts.into_iter().filter(|(n, _)| *n > 0).map(named).collect();
     let bytes: u64 = data.artifacts.iter().map(|a| a.bytes).sum();
@@ -204,4 +222,45 @@ fn key_figures(data: &Data) -> Vec<(String, String)> {
         figures.push((set::bytes(bytes), "of data".into()));
     }
     figures
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::data::Artifact;
+
+    /// Names that are equal, or empty once they are valid as file names, are numbered over all sections.
+    #[test]
+    fn val_names_are_unique_and_valid() {
+        let table = |id: &&str| {
+            let numbers = Numbers::new("", &[]);
+            Block::FoldedTable(TableBlock { id: (*id).to_owned(), caption: String::new(), numbers })
+        };
+        let section = |ids: &[&str]| {
+            let blocks = ids.iter().map(table).chain([Block::Text("a".into())]).collect();
+            Section { id: "section", name: "", title: "", blocks }
+        };
+        let mut sections = [section(&["a", "A", "a-2"]), section(&["a", "../", "??"])];
+        name_once(&mut sections);
+        let name = |block: &Block| match block {
+            Block::FoldedTable(table) => Some(table.id.clone()),
+            _ => None,
+        };
+        let names: Vec<String> = sections.iter().flat_map(|section| &section.blocks).filter_map(name).collect();
+        assert_eq!(names, ["a", "a-2", "a-2-2", "a-3", "unnamed", "unnamed-2"]);
+    }
+
+    /// Counts on the head of the page; what there is none of is left out.
+    #[test]
+    fn val_the_head_counts_what_there_is() {
+        let mut data = crate::tests::made_up::empty();
+        assert!(key_figures(&data).is_empty());
+        let full = crate::tests::made_up::full(1, 24);
+        data.missions = full.missions[..2].to_vec();
+        data.fits = full.fits[..1].to_vec();
+        let artifact = |path: &str, bytes| Artifact { path: path.into(), bytes };
+        data.artifacts = vec![artifact("mcap/a/b.mcap", 1_000_000), artifact("fit/a.json", 234_000)];
+        let counts: Vec<String> = key_figures(&data).into_iter().map(|(n, what)| format!("{n} {what}")).collect();
+        assert_eq!(counts, ["1 covariance fit", "2 missions", "1 MCAP recording", "2 data files", "1.23 MB of data"]);
+    }
 }

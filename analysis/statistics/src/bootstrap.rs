@@ -1,5 +1,4 @@
-//! Bootstrap intervals for samples that come in clusters (missions of one terrain resemble each other, so the terrain
-//! is what is drawn anew).
+//! Bootstrap intervals for clustered samples (missions on one terrain resemble each other, so terrains are resampled).
 
 use sastrugi_numeric::{Stream, sums};
 
@@ -12,13 +11,13 @@ pub struct Interval {
     pub low: f64,
     /// Upper end.
     pub high: f64,
-    /// Nominal coverage, as 0.95.
+    /// Nominal coverage, such as 0.95.
     pub level: f64,
 }
 
 impl Interval {
-    /// Percentile interval (Davison and Hinkley, 1997, section 5.3.1) from bootstrap values of a statistic. Values that are
-    /// not finite (a redraw without what the statistic needs) are left out; `None` when that is more than half of them.
+    /// Percentile interval (Davison and Hinkley, 1997, section 5.3.1) from bootstrap values of a statistic. Non-finite values
+    /// (replicates for which the statistic is undefined) are left out; `None` if they are more than half.
     pub fn percentile(estimate: f64, replicates: &[f64], level: f64) -> Option<Self> {
         let mut sorted = sums::finite(replicates);
         if sorted.is_empty() || 2 * sorted.len() < replicates.len() {
@@ -30,15 +29,14 @@ impl Interval {
         Some(Self { estimate, low, high, level })
     }
 
-    /// True when the value lies in the interval, ends included.
+    /// True if the value lies in the interval, ends included.
     pub fn holds(&self, value: f64) -> bool {
         self.low <= value && value <= self.high
     }
 }
 
-/// Any statistic of samples that consist of clusters, on `replicates` redraws: for each of the independent samples, whose
-/// numbers of clusters are given, as many cluster numbers as it has, drawn with replacement. A sample without clusters
-/// draws none.
+/// Evaluates a statistic of clustered samples on `replicates` bootstrap replicates. `samples` are the numbers of clusters of each
+/// independent sample; for each, that many cluster indices are drawn with replacement (none for a sample without clusters).
 pub fn redraw<T>(
     samples: &[usize],
     replicates: usize,
@@ -53,8 +51,23 @@ pub fn redraw<T>(
     (0..replicates).map(|_| once()).collect()
 }
 
-/// Percentile cluster-bootstrap interval (Davison and Hinkley, 1997, section 3.8) of a statistic of the numbers of the clusters
-/// in each sample (each number once: the estimate). Fewer than about ten clusters give intervals that are too short. `None` when any sample has fewer than two clusters, or by [`Interval::percentile`].
+/// Percentile cluster-bootstrap interval (Davison and Hinkley, 1997, section 3.8) of a statistic of the cluster indices of each
+/// sample; the estimate uses each index once. With fewer than about ten clusters the intervals are too short. `None` if any sample has
+/// fewer than two clusters, or as for [`Interval::percentile`].
+///
+/// ```
+/// use sastrugi_numeric::{Streams, sums};
+/// use sastrugi_statistics::cluster_interval;
+///
+/// // Mean distance over the missions of five terrains: terrains are resampled, with all their missions.
+/// let terrains = [[10.0, 12.0], [30.0, 28.0], [21.0, 19.0], [15.0, 15.0], [24.0, 26.0]];
+/// let mut stream = Streams::for_seed(1, "example").stream("bootstrap");
+/// let mean = |drawn: &[Vec<usize>]| sums::mean(&drawn[0].iter().flat_map(|&k| terrains[k]).collect::<Vec<_>>());
+/// let found = cluster_interval(&[terrains.len()], 500, 0.95, &mut stream, mean).unwrap();
+/// assert!((found.estimate - 20.0).abs() < 1e-12 && found.holds(found.estimate));
+/// // No replicate can leave the range of the terrains' means.
+/// assert!(found.low >= 11.0 && found.high <= 29.0);
+/// ```
 pub fn cluster_interval(
     samples: &[usize],
     replicates: usize,
@@ -99,7 +112,8 @@ mod tests {
         assert_eq!(cluster_median(&[vec![], vec![f64::NAN], vec![1.0]], 100, 0.95, &mut stream("empty")), None);
     }
 
-    /// By hand: 0..=100 leaves 2.5 % outside of 2.5 and 97.5; of NaN and 1, half is enough, of NaN, NaN and 1 it is not.
+    /// By hand: for 0..=100, 2.5 % lie beyond each of 2.5 and 97.5. Of NaN and 1, half is finite, which is enough; of NaN, NaN and 1 it
+    /// is not.
     #[test]
     fn val_percentiles_and_missing_values() {
         let values: Vec<f64> = (0..=100).map(f64::from).collect();
@@ -111,7 +125,7 @@ mod tests {
         assert_eq!(Interval::percentile(1.0, &[], 0.9), None);
     }
 
-    /// Two samples are drawn apart from each other, each with its own number of clusters.
+    /// Samples are resampled independently, each with its own number of clusters.
     #[test]
     fn prop_samples_keep_their_sizes() {
         let sizes = |drawn: &[Vec<usize>]| {
@@ -120,6 +134,18 @@ mod tests {
         };
         assert!(redraw(&[3, 5, 0], 50, &mut stream("sizes"), sizes).iter().all(|s| *s == (3, 5, 0)));
         assert_eq!(cluster_interval(&[3, 1], 9, 0.9, &mut stream("few"), |_| 1.0), None);
+    }
+
+    /// Every index of a sample is drawn equally often, with replacement. Null: probability 1/4 each, 4 x 5000 draws; bound 5 standard deviations
+    /// of a count, sqrt(20 000 x 3/16) = 61 (false alarm 4 x 6e-7). All four are drawn in 4!/4^4 = 9.4 % of the replicates: 469, standard
+    /// deviation 21, bound 5 of these.
+    #[test]
+    fn stat_draws_are_uniform_and_with_replacement() {
+        let drawn = redraw(&[4], 5000, &mut stream("uniform"), |drawn| drawn[0].clone());
+        let count = |k: usize| drawn.iter().flatten().filter(|c| **c == k).count();
+        assert!((0..4).all(|k| count(k).abs_diff(5000) <= 305), "{:?}", [0, 1, 2, 3].map(count));
+        let complete = drawn.iter().filter(|d| (0..4).all(|k| d.contains(&k))).count();
+        assert!(complete.abs_diff(469) <= 105, "{complete}");
     }
 
     /// Null: 20 clusters of 10, cluster means N(0, 1), values N(mean, 1); true median 0. 300 samples, 200 replicates.

@@ -1,5 +1,5 @@
-//! How much of a variance belongs to groups, to members within groups, and to repeats of one member: two nested random
-//! factors.
+//! Variance components of two nested random factors: between groups, between members of a group, and between repeats of a
+//! member.
 //!
 //! Model: `y_ijk = mu + a_i + b_ij + e_ijk` for group `i` of `a` (a terrain), member `j` of its `b_i` (a mission), repeat `k` of
 //! `n_ij` (a start), with independent effects of mean 0 and variances `A`, `B`, `E`. Estimators of the analysis of variance
@@ -13,8 +13,8 @@
 //! k12 = sum n_ij^2 / n_i,   k1 = sum n_i^2 / N,   k3 = sum n_ij^2 / N
 //! ```
 //!
-//! They are unbiased whatever the distribution, so they hold for outcomes that are 0 or 1, where `E` is the mean of
-//! `p (1 - p)` over the members. Being unbiased they can be negative where the truth is near 0. Cost: one pass.
+//! They are unbiased for any distribution, including outcomes that are 0 or 1, where `E` is the mean of
+//! `p (1 - p)` over the members. Because they are unbiased, they can be negative if the true value is near 0. Cost: one pass.
 
 /// Estimates of the three variances, in squared units of the values. Any may be negative.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -27,7 +27,7 @@ pub struct Components {
     pub repeat: f64,
 }
 
-/// What a group contributes: sums add, so that groups can be drawn anew without their values.
+/// Sums of one group, sufficient for the estimates, so that groups can be resampled without their values.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Group {
     /// Values.
@@ -62,7 +62,17 @@ impl Group {
 }
 
 impl Components {
-    /// Estimates from groups; `None` unless there are two groups, a group with two members, and a member with two repeats.
+    /// Estimates from groups; `None` unless there are at least two groups, a group with two members, and a member with two repeats.
+    ///
+    /// ```
+    /// use sastrugi_statistics::{Components, components::Group};
+    ///
+    /// // Two terrains with two missions of two starts each; starts do not scatter.
+    /// let terrains = [[vec![1.0; 2], vec![3.0; 2]], [vec![11.0; 2], vec![13.0; 2]]].map(|missions| Group::of(&missions));
+    /// let found = Components::of(&terrains).unwrap();
+    /// // Missions have the variance 2. Terrains' means 2 and 12 have the variance 50, of which 2 / 2 comes from their missions.
+    /// assert_eq!((found.group, found.member, found.repeat), (49.0, 2.0, 0.0));
+    /// ```
     pub fn of(groups: &[Group]) -> Option<Self> {
         let known: Vec<&Group> = groups.iter().filter(|g| g.count > 0.0).collect();
         let total = |f: fn(&Group) -> f64| known.iter().map(|g| f(g)).sum::<f64>();
@@ -80,8 +90,8 @@ impl Components {
         Some(Self { group, member, repeat })
     }
 
-    /// Variance between the members of a group and between the repeats of a member, of one group or several; `None` unless a group
-    /// has two members and a member two repeats.
+    /// Variances between the members of a group and between the repeats of a member, from one or more groups; `None` unless a group
+    /// has at least two members and a member two repeats.
     pub fn within_groups(groups: &[Group]) -> Option<(f64, f64)> {
         let known: Vec<&Group> = groups.iter().filter(|g| g.count > 0.0).collect();
         let total = |f: fn(&Group) -> f64| known.iter().map(|g| f(g)).sum::<f64>();
@@ -94,7 +104,7 @@ impl Components {
         Some((member, repeat))
     }
 
-    /// Shares of the total in 0..1, negative estimates counted as 0: group, member, repeat. `None` when nothing varies.
+    /// Shares of the total in 0..1, with negative estimates counted as 0: group, member, repeat. `None` if nothing varies.
     pub fn shares(&self) -> Option<[f64; 3]> {
         let parts = [self.group, self.member, self.repeat].map(|v| v.max(0.0));
         let total: f64 = parts.iter().sum();
@@ -141,7 +151,7 @@ mod tests {
         }
     }
 
-    /// Coefficients of unbalanced data against expectations taken term by term: the three sums of squares are quadratic forms
+    /// Coefficients for unbalanced data against expectations computed term by term: the three sums of squares are quadratic forms
     /// y'Qy, whose expectation is the trace of Q times the covariance of y. Tolerance 1e-12.
     #[test]
     fn val_unbalanced_estimates_are_unbiased() {
@@ -215,9 +225,9 @@ mod tests {
     }
 
     /// Null: the estimators are unbiased. 400 data sets of 20 terrains, 10 missions, 6 starts; the mean of each estimate over
-    /// the sets lies within 5 standard errors (from the scatter of the sets) of its truth. False alarm 3 x 6e-7 = 2e-6
+    /// the sets lies within 5 standard errors (from the scatter of the sets) of the true value. False alarm 3 x 6e-7 = 2e-6
     /// (normal). Standard errors are 5e-4, 4e-4 and 5e-4, so that a bias of 6 % of any component is
-    /// caught.
+    /// detected.
     #[test]
     fn stat_components_of_outcomes_are_recovered() {
         let mut s = Streams::for_seed(1, "components-test").stream("outcomes");

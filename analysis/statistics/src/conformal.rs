@@ -1,33 +1,42 @@
-//! Where one new value lies among values that are nested in terrains.
+//! Conformal p-value of one new value among values that are nested in terrains.
 //!
-//! If the value comes from one more terrain, drawn as the others were, and is drawn on it as theirs on them, then
+//! If the value comes from one more terrain, with terrain and value drawn from the same distributions as the others, then
 //!
 //! ```text
 //! p above = (1 + sum over terrains of the share of their values >= the new one) / (terrains + 1)
 //! ```
 //!
-//! is below `a` with probability `a` at most, whatever the distributions (Y. Lee, R. Barber and R. Willett, Distribution-free inference
-//! with hierarchical data, Journal of the Royal Statistical Society B, 2025); and likewise below. Terrains count, not the values on
-//! them: `p` is never under 1 / (terrains + 1).
+//! is below `a` with probability at most `a`, whatever the distributions (Y. Lee, R. Barber and R. Willett, Distribution-free inference
+//! with hierarchical data, Journal of the Royal Statistical Society B, 2025); likewise for `p below`. The number of terrains matters, not
+//! that of values on them: `p` is never below 1 / (terrains + 1).
 
 use crate::bootstrap::Interval;
 use crate::proportion;
 
-/// A value's place.
+/// Position of a value among those of the terrains.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
-    /// Share of the values below it, terrains weighing the same and equal values counting half, with an interval.
+    /// Share of the values below it, with its interval; terrains have equal weight and equal values count half.
     pub share_below: Interval,
-    /// Probability of a value so high.
+    /// Probability of a value at least as high.
     pub p_above: f64,
-    /// Probability of a value so low.
+    /// Probability of a value at least as low.
     pub p_below: f64,
     /// Terrains with values.
     pub terrains: usize,
 }
 
 impl Place {
-    /// Of a value among those of each terrain. `None` when no terrain has any, or the value is not finite.
+    /// Position of a value among those of each terrain. `None` if no terrain has any, or the value is not finite.
+    ///
+    /// ```
+    /// use sastrugi_statistics::Place;
+    ///
+    /// // Above everything on nineteen terrains, which is the most that nineteen terrains can show.
+    /// let place = Place::of(5.0, &vec![vec![1.0, 2.0]; 19], 0.95).unwrap();
+    /// assert_eq!((place.p_above, place.p_below, place.p()), (0.05, 1.0, 0.1));
+    /// assert_eq!(place.p(), place.least_p());
+    /// ```
     pub fn of(value: f64, terrains: &[Vec<f64>], level: f64) -> Option<Self> {
         let known: Vec<&Vec<f64>> = terrains.iter().filter(|t| !t.is_empty()).collect();
         let shares = |counts: &dyn Fn(f64) -> f64| -> Vec<f64> {
@@ -42,12 +51,12 @@ impl Place {
         Some(Self { share_below, p_above, p_below, terrains: known.len() })
     }
 
-    /// Probability of a value so far out, on either side.
+    /// Two-sided p-value: probability of a value at least as extreme.
     pub fn p(&self) -> f64 {
         (2.0 * self.p_above.min(self.p_below)).min(1.0)
     }
 
-    /// The least p that any value could have.
+    /// The smallest p that any value could have.
     pub fn least_p(&self) -> f64 {
         2.0 / (self.terrains as f64 + 1.0)
     }
@@ -58,7 +67,7 @@ mod tests {
     use super::*;
     use sastrugi_numeric::Streams;
 
-    /// By hand: of the first terrain half is below and half equal, of the second all is above.
+    /// By hand: of the first terrain's values half are below and half equal, of the second's all are above.
     #[test]
     fn val_by_hand() {
         let place = Place::of(2.0, &[vec![1.0, 2.0], vec![], vec![3.0; 3]], 0.95).unwrap();
@@ -69,8 +78,8 @@ mod tests {
     }
 
     /// Null: the value is drawn on one more terrain. Two-sided p at 5 %, 2000 sets each of 3, 20 and 60 terrains with 1 and 20 values, scatter
-    /// between terrains 1, within 1. More than 151 of 2000 has a false-alarm probability of 4e-7 (binomial, p = 0.05). With 60 terrains of one value
-    /// the test is exact but for its steps of 2 / 61: fewer than 57 hits has one of 7e-7. A rank among 20 x 20 values taken as
+    /// between terrains 1, within 1. More than 151 of 2000 has a false-alarm probability of 4e-7 (binomial, p = 0.05). With 60 terrains of one
+    /// value the test is exact except for its steps of 2 / 61: fewer than 57 hits has one of 7e-7. A rank among 20 x 20 values treated as
     /// independent would be wrong in 12 %.
     #[test]
     fn stat_level() {

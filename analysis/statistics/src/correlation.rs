@@ -2,8 +2,17 @@
 
 use sastrugi_numeric::sums;
 
-/// Pearson's (1895) product-moment correlation of the pairs `(x[i], y[i])`; the longer slice is cut. NaN for fewer than two
-/// pairs or a constant side.
+/// Pearson's (1895) product-moment correlation of the pairs `(x[i], y[i])`; the longer slice is truncated. NaN for fewer than two
+/// pairs or if one side is constant.
+///
+/// ```
+/// use sastrugi_statistics::correlation::{pearson, spearman};
+///
+/// // A cube is not a straight line, but it keeps the order.
+/// let (x, y) = ([1.0, 2.0, 3.0], [1.0, 8.0, 27.0]);
+/// assert!(pearson(&x, &y) < 1.0);
+/// assert_eq!(spearman(&x, &y), 1.0);
+/// ```
 pub fn pearson(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
     let (x, y) = (centred(&x[..n]), centred(&y[..n]));
@@ -12,13 +21,13 @@ pub fn pearson(x: &[f64], y: &[f64]) -> f64 {
     if r.is_finite() { r.clamp(-1.0, 1.0) } else { f64::NAN }
 }
 
-/// Spearman's (1904) rank correlation: Pearson's of the ranks, ties sharing their mean rank.
+/// Spearman's (1904) rank correlation: Pearson's correlation of the ranks, with mean ranks for ties.
 pub fn spearman(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
     pearson(&ranks(&x[..n]), &ranks(&y[..n]))
 }
 
-/// Ranks from 1; equal values share their mean rank.
+/// Ranks from 1; equal values get their mean rank.
 pub fn ranks(values: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..values.len()).collect();
     order.sort_by(|&a, &b| values[a].total_cmp(&values[b]));
@@ -50,7 +59,7 @@ mod tests {
         assert!((spearman(&x, &y) - 0.818_18).abs() < 5e-6);
     }
 
-    /// scipy 1.17.1, stats.pearsonr and stats.spearmanr (`tests/statistical/nested_tests.py`). Tolerance 1e-14.
+    /// Against scipy 1.17.1, stats.pearsonr and stats.spearmanr (`tests/statistical/nested_tests.py`). Tolerance 1e-14.
     #[test]
     fn val_of_scipy() {
         let (x, y) = ([62.0, 71.5, 55.0, 80.0, 66.5], [58.0, 49.0, 71.5, 40.5, 55.0]);
@@ -64,5 +73,9 @@ mod tests {
         assert!(pearson(&[1.0, 1.0], &[1.0, 2.0]).is_nan());
         assert!(pearson(&[], &[]).is_nan());
         assert_eq!(spearman(&[1.0, 2.0, 3.0], &[1.0, 8.0, 27.0]), 1.0);
+        // The longer side is cut, whichever it is; one pair is too few.
+        let (short, long) = ([0.0, 1.0, 2.0], [4.0, 2.0, 0.0, 99.0]);
+        assert_eq!((pearson(&short, &long), spearman(&long, &short)), (-1.0, -1.0));
+        assert!(pearson(&[1.0], &[2.0]).is_nan() && spearman(&[3.0, 3.0], &[1.0, 2.0]).is_nan());
     }
 }

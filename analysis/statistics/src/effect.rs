@@ -1,4 +1,4 @@
-//! How large a difference is: Hodges and Lehmann's shift and Cliff's delta, with intervals that hold for few terrains too.
+//! Effect sizes: Hodges and Lehmann's shift and Cliff's delta, with intervals that are valid even for few terrains.
 //!
 //! ```text
 //! shift          median of y_j - x_i over all pairs       J. Hodges and E. Lehmann, Annals of Mathematical Statistics 34, 1963
@@ -7,29 +7,30 @@
 //! paired delta   #(d_i > 0) - #(d_i < 0), / n
 //! ```
 //!
-//! The shift has the unit of the values; delta is a pure number, 1 when every `y` is above every `x`. They are the
-//! estimates that go with the rank-sum and the signed-rank test. Values are one per terrain, or differences one per
+//! The shift has the unit of the values; delta is dimensionless, 1 if every `y` is above every `x`. They are the
+//! estimates that correspond to the rank-sum and the signed-rank test. Input is one value per terrain, or one difference per
 //! block. Cost: `O(n log n)` for sorting, and some 20 passes (about 60 with many ties) to find one of the ordered pairs
 //! without listing them.
 //!
 //! Intervals of the shift are the shifts that the rank test for values without ties does not reject (Hodges and Lehmann; M. Hollander,
 //! D. Wolfe and E. Chicken, Nonparametric Statistical Methods, 2014, sections 3.3 and 4.3): from the `k`-th smallest to the `k`-th
-//! largest difference, or without an end where so few values reject none. Ties make them wider. They hold the truth with the level at least
-//! (with that of the normal approximation for many values) where the groups differ by a shift; of groups with other scatter, and the
-//! more so where the smaller one scatters more, they and those of delta hold it less often. Those of delta are R. Newcombe's (Statistics in Medicine 25, 2006, part 2, method 5):
+//! largest difference, or unbounded if the values are too few to reject any shift. Ties make them wider. If the groups differ by a shift,
+//! their coverage is at least the nominal level (that of the normal approximation for many values). If the groups also differ in scatter,
+//! the coverage of these intervals and of those of delta is lower, above all if the smaller group scatters more. Intervals of delta are
+//! R. Newcombe's (Statistics in Medicine 25, 2006, part 2, method 5):
 //!
 //! ```text
 //! (t - t')^2 = z^2 t (1 - t) / (n m)  (1 + ((n + m) / 2 - 1) ((1 - t) / (2 - t) + t / (1 + t))),   t = (1 + delta) / 2
 //! ```
 //!
-//! solved for `t` on both sides of its estimate `t'`; of pairs those of a mean of signs, [`crate::proportion`]. Percentile redraws of
-//! few terrains hold it far less often, and are a point where all terrains go one way.
+//! solved for `t` on both sides of its estimate `t'`; for pairs, those of a mean of signs, [`crate::proportion`]. Percentile bootstrap
+//! intervals from few terrains have far lower coverage, and collapse to a point if all terrains agree in direction.
 
 use crate::bootstrap::Interval;
 use crate::rank_distribution::{rank_sum_below, signed_rank_below};
 use crate::{normal, proportion};
 
-/// Passes of a bisection after which ties are looked for.
+/// Passes of a bisection after which ties are resolved.
 const PASSES: usize = 50;
 
 /// A difference between two groups, from the first to the second.
@@ -42,7 +43,17 @@ pub struct Effect {
 }
 
 impl Effect {
-    /// Of two independent groups, intervals of that coverage. `None` when either is empty.
+    /// For two independent groups; `level` is the coverage of the intervals. `None` if either is empty.
+    ///
+    /// ```
+    /// use sastrugi_statistics::Effect;
+    ///
+    /// // Differences of all pairs: 1, 2, 3, 3, 4, 5. Every value of the second group is higher.
+    /// let effect = Effect::between(&[4.0, 5.0, 6.0], &[7.0, 9.0], 0.95).unwrap();
+    /// assert_eq!((effect.shift.estimate, effect.delta.estimate), (3.0, 1.0));
+    /// // Five values are too few to bound the shift with 95 %.
+    /// assert_eq!(effect.shift.high, f64::INFINITY);
+    /// ```
     pub fn between(first: &[f64], second: &[f64], level: f64) -> Option<Self> {
         let (first, second) = (sorted(first), sorted(second));
         let pairs = Pairs::between(&first, &second)?;
@@ -50,7 +61,7 @@ impl Effect {
         Some(Self { shift: pairs.interval(outside, level), delta: delta_interval(&first, &second, level) })
     }
 
-    /// Of paired groups, from the differences (second less first) within blocks. `None` without blocks.
+    /// For paired groups, from the differences (second minus first) within blocks. `None` without blocks.
     pub fn of_pairs(differences: &[f64], level: f64) -> Option<Self> {
         let (ascending, negated) = mirrored(differences);
         let outside = signed_rank_below(differences.len(), 0.5 * (1.0 - level));
@@ -61,13 +72,13 @@ impl Effect {
     }
 }
 
-/// Shift from the first group to the second; NaN when either is empty.
+/// Shift from the first group to the second; NaN if either is empty.
 pub fn shift(first: &[f64], second: &[f64]) -> f64 {
     let (first, second) = (sorted(first), sorted(second));
     Pairs::between(&first, &second).map_or(f64::NAN, |pairs| pairs.median())
 }
 
-/// Delta from the first group to the second; NaN when either is empty.
+/// Delta from the first group to the second; NaN if either is empty.
 pub fn delta(first: &[f64], second: &[f64]) -> f64 {
     let second = sorted(second);
     let above_less_below = |x: &f64| {
@@ -88,7 +99,7 @@ fn delta_interval(first: &[f64], second: &[f64], level: f64) -> Interval {
             t * (1.0 - t) / (n * m) * (1.0 + (0.5 * (n + m) - 1.0) * ((1.0 - t) / (2.0 - t) + t / (1.0 + t)));
         (t - above) * (t - above) - z * z * variance
     };
-    // Between an end, where the variance is 0, and the estimate lies the one root.
+    // The only root lies between an end, where the variance is 0, and the estimate.
     let end = |end: f64| {
         let (mut outside, mut inside) = (end, above);
         for _ in 0..60 {
@@ -100,13 +111,13 @@ fn delta_interval(first: &[f64], second: &[f64], level: f64) -> Interval {
     Interval { estimate, low: end(0.0).min(estimate), high: end(1.0).max(estimate), level }
 }
 
-/// Shift of paired groups; NaN for no differences.
+/// Shift of paired groups; NaN without differences.
 pub fn paired_shift(differences: &[f64]) -> f64 {
     let (ascending, negated) = mirrored(differences);
     Pairs::within(&negated, &ascending).map_or(f64::NAN, |sums| 0.5 * sums.median())
 }
 
-/// Delta of paired groups; NaN for no differences.
+/// Delta of paired groups; NaN without differences.
 pub fn paired_delta(differences: &[f64]) -> f64 {
     signs(differences).iter().sum::<f64>() / differences.len() as f64
 }
@@ -115,21 +126,21 @@ fn signs(differences: &[f64]) -> Vec<f64> {
     differences.iter().map(|d| f64::from(i8::from(*d > 0.0) - i8::from(*d < 0.0))).collect()
 }
 
-/// Differences in their order, and with their signs turned.
+/// Differences in ascending order, and with their signs reversed, also ascending.
 fn mirrored(differences: &[f64]) -> (Vec<f64>, Vec<f64>) {
     let ascending = sorted(differences);
     let negated = ascending.iter().rev().map(|d| -d).collect();
     (ascending, negated)
 }
 
-/// The differences of all pairs of two ascending slices, in their order but never listed; of one slice and its mirror image, the
+/// The ordered differences of all pairs of two ascending slices, without listing them; for a slice and its mirror image, the
 /// sums of all its pairs `i <= j`.
 struct Pairs<'a> {
     first: &'a [f64],
     second: &'a [f64],
-    /// Sums `i <= j` are half of all sums and half of the doubled values.
+    /// Whether these are sums over `i <= j`: half of all sums plus half of the doubled values.
     sums: bool,
-    /// Least and largest.
+    /// Smallest and largest.
     ends: (f64, f64),
 }
 
@@ -153,8 +164,8 @@ impl<'a> Pairs<'a> {
         if self.sums { (all + self.second.partition_point(|d| d + d <= bound)) / 2 } else { all }
     }
 
-    /// The `k`-th smallest, from 1: bisection finds a bound that parts it from what follows. Ties leave none; then the bound is
-    /// laid onto the difference below it, until this is the one.
+    /// The `k`-th smallest, from 1: bisection finds a bound between it and the next. With ties there is none; the bound is then
+    /// moved to the next difference below until that is the `k`-th.
     fn nth(&self, k: usize) -> f64 {
         let (mut low, mut bound) = (self.ends.0.next_down(), self.ends.1);
         for pass in 0.. {
@@ -187,7 +198,7 @@ impl<'a> Pairs<'a> {
         if self.len() % 2 == 1 || self.at_most(below) > half { below } else { 0.5 * (below + self.nth(half + 1)) }
     }
 
-    /// The median, and the interval that leaves that many out on either side; no end where it leaves out none.
+    /// The median, and the interval that excludes `outside` differences on either side; unbounded if that is 0.
     fn interval(&self, outside: usize, level: f64) -> Interval {
         let (low, high) = match outside {
             0 => (f64::NEG_INFINITY, f64::INFINITY),
@@ -203,8 +214,8 @@ fn sorted(values: &[f64]) -> Vec<f64> {
     sorted
 }
 
-/// Number of pairs with `second - first <= bound`, both ascending. Rounded differences keep their order, so one pass
-/// will do.
+/// Number of pairs with `second - first <= bound`, both ascending. Rounding preserves the order of differences, so one pass
+/// is enough.
 fn at_most(first: &[f64], second: &[f64], bound: f64) -> usize {
     let mut reached = 0;
     let of_one = |x: &f64| {
@@ -216,7 +227,7 @@ fn at_most(first: &[f64], second: &[f64], bound: f64) -> usize {
     first.iter().map(of_one).sum()
 }
 
-/// The largest difference up to the bound.
+/// The largest difference that does not exceed the bound.
 fn largest_up_to(first: &[f64], second: &[f64], bound: f64) -> f64 {
     let mut reached = 0;
     let of_one = |x: &f64| {

@@ -1,18 +1,17 @@
-//! Cumulative incidence of competing endings: the share that has ended in each way up to a distance (or time), when some were
-//! only watched for a part of the way.
+//! Cumulative incidence with competing risks and censoring: the share that has ended by each cause up to a distance (or time).
 //!
 //! The estimator of O. Aalen and S. Johansen, An empirical transition matrix for non-homogeneous Markov chains based on
-//! censored observations, Scandinavian Journal of Statistics 5 (1978). With `n(x)` still under way just before `x`,
-//! `d_k(x)` of them ending in way `k` at `x`, and `d(x)` the sum over `k`:
+//! censored observations, Scandinavian Journal of Statistics 5 (1978). With `n(x)` at risk just before `x`,
+//! `d_k(x)` of them ending by cause `k` at `x`, and `d(x)` the sum over `k`:
 //!
 //! ```text
 //! S(x)   = product over x' <= x of 1 - d(x') / n(x')         (Kaplan and Meier, 1958)
 //! F_k(x) = sum over x' <= x of S(x'-) d_k(x') / n(x')
 //! ```
 //!
-//! so that `S + sum F_k = 1`. One minus the Kaplan-Meier curve of a single way would count what ended otherwise as still able
-//! to end so, and is too high. At equal distances endings come before censorings. Endings at an unknown distance are left
-//! out. Cost: one sort. Subjects that come in clusters: [`clustered`].
+//! so that `S + sum F_k = 1`. One minus the Kaplan-Meier curve of a single cause would treat subjects that ended by another cause as
+//! still at risk, and is too high. At equal distances endings precede censorings. Endings at an unknown distance are left
+//! out. Cost: one sort. For clustered subjects see [`clustered`].
 
 pub mod clustered;
 
@@ -21,7 +20,7 @@ pub mod clustered;
 pub struct Ending {
     /// Distance (or time) at which it ended.
     pub at: f64,
-    /// Number of the way it ended; `None` when it was not watched further (censored).
+    /// Number of the cause; `None` if the subject was censored.
     pub cause: Option<usize>,
 }
 
@@ -30,21 +29,32 @@ pub struct Ending {
 pub struct Incidence {
     /// Distances at which a curve steps, ascending.
     pub at: Vec<f64>,
-    /// For each way to end, its share at and after each step.
+    /// For each cause, its share at and after each step.
     pub shares: Vec<Vec<f64>>,
 }
 
 impl Incidence {
-    /// Aalen-Johansen estimator for `causes` ways to end; an ending of a higher number counts as none of them but leaves the
-    /// risk set as they do.
+    /// Aalen-Johansen estimator for `causes` causes; an ending with a higher cause number is not reported but leaves the
+    /// risk set like the others.
+    ///
+    /// ```
+    /// use sastrugi_statistics::{Ending, Incidence};
+    ///
+    /// // Of four missions one is stuck at 10 m, one is stopped at 20 m for another reason, two arrive at 30 m.
+    /// let missions = [(10.0, Some(1)), (20.0, None), (30.0, Some(0)), (30.0, Some(0))];
+    /// let found = Incidence::of(&missions.map(|(at, cause)| Ending { at, cause }), 2);
+    /// assert_eq!(found.share(1, 15.0), 0.25);
+    /// // Of the 3/4 still under way at 20 m all arrive: the mission stopped there counts like the others.
+    /// assert_eq!((found.share(0, 29.0), found.share(0, 30.0)), (0.0, 0.75));
+    /// ```
     pub fn of(endings: &[Ending], causes: usize) -> Self {
         let mut sorted: Vec<Ending> = endings.iter().copied().filter(|e| e.at.is_finite()).collect();
         sorted.sort_by(|a, b| a.at.total_cmp(&b.at));
         Self::of_counted(sorted.into_iter().map(|ending| (ending, 1)), causes)
     }
 
-    /// The same of endings in the order of their finite distances, each with the number of subjects that ended so: redraws
-    /// keep the order and need no sorting.
+    /// The same from endings sorted by their finite distances, each with its number of subjects; resampling
+    /// keeps the order and needs no sorting.
     pub fn of_counted(sorted: impl IntoIterator<Item = (Ending, usize)>, causes: usize) -> Self {
         let sorted: Vec<(Ending, usize)> = sorted.into_iter().filter(|(_, n)| *n > 0).collect();
         let count = |is: &dyn Fn(&Ending) -> bool, all: &[(Ending, usize)]| {
@@ -69,7 +79,7 @@ impl Incidence {
         incidence
     }
 
-    /// Share that has ended in way `cause` up to `at`, in 0..1.
+    /// Share that has ended by `cause` up to `at`, in 0..1.
     pub fn share(&self, cause: usize, at: f64) -> f64 {
         let steps = self.at.partition_point(|x| *x <= at);
         steps.checked_sub(1).map_or(0.0, |last| self.shares[cause][last])
@@ -86,7 +96,7 @@ mod tests {
         distances.iter().zip(causes).map(ending).collect()
     }
 
-    /// By hand, five subjects: way 1 at 2, censored at 3, way 2 at 3, way 1 at 5, censored at 6. At risk 5, 4, 2: S = 4/5, then
+    /// By hand, five subjects: cause 1 at 2, censored at 3, cause 2 at 3, cause 1 at 5, censored at 6. At risk 5, 4, 2: S = 4/5, then
     /// 3/5, then 3/10; F1 = 1/5, then 1/5 + 3/5 / 2 = 1/2; F2 = 4/5 / 4 = 1/5.
     #[test]
     fn val_by_hand() {
@@ -99,7 +109,7 @@ mod tests {
         assert_eq!((i.share(0, 1.9), i.share(0, 2.0), i.share(1, 99.0)), (0.0, 0.2, i.shares[1][2]));
     }
 
-    /// scikit-survival 0.28.0 on 28 subjects with ties, three ways to end and censoring (lifelines 0.30.3 agrees to 1e-15);
+    /// Against scikit-survival 0.28.0 on 28 subjects with ties, three causes and censoring (lifelines 0.30.3 agrees to 1e-15);
     /// the program is `tests/statistical/aalen_johansen.py`. Tolerance 1e-14.
     #[test]
     fn val_of_an_independent_program() {
@@ -117,13 +127,13 @@ mod tests {
             (35.0, [0.3395648496240602, 0.28603148496240605, 0.12764802631578948]),
         ] {
             for (k, expected) in shares.into_iter().enumerate() {
-                assert!((i.share(k, at) - expected).abs() < 1e-14, "way {k} at {at}: {}", i.share(k, at));
+                assert!((i.share(k, at) - expected).abs() < 1e-14, "cause {k} at {at}: {}", i.share(k, at));
             }
         }
     }
 
     proptest! {
-        /// Without censoring before the end, the share is the plain count; what is under way makes up one with the shares.
+        /// Without censoring before the end, the share is the plain proportion.
         #[test]
         fn prop_without_censoring_shares_are_counts(steps in proptest::collection::vec((0u8..40, 0usize..4), 1..60)) {
             let all: Vec<Ending> = steps
@@ -141,6 +151,28 @@ mod tests {
                 }
             }
         }
+    }
+
+    /// By hand: one of two ends by a cause that is not asked for, which takes it out of the risk set: S = 1/2, then F = 1/2 x 1/1. Counted as
+    /// censored it would give 1, ignored 1 as well.
+    #[test]
+    fn val_other_causes_leave_the_risk_set() {
+        let i = Incidence::of(&[Ending { at: 2.0, cause: Some(0) }, Ending { at: 1.0, cause: Some(5) }], 1);
+        assert_eq!((i.at.as_slice(), i.shares[0].as_slice()), ([1.0, 2.0].as_slice(), [0.0, 0.5].as_slice()));
+    }
+
+    /// A count of n is n subjects, a count of 0 none.
+    #[test]
+    fn prop_counts_are_repetitions() {
+        let sorted = endings(&[1.0, 1.0, 2.0, 3.0, 3.0, 4.0], &[1, 0, 2, 1, 0, 2]);
+        let counts = [2, 1, 3, 0, 2, 1];
+        let counted = Incidence::of_counted(sorted.iter().copied().zip(counts), 2);
+        let repeated = sorted.iter().zip(counts).flat_map(|(e, n)| vec![*e; n]).collect::<Vec<_>>();
+        assert_eq!(counted, Incidence::of(&repeated, 2));
+        // Nine subjects: 2 of 9, then S = 7/9 and 3 of 6.
+        assert_eq!(counted.at, [1.0, 2.0, 4.0]);
+        assert!((counted.share(0, 9.0) - 2.0 / 9.0).abs() < 1e-15);
+        assert!((counted.share(1, 2.0) - 7.0 / 9.0 * 0.5).abs() < 1e-15);
     }
 
     #[test]

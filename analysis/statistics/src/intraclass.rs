@@ -1,13 +1,13 @@
-//! How alike the members of a cluster are: the intraclass correlation, and what it costs.
+//! Intraclass correlation: how alike the members of a cluster are, and the resulting design effect.
 //!
-//! Of values `y_ij` in clusters `i` (rovers of one world), with a variance `A` between clusters and `E` within them,
+//! For values `y_ij` in clusters `i` (rovers of one world), with a variance `A` between clusters and `E` within them,
 //!
 //! ```text
 //! rho = A / (A + E)
 //! ```
 //!
-//! `A` and `E` are the estimates of the analysis of variance for clusters of unequal size ([`components`](crate::components)), so that `rho` can be
-//! negative where clusters differ less than chance would have them. The interval is that of S. Searle (Linear Models, 1971; P. Shrout and
+//! `A` and `E` are the analysis-of-variance estimates for clusters of unequal size ([`components`](crate::components)), so that `rho` can be
+//! negative if clusters differ less than expected by chance. The interval is that of S. Searle (Linear Models, 1971; P. Shrout and
 //! J. Fleiss, Psychological Bulletin 86, 1979, formula for ICC(1,1)):
 //!
 //! ```text
@@ -16,10 +16,10 @@
 //! ```
 //!
 //! with `F_high` and `F'_high` the upper quantiles of Fisher's distribution with `(k - 1, N - k)` and `(N - k, k - 1)` degrees of freedom. It is
-//! exact for normal effects and clusters of one size; for outcomes that are 0 or 1 it is a guide.
+//! exact for normal effects and clusters of equal size; for outcomes that are 0 or 1 it is only a guide.
 //!
-//! The design effect `1 + (m' - 1) rho` with `m' = sum n_i^2 / N` (L. Kish, Survey Sampling, 1965) is the factor on the variance of a mean: `N` values
-//! tell as much as `N` over it independent ones.
+//! The design effect `1 + (m' - 1) rho` with `m' = sum n_i^2 / N` (L. Kish, Survey Sampling, 1965) is the factor by which clustering raises the
+//! variance of a mean: `N` values carry as much information as `N` divided by it independent ones.
 
 use crate::bootstrap::Interval;
 use crate::components::{Components, Group};
@@ -28,18 +28,27 @@ use crate::proportion::beta_quantile;
 /// Intraclass correlation and design effect.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Intraclass {
-    /// Correlation of two values of one cluster, with its interval.
+    /// Correlation of two values of the same cluster, with its interval.
     pub correlation: Interval,
     /// Factor on the variance of the mean of all values; at least 1.
     pub design_effect: f64,
-    /// Values.
+    /// Number of values.
     pub values: usize,
-    /// Clusters with values.
+    /// Number of clusters with values.
     pub clusters: usize,
 }
 
 impl Intraclass {
-    /// From the values of each cluster; `None` unless there are two clusters, one with two values, and something varies.
+    /// From the values of each cluster; `None` unless there are at least two clusters, one of them with two values, and something varies.
+    ///
+    /// ```
+    /// use sastrugi_statistics::Intraclass;
+    ///
+    /// // Three worlds of three rovers that all do the same: nine values carry as much information as three.
+    /// let found = Intraclass::of(&[vec![1.0; 3], vec![2.0; 3], vec![5.0; 3]], 0.95).unwrap();
+    /// assert_eq!((found.correlation.estimate, found.values, found.clusters), (1.0, 9, 3));
+    /// assert_eq!(found.values as f64 / found.design_effect, 3.0);
+    /// ```
     pub fn of(clusters: &[Vec<f64>], level: f64) -> Option<Self> {
         let (member, repeat) = Components::within_groups(&[Group::of(clusters)])?;
         let sizes: Vec<f64> = clusters.iter().filter(|c| !c.is_empty()).map(|c| c.len() as f64).collect();
@@ -61,7 +70,7 @@ impl Intraclass {
     }
 }
 
-/// The value with probability `p` below it of Fisher's distribution, by that of the beta distribution (M. Abramowitz and I. Stegun, 1964, 26.6.2).
+/// Quantile of Fisher's distribution, from that of the beta distribution (M. Abramowitz and I. Stegun, 1964, 26.6.2).
 fn fisher_quantile(p: f64, numerator: f64, denominator: f64) -> f64 {
     let share = beta_quantile(p, 0.5 * numerator, 0.5 * denominator);
     denominator * share / (numerator * (1.0 - share))
@@ -73,7 +82,7 @@ mod tests {
     use sastrugi_numeric::{Stream, Streams};
 
     /// Shrout and Fleiss (1979), Table 2: six targets, four judges. Table 4 and the documentation of R's psych::ICC give ICC(1,1) = 0.17 with the
-    /// 95 % interval -0.13 to 0.72. Digits beyond theirs: `tests/statistical/clustered_tests.py` (scipy 1.17.1). Tolerance 1e-10.
+    /// 95 % interval -0.13 to 0.72. More digits from `tests/statistical/clustered_tests.py` (scipy 1.17.1). Tolerance 1e-10.
     #[test]
     fn val_shrout_and_fleiss() {
         let targets = [
@@ -97,7 +106,7 @@ mod tests {
     const SHROUT: [f64; 4] =
         [0.165_741_768_405_475_44, -0.132_932_324_874_750_98, 0.722_560_062_328_121, 1.497_225_305_216_426_4];
 
-    /// Clusters of 1 to 5 values by `tests/statistical/clustered_tests.py` (scipy 1.17.1): sums of squares and quantiles the obvious way.
+    /// Clusters of 1 to 5 values against a direct implementation in `tests/statistical/clustered_tests.py` (scipy 1.17.1).
     /// Tolerance 1e-10.
     #[test]
     fn val_unequal_clusters_of_scipy() {
@@ -119,13 +128,29 @@ mod tests {
     const UNEQUAL: [f64; 4] =
         [0.853_393_808_105_425_4, 0.507_089_305_945_411_9, 0.981_899_996_912_566_9, 3.275_716_821_614_465_4];
 
+    /// Fisher's distribution with (1, n) degrees of freedom is that of the square of Student's t with n, with (2, n) it has a closed form, with
+    /// (n, n) its median is 1 (M. Abramowitz and I. Stegun, 1964, 26.6). Relative tolerance 1e-10.
+    #[test]
+    fn val_fisher_quantiles() {
+        let close = |value: f64, expected: f64| assert!((value / expected - 1.0).abs() < 1e-10, "{value} {expected}");
+        for n in [2.0, 5.0, 17.0, 80.0] {
+            for p in [0.05, 0.5, 0.9, 0.975] {
+                let t = crate::student::quantile(0.5 + 0.5 * p, n);
+                close(fisher_quantile(p, 1.0, n), t * t);
+                close(fisher_quantile(p, 2.0, n), 0.5 * n * (libm::pow(1.0 - p, -2.0 / n) - 1.0));
+                close(fisher_quantile(p, n, 7.0) * fisher_quantile(1.0 - p, 7.0, n), 1.0);
+            }
+            close(fisher_quantile(0.5, n, n), 1.0);
+        }
+    }
+
     #[test]
     fn val_degenerate_clusters() {
         assert_eq!(Intraclass::of(&[], 0.95), None);
         assert_eq!(Intraclass::of(&[vec![1.0, 2.0]], 0.95), None);
         assert_eq!(Intraclass::of(&[vec![1.0], vec![2.0]], 0.95), None);
         assert_eq!(Intraclass::of(&[vec![1.0; 3], vec![1.0; 3]], 0.95), None);
-        // Clusters that differ and values that do not: all is between.
+        // Clusters differ and their values do not: all variance is between clusters.
         let i = Intraclass::of(&[vec![1.0; 3], vec![2.0; 3], vec![5.0; 3]], 0.95).unwrap();
         assert_eq!((i.correlation.estimate, i.correlation.high, i.design_effect), (1.0, 1.0, 3.0));
     }
@@ -139,9 +164,9 @@ mod tests {
         sizes.iter().map(cluster).collect()
     }
 
-    /// Null: the 95 % interval holds rho = 0, 0.1 and 0.5 of normal values. 2000 sets each of 20 clusters of 10 (exact), and of 5 to 15
-    /// (nearly). Fewer than 1848 or more than 1947 hits of 2000 have a false-alarm probability of 4e-7 on either side at p = 0.95
-    /// (binomial); an interval that took all values as independent would hold 0.5 in fewer than half.
+    /// Null: the 95 % interval covers rho = 0, 0.1 and 0.5 of normal values. 2000 sets each of 20 clusters of 10 (exact), and of 5 to 15
+    /// (nearly exact). Fewer than 1848 or more than 1947 hits of 2000 have a false-alarm probability of 4e-7 on either side at p = 0.95
+    /// (binomial); an interval that treated all values as independent would cover 0.5 in fewer than half.
     #[test]
     fn stat_interval_coverage() {
         let mut s = Streams::for_seed(1, "intraclass-test").stream("coverage");

@@ -1,7 +1,7 @@
-//! Logistic model of success with a random intercept of the terrain.
+//! Logistic model of success with a random intercept per terrain.
 //!
-//! Missions on one terrain share what the terrain is like. With `x` the covariates of a mission, `b` their coefficients
-//! (natural logarithms of odds), `s >= 0` the standard deviation between terrains on the same scale, and one `u` for
+//! Missions on one terrain share its properties. With `x` the covariates of a mission, `b` their coefficients
+//! (log odds), `s >= 0` the standard deviation between terrains on the same scale, and one `u` for
 //! each terrain,
 //!
 //! ```text
@@ -10,14 +10,14 @@
 //! ```
 //!
 //! (R. Stiratelli, N. Laird and J. Ware, Biometrics 40, 1984; A. Agresti, Categorical Data Analysis, 2013, section
-//! 13.1.) Estimates maximise `L`. The coefficients compare missions on terrains of equal `u`; on the average over
+//! 13.1.) Estimates maximise `L`. The coefficients compare missions on terrains of equal `u`; averaged over
 //! terrains the odds differ less.
 //!
-//! The integral is taken about the mode of its integrand, as adaptive Gauss-Hermite quadrature does (J. Pinheiro and D.
-//! Bates, Journal of Computational and Graphical Statistics 4, 1995), by the trapezoidal rule, which for such functions
-//! converges geometrically as well (L. Trefethen and J. Weideman, SIAM Review 56, 2014) and needs no nodes: steps of
-//! half the width of the mode, or half the distance to the logistic function's poles where that is less, out to where
-//! the integrand has fallen by exp(-36). It is then exact to about twelve digits. Newton's method uses the exact
+//! The integral is computed around the mode of its integrand, as in adaptive Gauss-Hermite quadrature (J. Pinheiro and D.
+//! Bates, Journal of Computational and Graphical Statistics 4, 1995), but by the trapezoidal rule, which for such functions
+//! also converges geometrically (L. Trefethen and J. Weideman, SIAM Review 56, 2014) and needs no nodes: steps of
+//! half the width of the mode, or half the distance to the logistic function's poles if that is less, out to where
+//! the integrand has fallen by exp(-36). It is then accurate to about twelve digits. Newton's method uses the exact
 //! information, by T. Louis's formula (Journal of the Royal Statistical Society B 44, 1982):
 //!
 //! ```text
@@ -25,58 +25,69 @@
 //! information = sum over terrains of E[-dz] - Var[z]
 //! ```
 //!
-//! Standard errors are those of the inverse information, intervals Wald's; tests compare likelihoods (chi-square, S.
-//! Wilks, 1938). Both are for many terrains: with fewer than about ten a group they are too sure of themselves.
-//! Terrains that share their random draws are taken as independent, which makes the errors of differences too large
+//! Standard errors come from the inverse information, intervals are Wald's, and tests are likelihood ratio tests (chi-square, S.
+//! Wilks, 1938). These are asymptotic: with fewer than about ten terrains per group they are anticonservative.
+//! Terrains that share their random draws are treated as independent, which makes the errors of differences too large
 //! rather than too small. Cost: some 50 evaluations per mission row and step, about ten steps; memory proportional to
 //! the rows.
 
 use crate::chi_square;
 use std::collections::BTreeMap;
 
-/// Newton steps at most.
+/// Most Newton steps.
 const STEPS_MAX: usize = 200;
-/// Where the gain that a step promises is below this, the maximum is reached.
+/// Predicted gain of a step below which the fit has converged.
 const GAIN_MIN: f64 = 1e-18;
-/// A logarithm of odds beyond which a fit has run away: data without failures (or successes) have no finite estimate.
+/// Log odds beyond which a fit has diverged: data without failures (or successes) has no finite estimate.
 const LOG_ODDS_MAX: f64 = 18.0;
-/// The integrand is followed until it has fallen by this much, in logarithms.
+/// The integration ends where the logarithm of the integrand has fallen by this much.
 const FALL: f64 = 36.0;
-/// Deviation between terrains at the start, in logarithms of odds.
+/// Initial standard deviation between terrains, log odds.
 const DEVIATION_START: f64 = 1.0;
 
-/// Missions of equal covariates on one terrain.
+/// Missions with equal covariates on one terrain.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Missions {
-    /// Covariates, the intercept (1) among them.
+    /// Covariates, including the intercept (1).
     pub covariates: Vec<f64>,
-    /// Successful missions.
+    /// Number of successful missions.
     pub successes: f64,
-    /// All missions.
+    /// Number of all missions.
     pub trials: f64,
 }
 
 /// A fitted model.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Fit {
-    /// Coefficients, natural logarithms of odds.
+    /// Coefficients, log odds.
     pub coefficients: Vec<f64>,
     /// Their standard errors.
     pub standard_errors: Vec<f64>,
     /// Covariance of the coefficients, row by row.
     pub covariance: Vec<Vec<f64>>,
-    /// Standard deviation between terrains, logarithms of odds.
+    /// Standard deviation between terrains, log odds.
     pub deviation: f64,
-    /// Its standard error; not finite where the deviation is 0.
+    /// Its standard error; not finite if the deviation is 0.
     pub deviation_error: f64,
-    /// Logarithm of the likelihood, without binomial coefficients.
+    /// Log likelihood, without binomial coefficients.
     pub log_likelihood: f64,
 }
 
 impl Fit {
-    /// The model of terrains with their missions. `None` when rows have other numbers of covariates than the first,
-    /// when there is no mission, or when no finite estimate exists: covariates that determine each other or the
+    /// Fits the model to terrains with their missions. `None` if rows differ in their number of covariates,
+    /// if there is no mission, or if no finite estimate exists because covariates determine each other or the
     /// outcome.
+    ///
+    /// ```
+    /// use sastrugi_statistics::mixed_logistic::{Fit, Missions};
+    ///
+    /// // Ten terrains on which 15 of 20 missions succeed, and ten with 10 of 20: the terrains of a group do not scatter, so that the
+    /// // coefficients are those of the plain logistic model, log odds ln 3 and a difference of -ln 3.
+    /// let terrain = |group: f64, successes: f64| vec![Missions { covariates: vec![1.0, group], successes, trials: 20.0 }];
+    /// let terrains: Vec<_> = (0..20).map(|k| if k < 10 { terrain(0.0, 15.0) } else { terrain(1.0, 10.0) }).collect();
+    /// let fit = Fit::of(&terrains).unwrap();
+    /// assert!((fit.coefficients[0] - 3f64.ln()).abs() < 1e-6 && (fit.coefficients[1] + 3f64.ln()).abs() < 1e-6);
+    /// ```
     pub fn of(terrains: &[Vec<Missions>]) -> Option<Self> {
         let covariates = terrains.iter().flatten().next()?.covariates.len();
         let usable = |m: &Missions| m.covariates.len() == covariates && m.trials > 0.0;
@@ -119,7 +130,7 @@ impl Fit {
         (dot(weights, &self.coefficients), variance.sqrt())
     }
 
-    /// Likelihood ratio test against a model that holds a part of the covariates: chi-square, degrees of freedom, p.
+    /// Likelihood ratio test against a model with a subset of the covariates: chi-square, degrees of freedom, p.
     pub fn against(&self, simpler: &Self) -> (f64, usize, f64) {
         let chi2 = (2.0 * (self.log_likelihood - simpler.log_likelihood)).max(0.0);
         let freedom = self.coefficients.len().saturating_sub(simpler.coefficients.len());
@@ -127,13 +138,13 @@ impl Fit {
     }
 }
 
-/// Terrains with the same missions and outcomes: they add the same to the likelihood.
+/// Terrains with the same missions and outcomes, which contribute equally to the likelihood.
 struct Pattern<'a> {
     missions: &'a [Missions],
     terrains: f64,
 }
 
-/// Every pattern once, in the order of its first terrain.
+/// Every pattern once, in the order of first occurrence.
 fn patterns(terrains: &[Vec<Missions>]) -> Vec<Pattern<'_>> {
     let mut places: BTreeMap<Vec<u64>, usize> = BTreeMap::new();
     let mut patterns: Vec<Pattern> = Vec::new();
@@ -149,7 +160,7 @@ fn patterns(terrains: &[Vec<Missions>]) -> Vec<Pattern<'_>> {
     patterns
 }
 
-/// Logarithm of the likelihood with its derivatives for the coefficients and the deviation.
+/// Log likelihood and its derivatives with respect to the coefficients and the deviation.
 struct Likelihood {
     value: f64,
     score: Vec<f64>,
@@ -179,11 +190,11 @@ impl Likelihood {
             score.fill(0.0);
             for (m, f) in terrain.iter().zip(&fixed) {
                 let p = probability(f + deviation * point.u);
-                let (residual, bend) = (m.successes - m.trials * p, weight * m.trials * p * (1.0 - p));
+                let (residual, curvature) = (m.successes - m.trials * p, weight * m.trials * p * (1.0 - p));
                 let derivative = |k: usize| m.covariates.get(k).copied().unwrap_or(point.u);
                 for i in 0..n {
                     score[i] += residual * derivative(i);
-                    (0..n).for_each(|j| square[i][j] += bend * derivative(i) * derivative(j));
+                    (0..n).for_each(|j| square[i][j] += curvature * derivative(i) * derivative(j));
                 }
             }
             for i in 0..n {
@@ -200,7 +211,7 @@ impl Likelihood {
         }
     }
 
-    /// Newton's step and twice the gain it promises; where the information is not positive definite it is raised until
+    /// Newton's step and twice its predicted gain; if the information is not positive definite, its diagonal is raised until
     /// it is.
     fn step(&self) -> Option<(Vec<f64>, f64)> {
         let scale = (0..self.score.len()).map(|k| self.information[k][k].abs()).fold(1e-3, f64::max);
@@ -215,7 +226,7 @@ impl Likelihood {
     }
 }
 
-/// The first of ever shorter steps that raises the likelihood; the same place where rounding alone is left.
+/// The first of successively halved steps that does not lower the likelihood by more than rounding.
 fn better(patterns: &[Pattern], at: &[f64], here: &Likelihood, step: &[f64]) -> Option<(Vec<f64>, Likelihood)> {
     (0..40).find_map(|halvings| {
         let share = libm::exp2(-f64::from(halvings));
@@ -228,16 +239,16 @@ fn better(patterns: &[Pattern], at: &[f64], here: &Likelihood, step: &[f64]) -> 
 /// A point of the integration over `u`.
 struct Point {
     u: f64,
-    /// Logarithm of the integrand but for the constant of the normal density.
+    /// Logarithm of the integrand without the constant of the normal density.
     log_density: f64,
     width: f64,
 }
 
-/// The integrand on even steps about its mode. Its logarithm bends by at least that of the normal density, so the
-/// points are few.
+/// The integrand at even steps around its mode. Its logarithm is at least as curved as that of the normal density, so
+/// few points are needed.
 fn points(terrain: &[Missions], fixed: &[f64], deviation: f64) -> Vec<Point> {
-    let (mode, bend) = mode(terrain, fixed, deviation);
-    let width = 0.5 * (1.0 / bend.sqrt()).min(1.0 / deviation.abs().max(1.0));
+    let (mode, curvature) = mode(terrain, fixed, deviation);
+    let width = 0.5 * (1.0 / curvature.sqrt()).min(1.0 / deviation.abs().max(1.0));
     let at = |k: i32| {
         let u = mode + width * f64::from(k);
         Point { u, log_density: log_density(terrain, fixed, deviation, u), width }
@@ -249,25 +260,25 @@ fn points(terrain: &[Missions], fixed: &[f64], deviation: f64) -> Vec<Point> {
     std::iter::once(middle).chain(sides).collect()
 }
 
-/// Where the integrand is largest, and its bend there: Newton's method on a concave function, each step at most 1.
+/// The mode of the integrand and its curvature there, by Newton's method on a concave function, with steps of at most 1.
 fn mode(terrain: &[Missions], fixed: &[f64], deviation: f64) -> (f64, f64) {
     let mut u = 0.0;
-    let mut bend = 1.0;
+    let mut curvature = 1.0;
     for _ in 0..100 {
         let mut slope = -u;
-        bend = 1.0;
+        curvature = 1.0;
         for (m, f) in terrain.iter().zip(fixed) {
             let p = probability(f + deviation * u);
             slope += deviation * (m.successes - m.trials * p);
-            bend += deviation * deviation * m.trials * p * (1.0 - p);
+            curvature += deviation * deviation * m.trials * p * (1.0 - p);
         }
-        let step = (slope / bend).clamp(-1.0, 1.0);
+        let step = (slope / curvature).clamp(-1.0, 1.0);
         u += step;
         if step.abs() < 1e-9 {
             break;
         }
     }
-    (u, bend)
+    (u, curvature)
 }
 
 fn log_density(terrain: &[Missions], fixed: &[f64], deviation: f64, u: f64) -> f64 {
@@ -290,7 +301,7 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
     a.iter().zip(b).map(|(x, y)| x * y).sum()
 }
 
-/// Lower triangle of a positive definite matrix; `None` when it is not.
+/// Lower Cholesky factor of a positive definite matrix; `None` if it is not.
 fn cholesky(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
     let n = matrix.len();
     let mut lower = vec![vec![0.0; n]; n];
@@ -298,7 +309,7 @@ fn cholesky(matrix: &[Vec<f64>]) -> Option<Vec<Vec<f64>>> {
         for j in 0..=i {
             let rest = matrix[i][j] - dot(&lower[i][..j], &lower[j][..j]);
             if i == j {
-                // A pivot lost in rounding means columns that determine each other.
+                // A pivot lost to rounding means that columns are linearly dependent.
                 lower[i][i] = (rest > 1e-12 * matrix[i][i]).then(|| rest.sqrt())?;
             } else {
                 lower[i][j] = rest / lower[j][j];

@@ -1,6 +1,6 @@
-//! Which parameters matter? Screening by elementary effects.
+//! Screening of parameters by elementary effects (Morris method).
 //!
-//! Every parameter has `p` levels, equally spaced; a *trajectory* of `k + 1` designs moves each of `k` parameters once, in random order, by
+//! Every parameter has `p` equally spaced levels; a *trajectory* of `k + 1` designs moves each of `k` parameters once, in random order, by
 //! `p/2` levels up or down (M. Morris, Technometrics 33, 1991, 161-174: a step of `p / (2 (p - 1))` of the range with even `p`, so that all
 //! levels are equally likely). The elementary effect of a parameter is the change of the output over the change of the parameter:
 //!
@@ -9,21 +9,21 @@
 //! mu = mean d,   mu* = mean |d|,   sigma = standard deviation of d        over the trajectories
 //! ```
 //!
-//! `mu*` ranks the parameters (F. Campolongo, J. Cariboni and A. Saltelli, Environmental Modelling & Software 22, 2007, 1509-1518: `mu`
-//! alone may cancel); `sigma` is high where an effect hangs on the other parameters, or is curved.
+//! `mu*` ranks the parameters (F. Campolongo, J. Cariboni and A. Saltelli, Environmental Modelling & Software 22, 2007, 1509-1518: in `mu`
+//! effects of opposite sign may cancel); `sigma` is high if an effect depends on the other parameters or is nonlinear.
 //!
 //! # Several worlds
-//! The output is measured on `w` worlds, the same trajectories on each. `d` of a trajectory is the mean of its effects over the worlds. Worlds and
-//! trajectories are crossed, so that intervals redraw both, each with replacement and apart from the other (the pigeonhole bootstrap: A. Owen,
-//! Annals of Applied Statistics 1, 2007, 386-411, which does not understate the variance of a mean). Absolute values of noisy effects lie
-//! above 0, and redraws of them above the estimate: near its `noise` the interval of `mu*` lies too high, and that of `mu` tells.
+//! The output is measured on `w` worlds, with the same trajectories on each. `d` of a trajectory is the mean of its effects over the worlds.
+//! Worlds and trajectories are crossed, so that intervals resample both, independently and with replacement (the pigeonhole bootstrap: A. Owen,
+//! Annals of Applied Statistics 1, 2007, 386-411, which does not understate the variance of a mean). Absolute values of noisy effects are
+//! biased upwards, and so are their replicates: near its `noise` the interval of `mu*` is too high, and that of `mu` should be used.
 //!
-//! `noise` is what `mu*` would be on average if the mean effect over all worlds were 0 and the worlds at hand scattered as they do:
-//! `sqrt(2/pi) s / sqrt(w)`, the mean of the absolute value of a normal number, with `s` the standard deviation over the worlds, averaged over the
-//! trajectories. A parameter that nothing depends on has an effect of exactly 0 where the draws are common, and noise 0 too.
+//! `noise` is the mean of `mu*` if the mean effect over all worlds were 0 and the worlds scattered as observed:
+//! `sqrt(2/pi) s / sqrt(w)`, the mean absolute value of a normal variable, with `s` the standard deviation over the worlds, averaged over the
+//! trajectories. With common random draws, a parameter without any influence has an effect of exactly 0, and noise 0 too.
 //!
 //! # Cost
-//! `k + 1` outputs a trajectory and world; `k w r` operations a redraw, for `r` trajectories.
+//! `k + 1` outputs per trajectory and world; `k w r` operations per bootstrap replicate, for `r` trajectories.
 
 use crate::bootstrap::{Interval, redraw};
 use sastrugi_numeric::{Stream, sums};
@@ -34,12 +34,12 @@ use std::f64::consts::FRAC_2_PI;
 pub struct Trajectory {
     /// Level of every parameter, from 0, for each of the `k + 1` designs.
     pub levels: Vec<Vec<u32>>,
-    /// The parameter that moves from each design to the next.
+    /// The parameter that changes from each design to the next.
     pub order: Vec<usize>,
 }
 
 impl Trajectory {
-    /// Draws one; `levels` is even and 2 or more.
+    /// Draws a trajectory; `levels` must be even and at least 2.
     pub fn draw(parameters: usize, levels: u32, stream: &mut Stream) -> Self {
         let half = (levels / 2).max(1);
         let mut ends = || {
@@ -48,7 +48,7 @@ impl Trajectory {
         };
         let ends: Vec<[u32; 2]> = (0..parameters).map(|_| ends()).collect();
         let mut order: Vec<usize> = (0..parameters).collect();
-        // R. Fisher and F. Yates.
+        // Shuffle by R. Fisher and F. Yates.
         for last in (1..parameters).rev() {
             order.swap(last, stream.below(last as u64 + 1) as usize);
         }
@@ -63,17 +63,17 @@ impl Trajectory {
 }
 
 /// Elementary effects of one trajectory, by parameter: `points` and `values` are the parameters and the output of each design, `order` the
-/// parameter that moves to the next.
+/// parameter that changes to the next.
 pub fn elementary_effects(points: &[Vec<f64>], order: &[usize], values: &[f64]) -> Vec<f64> {
     let mut effects = vec![f64::NAN; order.len()];
     for ((x, y), &k) in points.windows(2).zip(values.windows(2)).zip(order) {
-        // No -0: nothing changed is nothing, whichever way the parameter went.
+        // Turns -0 into 0: no change is 0 whichever way the parameter moved.
         effects[k] = (y[1] - y[0]) / (x[1][k] - x[0][k]) + 0.0;
     }
     effects
 }
 
-/// How much a parameter matters.
+/// Importance of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Importance {
     /// Mean effect.
@@ -86,12 +86,33 @@ pub struct Importance {
     pub mu_star_interval: Option<Interval>,
     /// Standard deviation of the effects over the trajectories; NaN with one.
     pub sigma: f64,
-    /// What `mu_star` would be without any mean effect; NaN with one world.
+    /// Expected `mu_star` without any mean effect; NaN with one world.
     pub noise: f64,
 }
 
 /// The importance of every parameter. `effects` are those of [`elementary_effects`], by parameter, trajectory and world; all parameters
-/// have the same trajectories and worlds, and share the redraws.
+/// have the same trajectories and worlds, and share the bootstrap replicates.
+///
+/// ```
+/// use sastrugi_numeric::Streams;
+/// use sastrugi_statistics::morris::{Trajectory, elementary_effects, screen};
+///
+/// // Two parameters in 0..1, of which only the first matters: y = 3 x0.
+/// let mut stream = Streams::for_seed(1, "example").stream("screening");
+/// let mut effects = vec![Vec::new(); 2];
+/// for _ in 0..4 {
+///     let drawn = Trajectory::draw(2, 4, &mut stream);
+///     let points: Vec<Vec<f64>> =
+///         drawn.levels.iter().map(|levels| levels.iter().map(|l| f64::from(*l) / 3.0).collect()).collect();
+///     let values: Vec<f64> = points.iter().map(|x| 3.0 * x[0]).collect();
+///     let of = elementary_effects(&points, &drawn.order, &values);
+///     // One world each.
+///     effects.iter_mut().zip(of).for_each(|(all, d)| all.push(vec![d]));
+/// }
+/// let found = screen(&effects, 0, 0.95, &mut stream);
+/// assert!((found[0].mu_star - 3.0).abs() < 1e-12);
+/// assert_eq!(found[1].mu_star, 0.0);
+/// ```
 pub fn screen(effects: &[Vec<Vec<f64>>], replicates: usize, level: f64, stream: &mut Stream) -> Vec<Importance> {
     let trajectories = effects.first().map_or(0, Vec::len);
     let worlds = effects.first().and_then(|of| of.first()).map_or(0, Vec::len);
@@ -133,7 +154,7 @@ impl Means {
     }
 }
 
-/// Mean effect over the drawn worlds of each drawn trajectory; `drawn` are the numbers of trajectories and of worlds.
+/// Mean effect over the drawn worlds of each drawn trajectory; `drawn` are the indices of trajectories and of worlds.
 fn averages(effects: &[Vec<f64>], drawn: &[Vec<usize>]) -> Vec<f64> {
     let [trajectories, worlds] = drawn else { return Vec::new() };
     let mut of_worlds = Vec::with_capacity(worlds.len());
@@ -145,7 +166,7 @@ fn averages(effects: &[Vec<f64>], drawn: &[Vec<usize>]) -> Vec<f64> {
     trajectories.iter().map(&mut average).collect()
 }
 
-/// Standard deviation, divided by n - 1; NaN for fewer than two values.
+/// Sample standard deviation (n - 1); NaN for fewer than two values.
 fn deviation(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     if n < 2.0 { f64::NAN } else { (sums::variance(values) * n / (n - 1.0)).sqrt() }

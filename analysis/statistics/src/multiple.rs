@@ -1,7 +1,14 @@
-//! Several tests at once.
+//! Adjustment for multiple tests.
 
-/// Holm's (1979) step-down adjustment: with `adjusted <= alpha` as the rule, the probability that any true hypothesis of
-/// the family is rejected is at most alpha, however the tests depend on each other. NaN stays NaN and counts as no test.
+/// Holm's (1979) step-down adjustment: rejecting where `adjusted <= alpha`, the probability that any true hypothesis of
+/// the family is rejected is at most alpha, however the tests depend on each other. NaN stays NaN and does not count as a test.
+///
+/// ```
+/// use sastrugi_statistics::holm;
+///
+/// // The smallest of three p-values counts three times, the next twice; the order of the input is kept.
+/// assert_eq!(holm(&[0.5, 0.125, 0.25]), [0.5, 0.375, 0.5]);
+/// ```
 pub fn holm(p: &[f64]) -> Vec<f64> {
     let mut order: Vec<usize> = (0..p.len()).filter(|&k| !p[k].is_nan()).collect();
     order.sort_by(|&a, &b| p[a].total_cmp(&p[b]));
@@ -18,7 +25,7 @@ pub fn holm(p: &[f64]) -> Vec<f64> {
 mod tests {
     use super::*;
 
-    /// By hand: 4 x 0.01, 3 x 0.02, 2 x 0.03 raised to what came before it, 1 x 0.5.
+    /// By hand: 4 x 0.01, 3 x 0.02, 2 x 0.03 (at least the value before it), 1 x 0.5.
     #[test]
     fn val_holm_by_hand() {
         let adjusted = holm(&[0.5, 0.01, f64::NAN, 0.03, 0.02]);

@@ -1,19 +1,28 @@
-//! Where the value of one more cluster falls: the band for a single world beside the worlds that are known.
+//! Prediction interval for the value of one more cluster, such as a single new world.
 //!
-//! With mean `y` and standard deviation `s` of `k` normal values, one more falls with that probability in
+//! With mean `y` and standard deviation `s` of `k` normal values, one more falls with the given probability between
 //!
 //! ```text
-//! y - t s sqrt(1 + 1/k)  to  y + t s sqrt(1 + 1/k),   t: Student's quantile with k - 1 degrees of freedom
+//! y - t s sqrt(1 + 1/k)  and  y + t s sqrt(1 + 1/k),   t: Student's quantile with k - 1 degrees of freedom
 //! ```
 //!
-//! (G. Hahn and W. Meeker, Statistical Intervals, 1991, section 4.7). Positive values that vary by factors, such as distances, are taken by
-//! their logarithms. The band does not shrink to a point with more clusters, as the interval of a mean does.
+//! (G. Hahn and W. Meeker, Statistical Intervals, 1991, section 4.7). For positive values that vary by factors, such as distances, logarithms
+//! are used. Unlike the interval of a mean, this interval does not shrink to a point with more clusters.
 
 use crate::bootstrap::Interval;
 use crate::student;
 use sastrugi_numeric::sums;
 
-/// Band of one more of these values, about their mean; `None` for fewer than two.
+/// Prediction interval for one more of these values, around their mean; `None` for fewer than two.
+///
+/// ```
+/// use sastrugi_statistics::{prediction, student};
+///
+/// // Mean 1, variance 2: t s sqrt(1 + 1/2) on either side.
+/// let next = prediction::one_more(&[0.0, 2.0], 0.95).unwrap();
+/// let half = student::quantile(0.975, 1.0) * (2.0f64 * 1.5).sqrt();
+/// assert!((next.estimate - 1.0).abs() < 1e-15 && (next.high - 1.0 - half).abs() < 1e-9);
+/// ```
 pub fn one_more(values: &[f64], level: f64) -> Option<Interval> {
     let k = values.len() as f64;
     if values.len() < 2 {
@@ -24,7 +33,7 @@ pub fn one_more(values: &[f64], level: f64) -> Option<Interval> {
     Some(Interval { estimate: mean, low: mean - half, high: mean + half, level })
 }
 
-/// The same of positive values by their logarithms, about their geometric mean; `None` where one is not positive.
+/// The same for positive values by their logarithms, around their geometric mean; `None` if any value is not positive.
 pub fn one_more_positive(values: &[f64], level: f64) -> Option<Interval> {
     if !values.iter().all(|v| *v > 0.0) {
         return None;
@@ -40,7 +49,8 @@ mod tests {
     use super::*;
     use sastrugi_numeric::Streams;
 
-    /// Hahn and Meeker (1991), voltages of five circuit packs: mean 50.10, standard deviation 1.31, band of one more 46.1 to 54.1.
+    /// Hahn and Meeker (1991), voltages of five circuit packs: mean 50.10, standard deviation 1.31, prediction interval for one more 46.1
+    /// to 54.1.
     #[test]
     fn val_hahn_and_meeker() {
         let voltages = [51.4, 49.5, 48.7, 49.3, 51.6];
@@ -61,9 +71,9 @@ mod tests {
         assert_eq!(one_more(&[2.0, 2.0], 0.95).map(|i| (i.low, i.high)), Some((2.0, 2.0)));
     }
 
-    /// Null: one more falls in the band with 95 %, exactly for normal values. 2000 sets each of 4 and 20 clusters. Fewer than 1848 or more than 1947
-    /// hits of 2000 have a false-alarm probability of 4e-7 on either side (binomial). The interval of the mean would hold fewer than 70 %.
-    /// The means of 20 skewed values of a cluster, `exp(0.5 c + 0.5 e)` with normal `c` and `e`, are held alike by their logarithms.
+    /// Null: one more value falls in the interval with 95 %, exactly for normal values. 2000 sets each of 4 and 20 clusters. Fewer than 1848 or
+    /// more than 1947 hits of 2000 have a false-alarm probability of 4e-7 on either side (binomial). The interval of the mean would cover fewer
+    /// than 70 %. Means of 20 skewed values of a cluster, `exp(0.5 c + 0.5 e)` with normal `c` and `e`, are covered equally well by logarithms.
     #[test]
     fn stat_one_more_falls_inside() {
         let mut s = Streams::for_seed(1, "prediction-test").stream("coverage");

@@ -1,16 +1,16 @@
-//! How many of the ordered differences of pairs lie below an interval of the shift, from the null distributions of the rank
+//! Number of ordered pairwise differences below an interval of the shift, from the null distributions of the rank
 //! statistics that count them.
 //!
 //! The number of pairs with `y_j - x_i` above the true shift has the distribution of H. Mann and D. Whitney's `U` (1947), the number
-//! of Walsh averages above it that of F. Wilcoxon's signed-rank sum (1945); both are exact for values without ties, whatever their
-//! distribution, and count too few where there are ties, so that intervals become wider. Where counting is long the statistics are
-//! taken for normal, with a correction for continuity.
+//! of Walsh averages above it that of F. Wilcoxon's signed-rank sum (1945). Both are exact for values without ties, whatever their
+//! distribution; with ties the counts are too small, so that intervals become wider. If exact counting would take too long, the
+//! statistics are treated as normal, with a continuity correction.
 
 use crate::normal;
 
-/// Pairs up to which `U` is counted out.
+/// Most pairs for which `U` is counted exactly.
 const PAIRS_MAX: usize = 2500;
-/// Differences up to which the signed-rank sum is counted out.
+/// Most differences for which the signed-rank sum is counted exactly.
 const DIFFERENCES_MAX: usize = 100;
 
 /// The largest `k` with `P(U < k) <= tail`.
@@ -22,7 +22,7 @@ pub(crate) fn rank_sum_below(n: usize, m: usize, tail: f64) -> usize {
     below(&rank_sum(n, m), tail)
 }
 
-/// The largest `k` with `P(W < k) <= tail`, W being the signed-rank sum of the positive ones of `n` differences.
+/// The largest `k` with `P(W < k) <= tail`, W being the rank sum of the positive ones among `n` differences.
 pub(crate) fn signed_rank_below(n: usize, tail: f64) -> usize {
     if n > DIFFERENCES_MAX {
         let n = n as f64;
@@ -31,8 +31,8 @@ pub(crate) fn signed_rank_below(n: usize, tail: f64) -> usize {
     below(&signed_rank(n), tail)
 }
 
-/// Probability of each value of `U`: the largest of all values is of the first or of the second group, and has then `m` or no
-/// pairs below it.
+/// Probability of each value of `U`. Recursion: the largest of all values is in the first or in the second group, and then adds `m`
+/// pairs or none.
 fn rank_sum(n: usize, m: usize) -> Vec<f64> {
     // Row by row over the size of the first group; one distribution for each size of the second.
     let mut row: Vec<Vec<f64>> = (0..=m).map(|_| vec![1.0]).collect();
@@ -50,7 +50,7 @@ fn rank_sum(n: usize, m: usize) -> Vec<f64> {
     row.pop().unwrap_or_default()
 }
 
-/// Probability of each signed-rank sum: every rank is counted or not.
+/// Probability of each signed-rank sum: every rank is included or not.
 fn signed_rank(n: usize) -> Vec<f64> {
     let mut of = vec![1.0];
     for rank in 1..=n {
@@ -65,7 +65,7 @@ fn signed_rank(n: usize) -> Vec<f64> {
 }
 
 fn below(probabilities: &[f64], tail: f64) -> usize {
-    // Sums round: equal to the tail counts as within it.
+    // Sums are rounded: a sum equal to the tail counts as within it.
     let bound = tail * (1.0 + 1e-12);
     let sums = probabilities.iter().scan(0.0, |sum, p| {
         *sum += p;
@@ -82,9 +82,9 @@ fn of_normal(mean: f64, variance: f64, tail: f64) -> usize {
 mod tests {
     use super::*;
 
-    /// scipy 1.17.1: scipy.stats.mannwhitneyu and wilcoxon, method "exact", give these tails (`tests/statistical/nested_tests.py`); the
-    /// counts at 2.5 % are those of printed tables (Hollander, Wolfe and Chicken, 2014): U of 4 + 4, 5 + 6, 10 + 10, 20 + 20
-    /// terrains, W of 5, 6, 10, 20 pairs.
+    /// scipy 1.17.1: scipy.stats.mannwhitneyu and wilcoxon, method "exact", give these tails (`tests/statistical/nested_tests.py`). The
+    /// counts at 2.5 % are those of printed tables (Hollander, Wolfe and Chicken, 2014): U for 4 + 4, 5 + 6, 10 + 10, 20 + 20
+    /// terrains, W for 5, 6, 10, 20 pairs.
     #[test]
     fn val_of_tables() {
         let of = [(3, 3), (4, 4), (5, 6), (10, 10), (20, 20)].map(|(n, m)| rank_sum_below(n, m, 0.025));
@@ -94,14 +94,45 @@ mod tests {
         assert!((signed_rank(9).iter().sum::<f64>() - 1.0).abs() < 1e-14);
     }
 
-    /// Where counting ends the normal distribution is off by one in hundreds at most.
+    /// Both distributions against the enumeration of all arrangements: every choice of the first group's ranks, and every choice of
+    /// signs, is equally likely. Tolerance 1e-14.
+    #[test]
+    fn val_distributions_equal_enumeration() {
+        let shares = |values: Vec<usize>, len: usize| {
+            let count = |value: usize| values.iter().filter(|v| **v == value).count() as f64;
+            (0..len).map(|value| count(value) / values.len() as f64).collect::<Vec<f64>>()
+        };
+        let close = |a: &[f64], b: &[f64]| a.len() == b.len() && a.iter().zip(b).all(|(a, b)| (a - b).abs() < 1e-14);
+        for (n, m) in [(1usize, 1usize), (2, 3), (4, 2), (3, 5)] {
+            let chosen = (0..1usize << (n + m)).filter(|bits| bits.count_ones() as usize == n);
+            // Pairs in which the member of the second group has the higher rank.
+            let pairs = |bits: usize| {
+                let is_first = |k: usize| bits >> k & 1 == 1;
+                let above = |k: usize| (k + 1..n + m).filter(|&l| !is_first(l)).count();
+                (0..n + m).filter(|&k| is_first(k)).map(above).sum::<usize>()
+            };
+            assert!(close(&rank_sum(n, m), &shares(chosen.map(pairs).collect(), n * m + 1)), "{n} {m}");
+        }
+        for n in [1usize, 2, 5, 8] {
+            let sum = |bits: usize| (0..n).filter(|k| bits >> k & 1 == 1).map(|k| k + 1).sum::<usize>();
+            let all = shares((0..1usize << n).map(sum).collect(), n * (n + 1) / 2 + 1);
+            assert!(close(&signed_rank(n), &all), "{n}");
+        }
+    }
+
+    /// Where exact counting ends, it is off from the normal approximation by as much as whole-number arithmetic in Python finds: 0, 0
+    /// and 2 pairs of 2500, 1, 1 and 4 of the signed-rank sum. Beyond that limit the approximation is used.
     #[test]
     fn conv_normal_where_counting_ends() {
-        for tail in [0.05, 0.025, 0.005] {
-            let (exact, near) = (below(&rank_sum(50, 50), tail), of_normal(1250.0, 2500.0 * 101.0 / 12.0, tail));
-            assert!(exact.abs_diff(near) <= 3, "{exact} {near}");
-            let (exact, near) = (below(&signed_rank(100), tail), of_normal(2525.0, 100.0 * 101.0 * 201.0 / 24.0, tail));
-            assert!(exact.abs_diff(near) <= 8, "{exact} {near}");
+        for (tail, u, w) in
+            [(0.05, [1011, 1011], [2046, 2047]), (0.025, [966, 966], [1956, 1955]), (0.005, [878, 876], [1780, 1776])]
+        {
+            assert_eq!([below(&rank_sum(50, 50), tail), of_normal(1250.0, 2500.0 * 101.0 / 12.0, tail)], u);
+            let near = of_normal(2525.0, 100.0 * 101.0 * 201.0 / 24.0, tail);
+            assert_eq!([below(&signed_rank(100), tail), near], w);
+            assert_eq!((rank_sum_below(50, 50, tail), signed_rank_below(100, tail)), (u[0], w[0]));
         }
+        // Whole-number arithmetic gives 987 and 1998.
+        assert_eq!((rank_sum_below(51, 50, 0.025), signed_rank_below(101, 0.025)), (986, 1997));
     }
 }

@@ -1,9 +1,18 @@
-//! Student's t distribution, from `libm` alone, so that its bits do not depend on the CPU.
+//! Student's t distribution and the incomplete beta function, computed with `libm` only, so that results do not depend on the CPU
+//! (why not `statrs`: see [`crate::normal`]).
 
-/// Terms of the continued fraction at most; it needs fewer than 200 for up to 1e4 degrees of freedom.
+/// Most terms of the continued fraction; it needs fewer than 200 for up to 1e4 degrees of freedom.
 const TERMS_MAX: usize = 2000;
 
-/// Probability below `t` with `freedom > 0` degrees of freedom, which need not be whole; NaN outside.
+/// Probability below `t` with `freedom > 0` degrees of freedom, not necessarily an integer; NaN outside the domain.
+///
+/// ```
+/// use sastrugi_statistics::student;
+///
+/// // With one degree of freedom it is Cauchy's distribution, whose quartiles are -1 and 1.
+/// assert!((student::cdf(1.0, 1.0) - 0.75).abs() < 1e-14);
+/// assert!((student::quantile(0.25, 1.0) + 1.0).abs() < 1e-12);
+/// ```
 pub fn cdf(t: f64, freedom: f64) -> f64 {
     let tail = 0.5 * incomplete_beta(0.5 * freedom, 0.5, freedom / (freedom + t * t));
     if t > 0.0 { 1.0 - tail } else { tail }
@@ -32,7 +41,7 @@ pub fn quantile(p: f64, freedom: f64) -> f64 {
 }
 
 /// Regularised incomplete beta function I_x(a, b) by its continued fraction (NIST Digital Library of Mathematical
-/// Functions, 8.17.22), evaluated by W. Lentz's method (1976); the symmetry 8.17.4 takes it to where it converges fast.
+/// Functions, 8.17.22), evaluated by W. Lentz's method (1976), after applying the symmetry 8.17.4 where that converges faster.
 pub(crate) fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
     if !(a > 0.0 && b > 0.0 && (0.0..=1.0).contains(&x)) {
         return f64::NAN;
@@ -48,7 +57,7 @@ pub(crate) fn incomplete_beta(a: f64, b: f64, x: f64) -> f64 {
 }
 
 fn fraction(a: f64, b: f64, x: f64) -> f64 {
-    // Lentz's method stays clear of zero denominators.
+    // Lentz's method avoids zero denominators.
     let clear = |v: f64| if v.abs() < 1e-300 { 1e-300 } else { v };
     let (mut value, mut c, mut d) = (1.0, 1.0, 0.0);
     for k in 1..TERMS_MAX {
@@ -72,7 +81,7 @@ fn fraction(a: f64, b: f64, x: f64) -> f64 {
 mod tests {
     use super::*;
 
-    /// scipy.stats.t.cdf and .ppf of scipy 1.17.1 (`tests/statistical/nested_tests.py`). Relative tolerance 1e-11.
+    /// Against scipy.stats.t.cdf and .ppf of scipy 1.17.1 (`tests/statistical/nested_tests.py`). Relative tolerance 1e-11.
     #[test]
     fn val_of_scipy() {
         for (t, freedom, p) in [
@@ -97,12 +106,67 @@ mod tests {
         }
     }
 
+    /// Closed forms (M. Abramowitz and I. Stegun, 1964, 26.7.3 and 26.7.4, for 2, 3 and 4 degrees of freedom) on both sides of 0.
+    /// Tolerance 1e-12.
+    #[test]
+    fn val_closed_forms() {
+        for k in -60..=60 {
+            let t = 0.25 * f64::from(k);
+            let r = t / 3f64.sqrt();
+            let of_three = 0.5 + (r / (1.0 + r * r) + libm::atan(r)) / std::f64::consts::PI;
+            let s = t / (4.0 + t * t).sqrt();
+            for (freedom, expected) in
+                [(2.0, 0.5 + 0.5 * t / (2.0 + t * t).sqrt()), (3.0, of_three), (4.0, 0.5 + 0.25 * s * (3.0 - s * s))]
+            {
+                assert!((cdf(t, freedom) - expected).abs() < 1e-12, "{t}, {freedom}: {} {expected}", cdf(t, freedom));
+                assert!((cdf(t, freedom) + cdf(-t, freedom) - 1.0).abs() < 1e-15);
+            }
+        }
+    }
+
+    /// The quantile inverts the distribution. Tolerance 1e-12 of p.
+    #[test]
+    fn prop_quantile_inverts_the_distribution() {
+        for freedom in [1.0, 2.5, 7.0, 38.6, 1000.0] {
+            for p in [1e-6, 0.025, 0.3, 0.5, 0.8, 0.999] {
+                assert!((cdf(quantile(p, freedom), freedom) - p).abs() < 1e-12, "{p} {freedom}");
+            }
+        }
+    }
+
+    /// `I_x(k, n - k + 1)` is the probability of at least `k` successes among `n`, summed here term by term; on both sides of the
+    /// switch between the two fractions. `I_x(a, 1) = x^a`. Tolerance 1e-12.
+    #[test]
+    fn val_incomplete_beta_is_a_binomial_tail() {
+        for n in [1, 2, 5, 12, 30] {
+            for x in [0.01, 0.2, 0.5, 0.73, 0.99] {
+                // Probability of j successes, from that of none.
+                let mut term = (0..n).fold(1.0, |product, _| product * (1.0 - x));
+                let terms: Vec<f64> = (0..=n)
+                    .map(|j| {
+                        let own = term;
+                        term *= f64::from(n - j) / f64::from(j + 1) * x / (1.0 - x);
+                        own
+                    })
+                    .collect();
+                for k in 1..=n {
+                    let tail: f64 = terms[k as usize..].iter().rev().sum();
+                    let found = incomplete_beta(f64::from(k), f64::from(n - k + 1), x);
+                    assert!((found - tail).abs() < 1e-12, "{k} of {n} at {x}: {found} {tail}");
+                }
+            }
+        }
+        assert!((incomplete_beta(2.5, 1.0, 0.49) - 0.168_07).abs() < 1e-12);
+        assert_eq!((incomplete_beta(2.0, 3.0, 0.0), incomplete_beta(2.0, 3.0, 1.0)), (0.0, 1.0));
+        assert!(incomplete_beta(0.0, 1.0, 0.5).is_nan() && incomplete_beta(1.0, 1.0, 1.1).is_nan());
+    }
+
     #[test]
     fn val_limits() {
         assert_eq!((cdf(0.0, 3.0), quantile(0.5, 3.0).abs() < 1e-15), (0.5, true));
         assert_eq!((quantile(0.0, 3.0), quantile(1.0, 3.0)), (f64::NEG_INFINITY, f64::INFINITY));
         assert!(quantile(0.3, 0.0).is_nan() && quantile(2.0, 3.0).is_nan() && cdf(f64::NAN, 3.0).is_nan());
-        // One degree of freedom is Cauchy's distribution, many are the normal one.
+        // With one degree of freedom it is Cauchy's distribution, with many the normal one.
         assert!((cdf(1.0, 1.0) - 0.75).abs() < 1e-14);
         assert!((cdf(-1.5, 1e7) - crate::normal::cdf(-1.5)).abs() < 1e-7);
     }

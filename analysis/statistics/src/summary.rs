@@ -1,17 +1,17 @@
-//! Figures of a box plot.
+//! Statistics of a box plot.
 
 use sastrugi_numeric::sums::quantile_sorted;
 
-/// Whiskers reach to the last value within this many interquartile ranges of the box (Tukey, 1977).
+/// Whiskers extend to the last value within this many interquartile ranges of the box (Tukey, 1977).
 pub const WHISKER_REACH: f64 = 1.5;
 
 /// A box plot: quartiles by linear interpolation between order statistics (type 7 of Hyndman and Fan, 1996), whiskers
-/// at the extreme values within 1.5 interquartile ranges of the box, every value beyond them an outlier.
+/// at the extreme values within 1.5 interquartile ranges of the box; every value beyond them is an outlier.
 #[derive(Clone, Debug, PartialEq)]
 pub struct BoxPlot {
     /// Number of values.
     pub count: usize,
-    /// Lowest value that is no outlier.
+    /// Lowest value that is not an outlier.
     pub whisker_low: f64,
     /// First quartile.
     pub quartile_low: f64,
@@ -19,14 +19,22 @@ pub struct BoxPlot {
     pub median: f64,
     /// Third quartile.
     pub quartile_high: f64,
-    /// Highest value that is no outlier.
+    /// Highest value that is not an outlier.
     pub whisker_high: f64,
     /// Values beyond the whiskers, ascending.
     pub outliers: Vec<f64>,
 }
 
 impl BoxPlot {
-    /// The box plot of the values in any order; values that are not finite are left out. `None` when none is left.
+    /// The box plot of values in any order; values that are not finite are left out. `None` if none is left.
+    ///
+    /// ```
+    /// use sastrugi_statistics::BoxPlot;
+    ///
+    /// let plot = BoxPlot::of(&[5.0, 1.0, 4.0, 2.0, 3.0, 90.0, f64::NAN]).unwrap();
+    /// assert_eq!((plot.count, plot.median), (6, 3.5));
+    /// assert_eq!((plot.whisker_low, plot.whisker_high, plot.outliers), (1.0, 5.0, vec![90.0]));
+    /// ```
     pub fn of(values: &[f64]) -> Option<Self> {
         let mut sorted = sastrugi_numeric::sums::finite(values);
         sorted.sort_by(f64::total_cmp);
@@ -49,7 +57,7 @@ impl BoxPlot {
 mod tests {
     use super::*;
 
-    /// By hand: quartiles of 1..9 are 3, 5, 7; the reach is 6, so 13 is inside and 14 is not.
+    /// By hand: quartiles of 1..9 are 3, 5, 7; the whiskers extend up to 6 beyond the box, so 13 would be inside and 14 not.
     #[test]
     fn val_box_plot_by_hand() {
         let b = BoxPlot::of(&[9.0, 1.0, 8.0, 2.0, 7.0, 3.0, 6.0, 4.0, 5.0]).unwrap();
@@ -59,7 +67,17 @@ mod tests {
         assert_eq!((b.count, b.whisker_high, b.outliers), (9, 8.0, vec![30.0]));
     }
 
-    /// numpy 2, numpy.quantile with method "linear", and Tukey's fences (`tests/statistical/nested_tests.py`).
+    /// By hand: quartiles 3 and 7, so the fences are -3 and 13. A value on a fence belongs to the whisker, a value beyond it is an outlier.
+    #[test]
+    fn val_fences_belong_to_the_whiskers() {
+        let of = |low: f64, high: f64| BoxPlot::of(&[low, 2.0, 3.0, 4.0, 5.0, 6.0, 7.0, 8.0, high]).unwrap();
+        let on = of(-3.0, 13.0);
+        assert_eq!((on.whisker_low, on.whisker_high, on.outliers.len()), (-3.0, 13.0, 0));
+        let beyond = of(-3.5, 13.5);
+        assert_eq!((beyond.whisker_low, beyond.whisker_high, beyond.outliers), (2.0, 8.0, vec![-3.5, 13.5]));
+    }
+
+    /// Against numpy 2, numpy.quantile with method "linear", and Tukey's fences (`tests/statistical/nested_tests.py`).
     #[test]
     fn val_of_numpy() {
         let b = BoxPlot::of(&[1.5, -0.5, 3.0, 0.0, 2.5, 0.5, -1.0, 4.0, 12.0, -9.0]).unwrap();

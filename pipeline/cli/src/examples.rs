@@ -1,6 +1,7 @@
-//! Examples for the page on study files.
+//! Example values for the reference on study files.
 
-/// Examples of keys that have no default and stand in no study to start from, by name or the last word of it, after `section: ` where sections differ.
+/// Example values of keys that have no default and appear in no starting study. The key is the full name or its last part, preceded by
+/// `section: ` where sections differ.
 pub const EXAMPLES: [(&str, &str); 146] = [
     ("license_file", r#""site.license.txt""#),
     ("basic_spacing_m", "0.01"),

@@ -29,7 +29,7 @@ impl From<Code> for ExitCode {
     }
 }
 
-/// A verb that did not do what it was asked.
+/// Why a verb failed.
 #[derive(Debug)]
 pub struct Failure(pub Error);
 
@@ -63,5 +63,28 @@ impl Failure {
 impl From<Error> for Failure {
     fn from(error: Error) -> Self {
         Self(error)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_stages::study::{Refusals, StudyError};
+
+    /// The codes that the help documents.
+    #[test]
+    fn val_exit_codes() {
+        let study = Error::Study {
+            name: "study.toml".to_owned(),
+            text: String::new(),
+            refusals: Refusals(vec![StudyError::at(None, "wrong")]),
+        };
+        let code = |failure: Failure| failure.code() as u8;
+        assert_eq!(code(study.into()), 2);
+        assert_eq!(code(Failure::usage("how")), 2);
+        assert_eq!(code(Failure::input("what")), 65);
+        assert_eq!(code(Failure::failed("why")), 1);
+        assert_eq!(code(Error::Retry("later".to_owned()).into()), 75);
+        assert_eq!([Code::Done, Code::Partial, Code::Difference].map(|code| code as u8), [0, 3, 4]);
     }
 }

@@ -1,4 +1,4 @@
-//! The `sastrugi` command: reads arguments, calls the stages, prints, and ends with a documented exit code.
+//! The `sastrugi` command: parses arguments, calls the stages, prints results, and exits with a documented code.
 
 mod args;
 mod examples;
@@ -20,7 +20,7 @@ fn main() -> ExitCode {
         Err(error) => return refuse_arguments(&error),
     };
     if let Err(error) = signals::listen() {
-        output::warn(&format!("sastrugi: note: Ctrl-C will not be announced: {error}"));
+        output::warn(&format!("sastrugi: note: no message will be shown on Ctrl-C: {error}"));
     }
     if let Err(failure) = verbs::start_threads(arguments.common.threads) {
         return output::report(failure);
@@ -31,12 +31,12 @@ fn main() -> ExitCode {
     }
 }
 
-/// `--help` and `--version` are no errors; anything else that clap says is bad usage.
+/// `--help` and `--version` are not errors; everything else from clap is bad usage.
 fn refuse_arguments(error: &clap::Error) -> ExitCode {
-    // Nothing can be done about a terminal that is gone.
+    // A closed terminal cannot be helped.
     let _ = error.print();
     if error.use_stderr() { Code::Usage.into() } else { Code::Done.into() }
 }
 
-/// What a verb comes to.
+/// Result of a verb.
 type Verdict = Result<Code, Failure>;

@@ -9,16 +9,16 @@ use std::io::{IsTerminal, Write};
 use std::ops::Range;
 use std::process::ExitCode;
 
-/// A place farther right is told by its number: the drawing of a line that long helps nobody, and `miette` counts columns in 16 bits.
+/// Places farther right are given by line and column only: drawing such a long line is useless, and `miette` counts columns in 16 bits.
 const COLUMNS_SHOWN: usize = 1000;
 
-/// Reasons of a refusal that are drawn; a file of another kind would have thousands.
+/// Maximum number of errors that are drawn; a file that is not a study would give thousands.
 const REFUSALS_SHOWN: usize = 20;
 
-/// Prints JSON when asked for, else the text.
+/// Prints the value as JSON on request, otherwise the text.
 ///
 /// # Errors
-/// When stdout is gone.
+/// If stdout cannot be written.
 pub fn print(json: bool, value: &Value, text: &str) -> Result<(), Failure> {
     let mut out = std::io::stdout().lock();
     let written = if json {
@@ -28,18 +28,18 @@ pub fn print(json: bool, value: &Value, text: &str) -> Result<(), Failure> {
         writeln!(out, "{}", text.trim_end())
     };
     match written.and_then(|()| out.flush()) {
-        // A reader that has seen enough (`| head`) is no failure.
+        // A reader that closes the pipe early (`| head`) is not a failure.
         Err(e) if e.kind() == std::io::ErrorKind::BrokenPipe => Ok(()),
         other => other.map_err(Failure::failed),
     }
 }
 
-/// A line on stderr. Whoever reads it may have gone away: that is no reason to stop.
+/// Prints a line on stderr. A closed stderr is ignored.
 pub fn warn(line: &str) {
     drop(writeln!(std::io::stderr(), "{line}"));
 }
 
-/// Prints the message of a failure on stderr and gives the exit code.
+/// Prints the message of a failure on stderr and returns the exit code.
 pub fn report(failure: Failure) -> ExitCode {
     let code = failure.code();
     match failure.0 {
@@ -49,12 +49,12 @@ pub fn report(failure: Failure) -> ExitCode {
     code.into()
 }
 
-/// What is wrong in a study, each place drawn.
+/// Prints the errors in a study, each with its source line.
 fn print_refusals(name: &str, text: &str, refusals: &Refusals) {
     let Refusals(errors) = refusals;
-    let number = if errors.len() == 1 { String::new() } else { format!(" for {} reasons", errors.len()) };
+    let number = if errors.len() == 1 { String::new() } else { format!(": {} errors", errors.len()) };
     let drawn: Vec<String> = errors.iter().take(REFUSALS_SHOWN).map(|error| drawn(name, text, error)).collect();
-    warn(&format!("sastrugi: the study is refused{number}\n{}", drawn.join("\n")));
+    warn(&format!("sastrugi: invalid study{number}\n{}", drawn.join("\n")));
     if errors.len() > REFUSALS_SHOWN {
         warn(&format!("... and {} more", errors.len() - REFUSALS_SHOWN));
     }
@@ -85,7 +85,7 @@ fn drawn(name: &str, text: &str, error: &StudyError) -> String {
     }
 }
 
-/// Whether the lines of a span are short enough to be drawn.
+/// Whether the lines of a span are short enough to draw.
 fn is_narrow(text: &str, span: &Range<usize>) -> bool {
     let start = text.get(..span.start).map_or(0, |before| span.start - last_line(before).len());
     let end = text.get(span.end..).and_then(|rest| rest.find('\n')).map_or(text.len(), |length| span.end + length);
@@ -107,7 +107,7 @@ pub fn columns(rows: &[Vec<String>]) -> String {
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// Bytes in words.
+/// A size with unit.
 pub fn bytes(count: f64) -> String {
     let steps = [(1e9, "GB"), (1e6, "MB"), (1e3, "kB")];
     match steps.iter().find(|(size, _)| count >= *size) {
@@ -116,7 +116,7 @@ pub fn bytes(count: f64) -> String {
     }
 }
 
-/// Seconds in words.
+/// A duration with unit.
 pub fn seconds(count: f64) -> String {
     if count < 90.0 { format!("{count:.1} s") } else { format!("{:.1} min", count / 60.0) }
 }
@@ -140,5 +140,25 @@ mod tests {
         assert!(is_narrow(&text, &(0..1)) && is_narrow(&text, &(text.len() - 2..text.len())));
         assert!(!is_narrow(&text, &(end..end + 1)) && !is_narrow(&text, &(0..text.len())));
         assert!(!is_narrow(&text, &(0..text.len() + 9)));
+    }
+
+    #[test]
+    fn val_numbers_for_people() {
+        let sizes = [0.0, 999.0, 1000.0, 1.5e6, 2.34e9].map(bytes);
+        assert_eq!(sizes, ["0 bytes", "999 bytes", "1.0 kB", "1.5 MB", "2.3 GB"]);
+        assert_eq!([0.0, 89.9, 90.0, 600.0].map(seconds), ["0.0 s", "89.9 s", "1.5 min", "10.0 min"]);
+        // Rounding up may take one digit more before the point.
+        let numbers = [0.0, -0.5, 1.0, 9.9996, 1234.6, 123_456.0, 0.000_123_456, 1e-20, f64::NAN].map(significant);
+        let expected = ["0.000", "-0.5000", "1.000", "10.00", "1235", "123456", "0.0001235", "0.000000000000", "NaN"];
+        assert_eq!(numbers, expected);
+    }
+
+    /// Two spaces between columns, as wide as the widest cell in characters; rows may be short.
+    #[test]
+    fn val_columns_are_aligned() {
+        let rows = [vec!["σ", "b", "x"], vec!["long", "", ""], vec!["c"]];
+        let rows = rows.map(|row| row.into_iter().map(str::to_owned).collect::<Vec<_>>());
+        assert_eq!(columns(&rows), "σ     b  x\nlong\nc");
+        assert_eq!(columns(&[]), "");
     }
 }

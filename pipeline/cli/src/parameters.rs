@@ -1,31 +1,31 @@
-//! Parameters in words, from their JSON Schema.
+//! Descriptions of parameters, from their JSON Schema.
 
 use sastrugi_stages::verbs::parameters::to_toml;
 use serde_json::Value;
 
-/// A parameter, or a word or table that one may be.
+/// A parameter, or one of its alternatives: a word or a kind of table.
 #[derive(Debug, Default)]
 pub struct Parameter {
-    /// Dotted name: those of tables with `.`, of lists of tables with `[].`, of tables of a kind with `[kind].`; `name = word` for a word.
+    /// Dotted name: `.` after a table, `[].` after a list of tables, `[kind].` after a table of that kind; `name = word` for a word.
     pub name: String,
-    /// What it may hold; empty for words and tables of a list.
+    /// Type of the value; empty for words and tables of a list.
     pub holds: String,
-    /// Its default as TOML; empty where there is none.
+    /// Default as TOML; empty if there is none.
     pub default: String,
-    /// True when it must be given.
+    /// True if required.
     pub is_required: bool,
-    /// What it means.
+    /// Meaning.
     pub meaning: String,
 }
 
-/// The parameters that a schema describes, tables opened; a table within itself is not opened again.
+/// All parameters in a schema, including those of nested tables; a table that contains itself is expanded once.
 pub fn parameters(schema: &Value) -> Vec<Parameter> {
     let mut rows = Vec::new();
     add("", &[schema], schema.get("default"), &mut rows);
     rows
 }
 
-/// `path` leads from the root to the schema; `defaults` are those of its table as a whole.
+/// `path` leads from the root to the schema; `defaults` is the default of the table.
 fn add(prefix: &str, path: &[&Value], defaults: Option<&Value>, rows: &mut Vec<Parameter>) {
     let (Some(root), Some(schema)) = (path.first(), path.last()) else { return };
     let schema = resolve(schema, root);
@@ -68,7 +68,7 @@ fn add(prefix: &str, path: &[&Value], defaults: Option<&Value>, rows: &mut Vec<P
     }
 }
 
-/// What a value may be, in words.
+/// Type of a value, as text.
 fn holds(schema: &Value, root: &Value) -> String {
     if let Some(choices) = schema.get("anyOf").and_then(Value::as_array) {
         let mut all: Vec<String> =
@@ -125,23 +125,102 @@ fn choices(items: &Value) -> Vec<(&str, &Value)> {
     all.filter_map(|c| Some((c.pointer("/properties/kind/const")?.as_str()?, c))).collect()
 }
 
-/// Words that a parameter may be, with what the schema says of each.
+/// Words that a parameter accepts, with their descriptions.
 fn words(schema: &Value) -> Vec<(String, String)> {
     let all = schema.get("oneOf").and_then(Value::as_array).into_iter().flatten();
     let described = all.filter(|word| word.get("description").is_some());
     described.filter_map(|word| Some((word.get("const")?.to_string(), text_of(word)))).collect()
 }
 
-/// What a schema says of itself, on one line.
+/// The description of a schema, on one line.
 pub fn text_of(schema: &Value) -> String {
     schema.get("description").and_then(Value::as_str).unwrap_or_default().replace('\n', " ")
 }
 
-/// The schema that a reference stands for, also where there may be nothing in its place.
+/// The schema that a reference points to, also if it is optional.
 fn resolve<'a>(schema: &'a Value, root: &'a Value) -> &'a Value {
     let something =
         schema.get("anyOf").and_then(Value::as_array).and_then(|any| any.iter().find(|s| s["type"] != "null"));
     let schema = something.unwrap_or(schema);
     let target = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix('#'));
     target.and_then(|path| root.pointer(path)).unwrap_or(schema)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    /// Numbers, words, lists and tables within tables; a table that contains itself is expanded once.
+    #[test]
+    fn val_parameters_of_a_schema() {
+        let schema = json!({
+            "required": ["sigma_m", "low"],
+            "properties": {
+                "kind": { "const": "x" },
+                "sigma_m": { "type": "number", "description": "Height.\nIn m." },
+                "low": { "$ref": "#/$defs/Layer" },
+                "phase": {
+                    "description": "Phase.",
+                    "default": "unit",
+                    "oneOf": [
+                        { "const": "unit", "description": "Exact." },
+                        { "const": "gaussian", "description": "Random." },
+                    ],
+                },
+                "window": { "type": ["array", "null"], "items": { "type": "number" }, "minItems": 4, "maxItems": 4 },
+            },
+            "$defs": {
+                "Layer": {
+                    "type": "object",
+                    "description": "A layer.",
+                    "properties": {
+                        "count": { "type": "integer", "default": 3, "description": "How many." },
+                        "inner": { "anyOf": [{ "$ref": "#/$defs/Layer" }, { "type": "null" }] },
+                    },
+                },
+            },
+        });
+        let mut rows = parameters(&schema);
+        rows.sort_by(|a, b| a.name.cmp(&b.name));
+        let of = |p: &Parameter| [&p.name, &p.holds, &p.default, &p.meaning].map(String::clone);
+        let told: Vec<[String; 4]> = rows.iter().map(of).collect();
+        let expected = [
+            ["low", "table", "", "A layer."],
+            ["low.count", "integer", "3", "How many."],
+            ["low.inner", "table", "", "A layer."],
+            ["phase", "word", "\"unit\"", "Phase."],
+            ["phase = \"gaussian\"", "", "", "Random."],
+            ["phase = \"unit\"", "", "", "Exact."],
+            ["sigma_m", "number", "", "Height. In m."],
+            ["window", "list of 4 numbers", "", ""],
+        ];
+        assert_eq!(told, expected);
+        let required: Vec<&str> = rows.iter().filter(|p| p.is_required).map(|p| p.name.as_str()).collect();
+        assert_eq!(required, ["low", "sigma_m"]);
+    }
+
+    /// Tables of a list are told apart by their kind, and the keys of each follow it.
+    #[test]
+    fn val_kinds_of_the_tables_of_a_list() {
+        let schema = json!({
+            "properties": {
+                "processes": {
+                    "type": "array",
+                    "description": "What happens.",
+                    "items": {
+                        "oneOf": [{
+                            "description": "Craters.",
+                            "properties": {
+                                "kind": { "const": "craters" },
+                                "count": { "type": "integer", "description": "How many." },
+                            },
+                        }],
+                    },
+                },
+            },
+        });
+        let names: Vec<String> = parameters(&schema).into_iter().map(|p| p.name).collect();
+        assert_eq!(names, ["processes", "processes[craters]", "processes[craters].count"]);
+    }
 }

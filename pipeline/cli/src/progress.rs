@@ -1,4 +1,4 @@
-//! Progress of a run on stderr: a bar with ETA on a terminal, plain lines otherwise, nothing but failures when quiet.
+//! Progress of a run on stderr: a bar with ETA on a terminal, plain lines otherwise, only failures when quiet.
 
 use crate::output::warn;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -10,14 +10,14 @@ use std::time::Instant;
 
 /// Steps of the bar per estimated second.
 const TICKS_PER_SECOND: f64 = 1000.0;
-/// Time after which the speed of a copy is known, s.
+/// Time after which the speed of a copy can be estimated, s.
 const KNOWN_AFTER_S: f64 = 2.0;
 
-/// Between two lines of progress where there is no bar, s.
+/// Minimum time between two lines of progress without a bar, s.
 const LINE_EVERY_S: f64 = 1.0;
 
-/// The listener of a run.
-pub struct Teller {
+/// Reports the progress of a run.
+pub struct Reporter {
     quiet: bool,
     bar: Option<ProgressBar>,
     state: Mutex<State>,
@@ -30,13 +30,13 @@ struct State {
     ended: usize,
     seconds_total: f64,
     seconds_done: f64,
-    /// When a copy began whose speed is not told yet.
+    /// Start of the current copy, until its remaining time has been reported.
     copy_start: Option<Instant>,
     last_line: Option<Instant>,
 }
 
 impl State {
-    /// True when the last line is a while ago, and at the last item.
+    /// True when the last line is old enough, and at the last item.
     fn is_time(&mut self) -> bool {
         let is_time =
             self.ended == self.total || self.last_line.is_none_or(|at| at.elapsed().as_secs_f64() >= LINE_EVERY_S);
@@ -47,8 +47,8 @@ impl State {
     }
 }
 
-impl Teller {
-    /// A listener; `quiet` keeps everything but failures.
+impl Reporter {
+    /// A reporter; `quiet` suppresses everything but failures.
     pub fn new(quiet: bool) -> Self {
         let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
             let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
@@ -59,7 +59,7 @@ impl Teller {
         Self { quiet, bar, state: Mutex::default(), start: Instant::now() }
     }
 
-    /// A line that stays.
+    /// Prints a permanent line.
     pub fn say(&self, line: &str) {
         if self.quiet {
             return;
@@ -74,7 +74,7 @@ impl Teller {
         }
     }
 
-    /// Takes the bar away.
+    /// Removes the bar.
     pub fn close(&self) {
         if let Some(bar) = &self.bar {
             bar.finish_and_clear();
@@ -96,8 +96,8 @@ impl Teller {
         }
     }
 
-    /// Tells once how long a copy will take, from what is done of it.
-    fn tell_copy(&self, done: u64, total: u64) {
+    /// Reports once how long a copy will take, from its speed so far.
+    fn report_copy(&self, done: u64, total: u64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         if done == 0 {
             state.copy_start = Some(Instant::now());
@@ -124,7 +124,7 @@ impl Teller {
     }
 }
 
-impl Progress for Teller {
+impl Progress for Reporter {
     fn begin(&self, total: usize, ready: usize, seconds: f64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         *state = State { total: total - ready, seconds_total: seconds, ..State::default() };
@@ -132,21 +132,21 @@ impl Progress for Teller {
         if let Some(bar) = &self.bar {
             bar.set_length((seconds * TICKS_PER_SECOND) as u64);
         }
-        self.say(&format!("{total} items, {ready} of them there already"));
+        self.say(&format!("{total} items, {ready} already computed"));
     }
 
     fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {
         match end {
-            // Their sentences are told in the end, by `watch`.
+            // Their notes are printed at the end, by `watch`.
             End::Done(_) => {}
             End::Failed(why) => self.print(&format!("sastrugi: {item} failed: {why}")),
-            End::Skipped(parent) => self.print(&format!("sastrugi: {item} not tried, because {parent} failed")),
+            End::Skipped(parent) => self.print(&format!("sastrugi: {item} skipped because {parent} failed")),
         }
         self.advance(item, seconds);
     }
 
     fn copied(&self, done: u64, total: u64) {
-        let Some(bar) = &self.bar else { return self.tell_copy(done, total) };
+        let Some(bar) = &self.bar else { return self.report_copy(done, total) };
         if done == 0 {
             bar.set_length(total);
             bar.reset_eta();
@@ -165,5 +165,33 @@ impl Progress for Teller {
         if let Some(bar) = &self.bar {
             bar.set_message(text.to_owned());
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first line comes at once, the next after a second, and the last in any case.
+    #[test]
+    fn val_lines_are_sparse() {
+        let mut state = State { total: 3, ended: 1, ..State::default() };
+        assert!(state.is_time());
+        state.ended = 2;
+        assert!(!state.is_time());
+        state.ended = 3;
+        assert!(state.is_time());
+    }
+
+    /// Without finished work nothing is known of the rest, and at the end there is none.
+    #[test]
+    fn val_time_left_is_told_when_known() {
+        let reporter = Reporter::new(true);
+        let state =
+            |ended, seconds_done| State { total: 2, ended, seconds_total: 8.0, seconds_done, ..State::default() };
+        assert_eq!(reporter.remaining(&state(1, 0.0)), "");
+        assert_eq!(reporter.remaining(&state(2, 8.0)), "");
+        let told = reporter.remaining(&state(1, 4.0));
+        assert!(told.starts_with(", about ") && told.ends_with(" left"), "{told}");
     }
 }

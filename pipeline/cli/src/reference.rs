@@ -1,4 +1,4 @@
-//! The page on study files (`docs/study.md`): every section, kind and key, from the schemas of what reads them.
+//! The reference for study files (`docs/study.md`): all sections, kinds and keys, generated from the schemas of their types.
 
 use crate::examples::EXAMPLES;
 use crate::parameters::{Parameter, parameters, text_of};
@@ -11,7 +11,7 @@ use serde_json::Value;
 
 const INTRODUCTION: &str = include_str!("reference.md");
 
-/// The page, Markdown.
+/// The page as Markdown.
 pub fn study() -> String {
     let listed = |name: &str, form: Form, envelope: &Value| {
         let heading = heading(name, form);
@@ -23,7 +23,7 @@ pub fn study() -> String {
     contents.extend(SECTIONS.iter().map(|s| listed(s.name, s.form, &(s.envelope)())));
     let mut parts = vec![
         INTRODUCTION.trim_end().to_owned(),
-        format!("## Sections\n\n| section | what it is |\n|---|---|\n{}", contents.join("\n")),
+        format!("## Sections\n\n| section | purpose |\n|---|---|\n{}", contents.join("\n")),
         chapter("study", Form::Table, &head),
     ];
     for section in &SECTIONS {
@@ -40,7 +40,7 @@ fn heading(name: &str, form: Form) -> String {
     }
 }
 
-/// What a section is: its description without its own name before it.
+/// The description of a section without the leading name.
 fn purpose(envelope: &Value) -> String {
     let text = text_of(envelope);
     capital(text.split_once("`: ").map_or(text.as_str(), |(_, purpose)| purpose))
@@ -80,7 +80,7 @@ fn kinds(section: &Section) -> Vec<String> {
     distinct.iter().map(text).collect()
 }
 
-/// A table of keys; empty where there are none.
+/// A table of keys; empty if there are none.
 fn table(place: &Place<'_>, schema: &Value) -> String {
     let rows: Vec<String> = parameters(schema).iter().map(|p| row(place, p)).collect();
     if rows.is_empty() {
@@ -97,14 +97,14 @@ fn row(place: &Place<'_>, p: &Parameter) -> String {
     format!("| {name} | {} | {default} | {example} | {} |", p.holds, p.meaning.replace('|', "\\|"))
 }
 
-/// Where a key belongs: its section, and the kind of its table where kinds have keys of their own.
+/// Location of a key: its section, and the kind of its table if kinds have their own keys.
 struct Place<'a> {
     section: &'a str,
-    /// Key that names the kind, and the kind.
+    /// Key that selects the kind, and the kind.
     kind: Option<(&'static str, &'static str)>,
 }
 
-/// The first table of a section in the studies to start from, without the comments around it.
+/// The first table of a section in the starting studies, without the surrounding comments.
 fn example(heading: &str) -> Option<String> {
     STARTING.iter().find_map(|starting| {
         let lines = starting.text.lines().skip_while(|line| *line != heading);
@@ -113,7 +113,7 @@ fn example(heading: &str) -> Option<String> {
     })
 }
 
-/// A value of a key: from a study to start from, its default, or from the list of examples.
+/// An example value of a key: from a starting study, its default, or the list of examples, in this order.
 fn example_of(place: &Place<'_>, p: &Parameter) -> Option<String> {
     let last = p.name.rsplit('.').next().unwrap_or_default();
     let in_section = format!("{}: {last}", place.section);
@@ -123,7 +123,7 @@ fn example_of(place: &Place<'_>, p: &Parameter) -> Option<String> {
     written(place, &p.name).or_else(default).or_else(listed)
 }
 
-/// What a key is given in the first table of its section and kind that has it, in the studies to start from.
+/// The value of a key in the first table of its section and kind that has it, in the starting studies.
 fn written(place: &Place<'_>, key: &str) -> Option<String> {
     let headings = [heading(place.section, Form::Array), heading(place.section, Form::Table)];
     let is_of_kind = |table: &str| match place.kind {
@@ -147,4 +147,43 @@ fn value_in(table: &str, key: &str) -> Option<String> {
         let value = value.split_once("  #").map_or(value, |(value, _)| value);
         (name == key).then(|| value.trim().to_owned())
     })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_values_in_the_lines_of_a_table() {
+        let table = "id = \"a\"  # its name\nhigh.d = 2.3\n# count = 4\nlist = [1, 2]";
+        let value = |key: &str| value_in(table, key);
+        assert_eq!((value("id").as_deref(), value("high.d").as_deref()), (Some("\"a\""), Some("2.3")));
+        assert_eq!((value("list").as_deref(), value("count"), value("d")), (Some("[1, 2]"), None, None));
+    }
+
+    /// The example of a section is the first table of a starting study, whole and without what surrounds it.
+    #[test]
+    fn val_examples_of_sections() {
+        let mut count = 0;
+        for section in &SECTIONS {
+            let heading = heading(section.name, section.form);
+            let Some(example) = example(&heading) else { continue };
+            count += 1;
+            assert!(example.starts_with(&heading) && example.lines().count() > 1, "{example}");
+            assert!(example.lines().skip(1).all(|line| !line.starts_with('[')), "{example}");
+        }
+        assert!(count >= 10, "{count}");
+        let terrain = example("[[terrain]]").unwrap();
+        assert!(terrain.contains("kind = \"multifractal\"") && !terrain.contains("weierstrass"), "{terrain}");
+        assert_eq!(example("[[nothing]]"), None);
+    }
+
+    /// Of a key that is listed twice, the second example would never be shown.
+    #[test]
+    fn val_examples_are_listed_once() {
+        let mut keys: Vec<&str> = EXAMPLES.iter().map(|(key, _)| *key).collect();
+        keys.sort_unstable();
+        keys.dedup();
+        assert_eq!(keys.len(), EXAMPLES.len());
+    }
 }

@@ -1,4 +1,4 @@
-//! Signals: ends that are asked for, and those that the system would make of an error.
+//! Signal handlers: orderly termination on request, and exit codes for conditions that the system reports by signal.
 
 use crate::failure::Code;
 use crate::output::warn;
@@ -10,14 +10,14 @@ use std::io;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
-/// Answers signals from here on.
+/// Installs the handlers.
 ///
 /// # Errors
-/// The system takes no handler, or starts no thread.
+/// If a handler cannot be registered or the thread cannot be started.
 pub fn listen() -> io::Result<()> {
-    // Writes beyond `ulimit -f` are then errors that name their file.
+    // A write beyond `ulimit -f` then fails with an error that names the file, instead of killing the process.
     flag::register(SIGXFSZ, Arc::default())?;
-    // Where memory is out, the standard library says so and aborts. With more of it the same call may work.
+    // When an allocation fails, the standard library prints a message and aborts. The call may succeed with more memory.
     flag::register_conditional_shutdown(SIGABRT, i32::from(Code::Retry as u8), Arc::new(AtomicBool::new(true)))?;
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     std::thread::Builder::new()
@@ -26,14 +26,12 @@ pub fn listen() -> io::Result<()> {
     Ok(())
 }
 
-/// Every file appears whole or not at all, so the process may end here and now.
+/// Files are written atomically, so the process may exit at any time.
 fn interrupted() {
     match serve::interrupted() {
         Some(Interrupt::First) => return,
         Some(Interrupt::Again) => warn("\nsastrugi: stopped immediately; open requests were cut off"),
-        None => warn(
-            "\nsastrugi: interrupted; nothing half-written bears its name, and a run goes on from what it finished",
-        ),
+        None => warn("\nsastrugi: interrupted; no partial files left; rerun to resume"),
     }
     std::process::exit(i32::from(Code::Retry as u8));
 }

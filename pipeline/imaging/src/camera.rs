@@ -1,11 +1,11 @@
-//! Which pixel a point falls on, and which ray a pixel looks along.
+//! Cameras: the pixel of a point, and the ray of a pixel.
 //!
-//! A parallel camera is one so far away that all rays are parallel, as from an orbit over a small scene; a pinhole camera stands in the
-//! scene, as a rover's does. Neither distorts.
+//! A parallel camera is so far away that all its rays are parallel, as from orbit over a small scene; a pinhole camera stands in the
+//! scene, like a rover's. Neither has lens distortion.
 
 use crate::direction::{Vector, along, cross, direction, dot, minus, unit};
 
-/// Views nearer to the vertical than this (cosine to the axis) take north for up.
+/// Cosine between the view and the default up axis above which the other axis is used as up.
 const NEAR_AXIS: f64 = 0.999;
 
 /// A camera of one of the two kinds.
@@ -17,7 +17,7 @@ pub enum Camera {
     Pinhole(PinholeCamera),
 }
 
-/// What a pixel looks along: from `origin_m` in the unit direction `direction`, away from the camera.
+/// The ray of a pixel: from `origin_m` in the unit direction `direction`, away from the camera.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Ray {
     /// A point on the ray, m: the pinhole, or a point of the image plane of a parallel camera.
@@ -35,7 +35,7 @@ struct Axes {
 }
 
 impl Axes {
-    /// Axes of a view against `back`; `up` points to the top of the image.
+    /// Axes of a view opposite to `back`; `up` points to the top of the image.
     fn new(back: Vector, up: Vector) -> Self {
         let right = unit(cross(up, back));
         Self { right, top: cross(back, right), back }
@@ -53,8 +53,8 @@ pub struct ParallelCamera {
 }
 
 impl ParallelCamera {
-    /// A camera towards which `azimuth_deg` (clockwise from north) and `elevation_deg` (90: straight above) point from the ground. The centre
-    /// of its image shows `centre_m`; a pixel is `pixel_m` wide across the rays.
+    /// A camera in the direction `azimuth_deg` (clockwise from north) and `elevation_deg` (90: straight above) as seen from the ground. The
+    /// centre of its image shows `centre_m`; a pixel measures `pixel_m` perpendicular to the rays.
     pub fn new(
         [azimuth_deg, elevation_deg]: [f64; 2],
         centre_m: Vector,
@@ -80,8 +80,8 @@ pub struct PinholeCamera {
 }
 
 impl PinholeCamera {
-    /// A camera at a place that looks at another, with its width seen under `field_of_view_deg`; up is up in the image, and north in one that
-    /// looks straight down.
+    /// A camera at `position_m` that looks at `target_m`; the width of its image spans `field_of_view_deg`. The top of the image is up, or
+    /// north if it looks straight down.
     pub fn new(position_m: Vector, target_m: Vector, field_of_view_deg: f64, [rows, cols]: [usize; 2]) -> Self {
         let back = unit(minus(position_m, target_m));
         let vertical = [0.0, 0.0, 1.0];
@@ -100,7 +100,17 @@ impl Camera {
         }
     }
 
-    /// Column and row that a point falls on, in pixels from the upper left corner; beyond the image too. `None` behind a pinhole.
+    /// Column and row of a point, in pixels from the upper left corner, also outside the image. `None` behind a pinhole.
+    ///
+    /// ```
+    /// use sastrugi_imaging::{Camera, PinholeCamera};
+    ///
+    /// // Looking north with 90 deg over 40 columns: what lies as far to the right as ahead is at the right edge.
+    /// let camera = Camera::Pinhole(PinholeCamera::new([0.0; 3], [0.0, 1.0, 0.0], 90.0, [30, 40]));
+    /// let [col, row] = camera.project([2.0, 2.0, 0.0]).unwrap();
+    /// assert!((col - 40.0).abs() < 1e-12 && (row - 15.0).abs() < 1e-12);
+    /// assert_eq!(camera.project([0.0, -1.0, 0.0]), None);
+    /// ```
     pub fn project(&self, point_m: Vector) -> Option<[f64; 2]> {
         let [rows, cols] = self.shape();
         let place = |offset: Vector, axes: &Axes, scale: f64| {
@@ -116,7 +126,7 @@ impl Camera {
         }
     }
 
-    /// The ray of a place in the image, column and row in pixels from the upper left corner.
+    /// The ray of a position in the image, column and row in pixels from the upper left corner.
     pub fn ray(&self, [col, row]: [f64; 2]) -> Ray {
         let [rows, cols] = self.shape();
         let (right, top) = (col - 0.5 * cols as f64, 0.5 * rows as f64 - row);
@@ -155,7 +165,7 @@ mod tests {
         ]
     }
 
-    /// A point of the ray of a pixel falls on that pixel.
+    /// A point on the ray of a pixel projects to that pixel.
     #[test]
     fn prop_rays_and_projection_agree() {
         for camera in cameras() {
@@ -170,7 +180,7 @@ mod tests {
         }
     }
 
-    /// From above: north is up, east right, a pixel is a cell.
+    /// From above, north is up, east is right, and a pixel is a cell.
     #[test]
     fn val_from_above_the_image_is_a_map() {
         let [camera, ..] = cameras();
@@ -178,7 +188,40 @@ mod tests {
         assert!((col - 24.0).abs() < 1e-12 && (row - 13.0).abs() < 1e-12);
     }
 
-    /// A pinhole: what lies behind it falls on no pixel, a horizontal camera has up at the top, its field of view is its width.
+    /// From the east at 30 deg, a metre east spans half a metre across the rays, a metre north a full one, and what stands a metre
+    /// higher appears 0.87 m farther west, away from the camera. From the south at 45 deg, height shifts a point to the north.
+    #[test]
+    fn val_oblique_images_lean_away_from_the_camera() {
+        let from = |azimuth_deg: f64, elevation_deg: f64| {
+            Camera::Parallel(ParallelCamera::new([azimuth_deg, elevation_deg], [10.0, 20.0, 1.0], 0.5, [30, 40]))
+        };
+        let near = |camera: Camera, point: Vector, [col, row]: [f64; 2]| {
+            let at = camera.project(point).unwrap();
+            assert!((at[0] - col).abs() < 1e-12 && (at[1] - row).abs() < 1e-12, "{point:?} at {at:?}, not {col} {row}");
+        };
+        let east = from(90.0, 30.0);
+        near(east, [10.0, 20.0, 1.0], [20.0, 15.0]);
+        near(east, [11.0, 20.0, 1.0], [21.0, 15.0]);
+        near(east, [10.0, 21.0, 1.0], [20.0, 13.0]);
+        near(east, [10.0, 20.0, 2.0], [20.0 - 3f64.sqrt(), 15.0]);
+        let south = from(180.0, 45.0);
+        near(south, [11.0, 20.0, 1.0], [22.0, 15.0]);
+        near(south, [10.0, 21.0, 1.0], [20.0, 15.0 - 2f64.sqrt()]);
+        near(south, [10.0, 20.0, 2.0], [20.0, 15.0 - 2f64.sqrt()]);
+    }
+
+    /// Straight down from 50 m with 60 deg over 40 columns, a pixel measures 50 m x tan 30 deg / 20, and north is up.
+    #[test]
+    fn val_a_pinhole_above_sees_a_map() {
+        let [.., camera] = cameras();
+        let pixel_m = 50.0 / 3f64.sqrt() / 20.0;
+        let [col, row] = camera.project([11.0, 22.0, 0.0]).unwrap();
+        let expected = [20.0 + 1.0 / pixel_m, 15.0 - 2.0 / pixel_m];
+        assert!((col - expected[0]).abs() < 1e-12 && (row - expected[1]).abs() < 1e-12, "{col} {row}");
+    }
+
+    /// A pinhole: points behind it project to no pixel, the image of a horizontal camera has up at the top, and its width spans the field
+    /// of view.
     #[test]
     fn val_pinholes_look_ahead() {
         let camera = Camera::Pinhole(PinholeCamera::new([0.0; 3], [0.0, 1.0, 0.0], 90.0, [30, 40]));

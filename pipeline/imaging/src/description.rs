@@ -1,4 +1,4 @@
-//! What stands in the JSON file beside an image: everything that is needed to take heights from it.
+//! The JSON file that accompanies an image: all that is needed to derive heights from it.
 
 use crate::photometry::Photometry;
 use crate::pose::CameraPose;
@@ -11,9 +11,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Noise {
-    /// Part that goes with the brightness.
+    /// Part proportional to the brightness.
     pub relative: f64,
-    /// Part that does not, in units of the image (I/F).
+    /// Constant part, in units of the image (I/F).
     pub absolute: f64,
 }
 
@@ -38,35 +38,35 @@ impl Noise {
     }
 }
 
-/// The file beside an image, `<image>.json`. Pixels hold `exposure * I + haze` and noise, with `I` the brightness of the ground
-/// ([`Photometry`]).
+/// The file that accompanies an image, `<image>.json`. Pixels hold `exposure * I + haze` plus noise, with `I` the brightness of the
+/// ground ([`Photometry`]).
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImageDescription {
-    /// File of the image, in the folder of this one.
+    /// File of the image, in the same folder.
     pub image: String,
     /// Sun.
     pub sun: Sun,
     /// Camera, in the coordinates of the surface.
     pub camera: CameraPose,
-    /// How a facet reflects.
+    /// Photometric function.
     #[serde(default)]
     pub photometry: Photometry,
-    /// Factor on the brightness.
+    /// Factor applied to the brightness.
     #[serde(default = "one")]
     pub exposure: f64,
-    /// Brightness that is added everywhere (I/F).
+    /// Brightness added to every pixel (I/F).
     #[serde(default)]
     pub haze: f64,
-    /// Noise that was added.
+    /// Noise of the image.
     #[serde(default)]
     pub noise: Noise,
-    /// Of an image that was rendered: from what.
+    /// Source of a rendered image.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rendered: Option<Rendered>,
 }
 
-/// What an image was rendered from.
+/// Source of a rendered image.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Rendered {
@@ -76,16 +76,16 @@ pub struct Rendered {
     pub surface_shape: [usize; 2],
     /// Its cell size east-west and north-south, m.
     pub surface_cell_m: [f64; 2],
-    /// Id or file of the albedo map; absent where the ground has one albedo.
+    /// Id or file of the albedo map; absent if the ground has uniform albedo.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub albedo_map: Option<String>,
-    /// Albedo where no map has one.
+    /// Albedo where there is no map or the map has no data.
     pub albedo: f64,
     /// Rays along a side of a pixel.
     pub samples: u32,
     /// True with cast shadows.
     pub shadows: bool,
-    /// Words of the random stream of the noise; absent without noise.
+    /// Name of the random stream of the noise; absent without noise.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub noise_stream: Option<String>,
 }
@@ -95,7 +95,7 @@ fn one() -> f64 {
 }
 
 impl ImageDescription {
-    /// Refuses what no image can have.
+    /// Checks every number.
     ///
     /// # Errors
     /// The first number that is out of range.
@@ -108,7 +108,7 @@ impl ImageDescription {
     }
 }
 
-/// Refuses exposures and haze that are out of range.
+/// Checks exposure and haze.
 pub(crate) fn check_radiometry(exposure: f64, haze: f64) -> Result<(), ParameterError> {
     ParameterError::positive("exposure", exposure)?;
     if haze.is_finite() {
@@ -123,7 +123,7 @@ mod tests {
     use super::*;
     use serde_json::json;
 
-    /// A file of someone else's image needs the image, its sun and its camera.
+    /// The description of an external image needs only the image, its sun and its camera.
     #[test]
     fn val_a_short_description_is_enough() {
         let camera = json!({ "kind": "parallel", "azimuth_deg": 0.0, "elevation_deg": 90.0, "centre_m": [5.0, 5.0, 0.0],

@@ -1,16 +1,16 @@
-//! An image for the eye: 8-bit grey.
+//! Conversion of an image to 8-bit grey for display.
 //!
-//! Black is 0; white is the brightness that one pixel in 200 exceeds, so that a few glints darken nothing. Between them levels go with the
-//! power 1/2.2 of the brightness, which screens undo. Pixels that see no ground are transparent.
+//! Black is brightness 0; white is the brightness exceeded by one pixel in 200, so a few glints do not darken the image. Between them,
+//! levels follow brightness to the power 1/2.2, which screens invert. Pixels that see no ground are transparent.
 
 use sastrugi_numeric::{Grid, sums};
 
 /// Share of the pixels that are shown below white.
 const WHITE_QUANTILE: f64 = 0.995;
-/// Exponent by which screens turn levels into light.
+/// Exponent by which screens convert levels to light.
 const GAMMA: f64 = 2.2;
 
-/// The brightness that is shown white; NaN where no pixel sees ground.
+/// The brightness that is displayed as white; NaN if no pixel sees ground.
 pub fn white(image: &Grid) -> f64 {
     let mut values = sums::finite(&image.values);
     values.sort_by(f64::total_cmp);
@@ -18,6 +18,15 @@ pub fn white(image: &Grid) -> f64 {
 }
 
 /// Level and opacity of every pixel, 0 to 255, with `white` as the brightness of white.
+///
+/// ```
+/// use sastrugi_imaging::display::grey;
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// // Black, white, brighter than white, and no ground.
+/// let image = Grid::new(Geometry::square(1, 4, 1.0), vec![0.0, 0.4, 9.0, f64::NAN]);
+/// assert_eq!(grey(&image, 0.4).values, [[0, 255], [255, 255], [255, 255], [0, 0]]);
+/// ```
 pub fn grey(image: &Grid, white: f64) -> Grid<[u8; 2]> {
     image.map(|brightness| match brightness {
         b if !b.is_finite() => [0, 0],
@@ -40,9 +49,9 @@ mod tests {
         assert_eq!(grey(&image, 1.0).values, [[0, 255], [0, 255], [middle, 255], [255, 255], [0, 0]]);
     }
 
-    /// One bright pixel in a thousand does not set the white.
+    /// One bright pixel in a thousand does not set the white level.
     #[test]
-    fn val_a_glint_darkens_nothing() {
+    fn val_a_glint_does_not_darken_the_image() {
         let g = Geometry::square(10, 100, 1.0);
         let mut image = Grid::filled(g, 0.2);
         image.values[17] = 50.0;

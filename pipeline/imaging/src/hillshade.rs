@@ -1,25 +1,37 @@
-//! Hillshade: how bright a surface is under one distant light.
+//! Hillshade: brightness of a surface under one distant light.
 //!
 //! Brightness is `max(0, n . l)` with the surface normal `n = (-p, -q, 1) / sqrt(1 + p^2 + q^2)` and the unit vector `l`
 //! towards the light. `p` (east) and `q` (north) are the 3 x 3 gradients of B. Horn, Hill shading and the reflectance
-//! map, Proc. IEEE 69 (1981), times the exaggeration. The outermost cells take the gradient of their inner neighbours; a
-//! neighbour without data counts as level with the centre.
+//! map, Proc. IEEE 69 (1981), times the exaggeration. The outermost cells take the gradient of their inner neighbours. A
+//! neighbour without data is assigned the height of the centre.
 
 use sastrugi_numeric::Grid;
 
 /// Unit vector to the light: azimuth 315 degrees (north-west), altitude 45 degrees.
 pub const LIGHT: [f64; 3] = [-0.5, 0.5, std::f64::consts::FRAC_1_SQRT_2];
 
-/// Root mean square slope at which relief is not exaggerated any further.
+/// Largest root mean square slope after exaggeration.
 const STEEP_ENOUGH: f64 = 0.5;
 
-/// The round factor that makes slopes of that root mean square well visible.
+/// The round factor of exaggeration that makes relief with this root mean square slope clearly visible.
 pub fn exaggeration(rms_slope: f64) -> f64 {
     let factors = [50.0, 20.0, 10.0, 5.0, 2.0];
     factors.into_iter().find(|f| f * rms_slope <= STEEP_ENOUGH).unwrap_or(1.0)
 }
 
-/// Brightness in 0..1 of every cell; NaN where there is no data.
+/// Brightness of every cell, 0 to 1; NaN without data.
+///
+/// ```
+/// use sastrugi_imaging::hillshade::hillshade;
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// let g = Geometry::square(5, 5, 1.0);
+/// let level = Grid::filled(g, 7.0);
+/// assert!((hillshade(&level, 1.0).at(2, 2) - 0.5f64.sqrt()).abs() < 1e-12);
+/// // Ground that rises to the east faces the light in the north-west.
+/// let rising = Grid::new(g, (0..25).map(|k| 0.3 * g.x(k % 5)).collect());
+/// assert!(hillshade(&rising, 1.0).at(2, 2) > hillshade(&level, 1.0).at(2, 2));
+/// ```
 pub fn hillshade(grid: &Grid, exaggeration: f64) -> Grid {
     let cells = (0..grid.rows()).flat_map(|r| (0..grid.cols()).map(move |c| (r, c)));
     let values = cells.map(|(r, c)| brightness(grid, r, c, exaggeration)).collect();
@@ -33,13 +45,13 @@ fn brightness(grid: &Grid, row: usize, col: usize, exaggeration: f64) -> f64 {
     lit(gradient(grid, row, col).map(|v| v * exaggeration), LIGHT)
 }
 
-/// Brightness of a facet of a gradient east and north.
+/// Brightness of a facet with a gradient east and north.
 fn lit([p, q]: [f64; 2], light: [f64; 3]) -> f64 {
     let length = (1.0 + p * p + q * q).sqrt();
     ((light[2] - p * light[0] - q * light[1]) / length).max(0.0)
 }
 
-/// Eight cells times the gradient east and north of 3 x 3 heights, row 0 in the north (Horn, 1981).
+/// Gradient east and north of 3 x 3 heights, times eight cell sizes; row 0 in the north (Horn, 1981).
 fn differences(z: impl Fn(usize, usize) -> f64) -> [f64; 2] {
     let east = z(0, 2) + 2.0 * z(1, 2) + z(2, 2) - z(0, 0) - 2.0 * z(1, 0) - z(2, 0);
     let north = z(0, 0) + 2.0 * z(0, 1) + z(0, 2) - z(2, 0) - 2.0 * z(2, 1) - z(2, 2);
@@ -62,8 +74,8 @@ fn gradient(grid: &Grid, row: usize, col: usize) -> [f64; 2] {
     [east / (8.0 * grid.geometry.cell[0]), north / (8.0 * grid.geometry.cell[1])]
 }
 
-/// Brightness in 0..1 of the inner cells of a raster of square cells, all but its outermost, under a light of any direction; NaN where there is no
-/// data. `shape` is `(rows, cols)`, row 0 in the north. Rasters that share these outermost cells with their neighbours have no seam between them.
+/// Brightness, 0 to 1, of all but the outermost cells of a raster of square cells, under a light of any direction; NaN without data.
+/// `shape` is `(rows, cols)`, row 0 in the north. Rasters that overlap their neighbours by these outermost cells join without a seam.
 pub fn shade_inner(
     heights: &[f32],
     [rows, cols]: [usize; 2],
@@ -81,7 +93,7 @@ pub fn shade_inner(
                 shades.push(f32::NAN);
                 continue;
             }
-            // Differences from the centre keep the digits of small relief on high ground.
+            // Differences from the centre preserve the digits of low relief on high ground.
             let z = |r: usize, c: usize| {
                 let difference = f64::from(lines[r][col + c - 1]) - f64::from(centre);
                 if difference.is_nan() { 0.0 } else { difference }
@@ -133,7 +145,20 @@ mod tests {
         assert!(hillshade(&line, 1.0).values.iter().all(|v| (v - LIGHT[2]).abs() < 1e-15));
     }
 
-    /// The inner cells of a tile with its neighbours' outermost are those of the whole, bit for bit: no seam.
+    /// Heights 0, 1, 2 to the east, without the one east of the centre, which takes the height of the centre: 6 eighths of a gradient of
+    /// 1. Both shadings use this rule.
+    #[test]
+    fn val_a_missing_neighbour_is_as_high_as_the_centre() {
+        let mut grid = Grid::new(Geometry::square(3, 3, 1.0), (0..9).map(|k| f64::from(k % 3)).collect());
+        grid.values[5] = f64::NAN;
+        let expected = (std::f64::consts::FRAC_1_SQRT_2 + 0.5 * 0.75) / 1.25;
+        assert!((hillshade(&grid, 1.0).at(1, 1) - expected).abs() < 1e-12);
+        let single: Vec<f32> = grid.values.iter().map(|z| *z as f32).collect();
+        let inner = shade_inner(&single, [3, 3], 1.0, LIGHT, 1.0);
+        assert!(inner.len() == 1 && (f64::from(inner[0]) - expected).abs() < 1e-6, "{inner:?}");
+    }
+
+    /// The inner cells of a tile that overlaps its neighbours equal those of the complete raster, bit for bit: no seam.
     #[test]
     fn prop_tiles_have_no_seam() {
         let (rows, cols) = (20, 26);
@@ -151,7 +176,8 @@ mod tests {
         assert!(shade_inner(&heights[..4], [2, 2], 0.1, light, 1.0).is_empty());
     }
 
-    /// Slopes of 0 to 80 degrees come back to 0.1 degrees from the brightness under a light straight above, 4 km up; and as [`hillshade`] has it.
+    /// Slopes of 0 to 80 degrees are recovered to 0.1 degrees from the brightness under a light straight above, at heights of 4 km; the
+    /// result agrees with [`hillshade`].
     #[test]
     fn val_slopes_are_right_at_any_zoom() {
         for cell_m in [0.01, 1.0, 600.0] {

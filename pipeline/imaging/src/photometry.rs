@@ -1,4 +1,4 @@
-//! How bright a facet is: a mixture of Lambert's and the Lommel-Seeliger law.
+//! Brightness of a facet: a mixture of Lambert's law and the Lommel-Seeliger law.
 //!
 //! $$ I = \alpha \left[ L \mu_0 + S \frac{2 \mu_0}{\mu_0 + \mu} \right], \qquad I = 0 \text{ where } \mu_0 \le 0 \text{ or } \mu \le 0 $$
 //!
@@ -10,8 +10,8 @@
 //! | `L`, `S` | weights | 0.35 and 0.65 |
 //!
 //! # Source
-//! The paper in `docs/papers/jpl.md` gives the weights of 35 and 65 %. The factor 2 is that of A. S. McEwen, Photometric functions for
-//! photoclinometry and other applications, Icarus 92 (1991): a facet that faces light and view is as bright as its albedo.
+//! The paper in `docs/papers/jpl.md` gives the weights of 35 and 65 %. The factor 2 follows A. S. McEwen, Photometric functions for
+//! photoclinometry and other applications, Icarus 92 (1991): the brightness of a facet that faces light and view equals its albedo.
 
 use crate::direction::{Vector, dot};
 use sastrugi_schemas::ParameterError;
@@ -34,12 +34,12 @@ impl Default for Photometry {
     }
 }
 
-/// Brightness of a facet of albedo 1, and its derivatives by the slopes.
+/// Brightness of a facet of albedo 1, and its derivatives with respect to the slopes.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Shade {
     /// Brightness.
     pub value: f64,
-    /// Derivatives by `p` and `q`.
+    /// Derivatives with respect to `p` and `q`.
     pub by_slope: [f64; 2],
 }
 
@@ -50,14 +50,22 @@ impl Photometry {
         ParameterError::not_negative("lambert", self.lambert)?;
         ParameterError::not_negative("lommel_seeliger", self.lommel_seeliger)?;
         if self.lambert + self.lommel_seeliger == 0.0 {
-            let message =
-                "is 0, and so is `lommel_seeliger`: the ground would reflect nothing; one weight must be above 0";
+            let message = "is 0, and so is `lommel_seeliger`: the ground would reflect nothing; at least one weight must be above 0";
             return Err(ParameterError::new("lambert", message));
         }
         Ok(())
     }
 
-    /// Brightness of a facet of albedo 1 by its two cosines; 0 where it is turned away from light or view.
+    /// Brightness of a facet of albedo 1 from its two cosines; 0 if it faces away from light or view.
+    ///
+    /// ```
+    /// use sastrugi_imaging::Photometry;
+    ///
+    /// let photometry = Photometry::default();
+    /// // A facet that faces both light and view has its albedo.
+    /// assert!((photometry.brightness(1.0, 1.0) - 1.0).abs() < 1e-15);
+    /// assert_eq!(photometry.brightness(-0.1, 1.0), 0.0);
+    /// ```
     #[inline]
     pub fn brightness(&self, to_light: f64, to_view: f64) -> f64 {
         if to_light <= 0.0 || to_view <= 0.0 {
@@ -74,7 +82,7 @@ impl Photometry {
         self.brightness(dot(normal, light) / length, dot(normal, view) / length)
     }
 
-    /// The same with its derivatives; all 0 where the facet is turned away from light or view.
+    /// The same with its derivatives; all 0 if the facet faces away from light or view.
     pub fn shade(&self, slopes: [f64; 2], light: Vector, view: Vector) -> Shade {
         let normal = [-slopes[0], -slopes[1], 1.0];
         let square = dot(normal, normal);
@@ -100,7 +108,7 @@ mod tests {
     use crate::direction::direction;
     use proptest::prelude::*;
 
-    /// McEwen's normalisation: a facet that faces both is as bright as its albedo, with 0.35 + 0.65 = 1.
+    /// McEwen's normalisation: the brightness of a facet that faces both equals its albedo, since 0.35 + 0.65 = 1.
     #[test]
     fn val_a_facet_that_faces_light_and_view_has_its_albedo() {
         let up = [0.0, 0.0, 1.0];
@@ -112,7 +120,7 @@ mod tests {
     }
 
     #[test]
-    fn val_facets_turned_away_are_black() {
+    fn val_facets_facing_away_are_black() {
         let photometry = Photometry::default();
         let light = direction(90.0, 30.0);
         let dark = photometry.shade([1.8, 0.0], light, [0.0, 0.0, 1.0]);
@@ -121,9 +129,9 @@ mod tests {
     }
 
     proptest! {
-        /// Derivatives against central differences: the error of these is of third order, below 1e-7 at steps of 1e-4.
+        /// Derivatives against central differences, whose error is of third order, below 1e-7 at steps of 1e-4.
         #[test]
-        fn prop_derivatives_are_those_of_the_value(
+        fn prop_derivatives_match_differences(
             p in -0.6..0.6f64, q in -0.6..0.6f64, azimuth in 0.0..360.0f64, elevation in 40.0..85.0f64, lean in 60.0..90.0f64,
         ) {
             let photometry = Photometry::default();

@@ -1,7 +1,7 @@
-//! Where a camera stands: as a study says it, and in the coordinates of a surface.
+//! Camera poses: as specified in a study, and in the coordinates of a surface.
 //!
-//! [`CameraParameters`] are what a study or a command line holds; they may leave out what follows from the surface. A [`CameraPose`] holds
-//! everything in numbers: it is what stands in the file beside an image, and what [`CameraPose::camera`] makes the same camera from again.
+//! [`CameraParameters`] come from a study or a command line and may omit what follows from the surface. A [`CameraPose`] is fully
+//! specified: it is stored in the file that accompanies an image, and [`CameraPose::camera`] reconstructs the same camera from it.
 
 use crate::camera::{Camera, ParallelCamera, PinholeCamera};
 use crate::direction::{Vector, cross, direction, dot, minus};
@@ -11,49 +11,49 @@ use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Most pixels of an image.
+/// Maximum number of pixels of an image.
 pub const PIXELS_MAX: usize = 1 << 26;
-/// Widest field of view, deg: beyond, the pixels at the border see almost nothing.
+/// Widest field of view, deg: beyond it, the pixels at the border see almost nothing.
 const FIELD_OF_VIEW_MAX_DEG: f64 = 170.0;
-/// Pixels that lie beyond the surface by less than this share of one are left out.
+/// A last pixel that would cover less than this share of a pixel of the surface is dropped.
 const PIXEL_TOLERANCE: f64 = 1e-6;
 
-/// A camera as a study says it.
+/// A camera as specified in a study.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum CameraParameters {
-    /// Straight down with parallel rays: the image is a map of the whole surface.
+    /// Straight down with parallel rays: the image is a map of the complete surface.
     Nadir {
         /// Pixel size, m; the surface's cell size when absent.
         #[serde(default)]
         pixel_m: Option<f64>,
     },
-    /// Parallel rays from a direction, as from an orbit.
+    /// Parallel rays from a direction, as from orbit.
     Parallel {
         /// Azimuth of the camera as seen from the ground, clockwise from north, deg.
         azimuth_deg: f64,
-        /// Its elevation above the horizon, above 0 to 90 deg.
+        /// Elevation of the camera above the horizon, above 0 to 90 deg.
         elevation_deg: f64,
-        /// Pixel size across the rays, m; the surface's cell size when absent.
+        /// Pixel size perpendicular to the rays, m; the surface's cell size when absent.
         #[serde(default)]
         pixel_m: Option<f64>,
-        /// Columns and rows; the whole surface when absent.
+        /// Columns and rows; the complete surface when absent.
         #[serde(default)]
         size_px: Option<[usize; 2]>,
-        /// Ground point `[x, y]` at the centre of the image, m; the middle of the surface when absent.
+        /// Ground point `[x, y]` at the centre of the image, m; the centre of the surface when absent.
         #[serde(default)]
         target_m: Option<[f64; 2]>,
     },
     /// A camera in the scene.
     Pinhole {
-        /// Place `[x, y, z]`, m.
+        /// Position `[x, y, z]`, m.
         position_m: Vector,
-        /// Point that the middle of the image shows, `[x, y, z]`, m.
+        /// Point shown at the centre of the image, `[x, y, z]`, m.
         target_m: Vector,
-        /// True: both z are above the ground at their x and y; false: they are heights as the surface has them.
+        /// True if both z are relative to the ground at their x and y; false if they are heights in the surface's datum.
         #[serde(default = "above_ground")]
         above_ground: bool,
-        /// Angle that the width of the image spans, deg.
+        /// Horizontal field of view, deg.
         #[serde(default = "field_of_view_deg")]
         field_of_view_deg: f64,
         /// Columns and rows.
@@ -80,7 +80,7 @@ impl Default for CameraParameters {
     }
 }
 
-/// A camera in the coordinates of a surface, with everything in numbers.
+/// A fully specified camera in the coordinates of a surface.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum CameraPose {
@@ -88,11 +88,11 @@ pub enum CameraPose {
     Parallel {
         /// Azimuth of the camera as seen from the ground, clockwise from north, deg.
         azimuth_deg: f64,
-        /// Its elevation above the horizon, above 0 to 90 deg.
+        /// Elevation of the camera above the horizon, above 0 to 90 deg.
         elevation_deg: f64,
-        /// Point that the middle of the image shows, `[x, y, z]`, m.
+        /// Point shown at the centre of the image, `[x, y, z]`, m.
         centre_m: Vector,
-        /// Pixel size across the rays, m.
+        /// Pixel size perpendicular to the rays, m.
         pixel_m: f64,
         /// Rows of the image.
         rows: usize,
@@ -101,11 +101,11 @@ pub enum CameraPose {
     },
     /// Rays through one point (see [`PinholeCamera::new`]).
     Pinhole {
-        /// Place, `[x, y, z]`, m.
+        /// Position `[x, y, z]`, m.
         position_m: Vector,
-        /// Point that the middle of the image shows, `[x, y, z]`, m.
+        /// Point shown at the centre of the image, `[x, y, z]`, m.
         target_m: Vector,
-        /// Angle that the width of the image spans, deg.
+        /// Horizontal field of view, deg.
         field_of_view_deg: f64,
         /// Rows of the image.
         rows: usize,
@@ -115,7 +115,7 @@ pub enum CameraPose {
 }
 
 impl CameraParameters {
-    /// Refuses what no surface makes right.
+    /// Checks everything that does not depend on the surface.
     ///
     /// # Errors
     /// The first parameter that is out of range.
@@ -138,7 +138,7 @@ impl CameraParameters {
         }
     }
 
-    /// About how many pixels its image of a surface of `size_m`, with cells of `cell_m`, has.
+    /// Approximate number of pixels of its image of a surface of `size_m` with cells of `cell_m`.
     pub fn pixels(&self, size_m: [f64; 2], cell_m: f64) -> f64 {
         let of = |pixel_m: Option<f64>| {
             let pixel_m = pixel_m.unwrap_or(cell_m);
@@ -153,7 +153,7 @@ impl CameraParameters {
         }
     }
 
-    /// Name of its kind.
+    /// Name of the kind of camera.
     pub fn kind(&self) -> &'static str {
         match self {
             Self::Nadir { .. } => "nadir",
@@ -165,7 +165,21 @@ impl CameraParameters {
     /// The camera over a surface.
     ///
     /// # Errors
-    /// As [`Self::check`]; also a camera below the ground, places without ground, and images of too many pixels.
+    /// As [`Self::check`]; also a camera below the ground, points off the ground, and images with too many pixels.
+    ///
+    /// ```
+    /// use sastrugi_imaging::CameraParameters;
+    /// use sastrugi_numeric::{Geometry, Grid};
+    ///
+    /// let heights = Grid::filled(Geometry::square(30, 40, 0.5), 0.0);
+    /// // By default straight down, a pixel for every cell.
+    /// let pose = CameraParameters::default().pose(&heights).unwrap();
+    /// assert!(pose.is_nadir());
+    /// assert_eq!(pose.camera().shape(), [30, 40]);
+    ///
+    /// let coarse = CameraParameters::Nadir { pixel_m: Some(100.0) };
+    /// assert_eq!(coarse.pose(&heights).unwrap_err().key, "pixel_m");
+    /// ```
     pub fn pose(&self, heights: &Grid) -> Result<CameraPose, ParameterError> {
         self.check()?;
         let pose = match *self {
@@ -226,7 +240,7 @@ impl CameraPose {
         matches!(self, Self::Parallel { elevation_deg, azimuth_deg, .. } if *elevation_deg == 90.0 && *azimuth_deg == 0.0)
     }
 
-    /// Shape and place of the image: in the coordinates of the surface where it is a map, else in pixels from its lower left corner.
+    /// Geometry of the image: in the coordinates of the surface if it is a map, else in pixels from its lower left corner.
     pub fn geometry(&self) -> Geometry {
         match *self {
             Self::Parallel { centre_m, pixel_m, rows, cols, .. } if self.is_nadir() => {
@@ -237,7 +251,7 @@ impl CameraPose {
         }
     }
 
-    /// Pixel size of parallel rays, m; a pinhole's pixels have none.
+    /// Pixel size of a parallel camera, m; `None` for a pinhole.
     pub fn pixel_m(&self) -> Option<f64> {
         match self {
             Self::Parallel { pixel_m, .. } => Some(*pixel_m),
@@ -246,7 +260,7 @@ impl CameraPose {
     }
 }
 
-/// Straight down on the whole surface, from its south-west corner on in whole pixels.
+/// A camera straight above the complete surface, with whole pixels starting at its south-west corner.
 fn nadir(heights: &Grid, pixel_m: f64) -> CameraPose {
     let g = &heights.geometry;
     let [cols, rows] = g.size().map(|size| whole_pixels(size / pixel_m));
@@ -255,7 +269,7 @@ fn nadir(heights: &Grid, pixel_m: f64) -> CameraPose {
     CameraPose::Parallel { azimuth_deg: 0.0, elevation_deg: 90.0, centre_m, pixel_m, rows, cols }
 }
 
-/// Parallel rays from a direction on the box around the surface, or on part of it.
+/// A parallel camera that covers the bounding box of the surface, or part of it.
 fn parallel(
     heights: &Grid,
     [azimuth_deg, elevation_deg]: [f64; 2],
@@ -277,7 +291,7 @@ fn parallel(
     CameraPose::Parallel { azimuth_deg, elevation_deg, centre_m, pixel_m, rows, cols }
 }
 
-/// Right and top of a parallel image, as [`ParallelCamera`] has them.
+/// Right and top axes of a parallel image, as in [`ParallelCamera`].
 fn image_axes(azimuth_deg: f64, elevation_deg: f64) -> [Vector; 2] {
     let shape = [2, 2];
     let camera = Camera::Parallel(ParallelCamera::new([azimuth_deg, elevation_deg], [0.0; 3], 1.0, shape));
@@ -289,38 +303,38 @@ fn middle_height(heights: &Grid) -> f64 {
     heights.range().map_or(0.0, |(low, high)| 0.5 * (low + high))
 }
 
-/// Pixels that cover a length; at least one, and too many for any image where there is no such number.
+/// Number of pixels that cover a length; at least one, and a number that [`check_shape`] rejects if it would overflow.
 fn whole_pixels(length: f64) -> usize {
     (length - PIXEL_TOLERANCE).ceil().clamp(1.0, 1e9) as usize
 }
 
-/// A point whose z is above the ground, in the heights of the surface.
+/// Converts a point with z above the ground to heights of the surface.
 fn on_ground(heights: &Grid, key: &str, [x, y, above]: Vector) -> Result<Vector, ParameterError> {
     let ground = heights.height(x, y);
-    let none = || {
-        ParameterError::new(key, format!("is at x = {}, y = {}, where the surface has no ground", shown(x), shown(y)))
-    };
+    let none =
+        || ParameterError::new(key, format!("is at x = {}, y = {}, where the surface has no data", shown(x), shown(y)));
     ground.map(|ground| [x, y, ground + above]).ok_or_else(none)
 }
 
 fn check_above(heights: &Grid, [x, y, z]: Vector) -> Result<(), ParameterError> {
     match heights.height(x, y) {
         Some(ground) if z <= ground => {
-            let message = format!("is at z = {} m; the ground there is at {ground:.3} m", shown(z));
+            let message =
+                format!("is at z = {} m; it must be above the ground, which is at {ground:.3} m there", shown(z));
             Err(ParameterError::new("position_m", message))
         }
         _ => Ok(()),
     }
 }
 
-/// Refuses pixels that a surface does not fill.
+/// Rejects pixels larger than the surface.
 fn check_fits(heights: &Grid, pixel_m: f64) -> Result<(), ParameterError> {
     let [east, north] = heights.geometry.size();
     if pixel_m <= east.min(north) * (1.0 + PIXEL_TOLERANCE) {
         return Ok(());
     }
     let message =
-        format!("is {} m; the surface, {} x {} m, does not fill a pixel", shown(pixel_m), shown(east), shown(north));
+        format!("is {} m; the surface of {} x {} m does not fill a pixel", shown(pixel_m), shown(east), shown(north));
     Err(ParameterError::new("pixel_m", message))
 }
 
@@ -340,7 +354,7 @@ fn check_shape(key: &str, rows: usize, cols: usize) -> Result<(), ParameterError
         Some(pixels) if (1..=PIXELS_MAX).contains(&pixels) => Ok(()),
         _ => Err(ParameterError::new(
             key,
-            format!("makes an image of {cols} x {rows} pixels; it must have 1 to {PIXELS_MAX}"),
+            format!("gives an image of {cols} x {rows} pixels; it must have 1 to {PIXELS_MAX}"),
         )),
     }
 }
@@ -350,7 +364,7 @@ fn check_pinhole(position_m: Vector, target_m: Vector, field_of_view_deg: f64) -
     check_point("target_m", &target_m)?;
     let offset = minus(position_m, target_m);
     if dot(offset, offset) == 0.0 {
-        return Err(ParameterError::new("target_m", "is where the camera is; it must be another point"));
+        return Err(ParameterError::new("target_m", "is the position of the camera; it must be another point"));
     }
     let angle = field_of_view_deg;
     if !(angle > 0.0 && angle <= FIELD_OF_VIEW_MAX_DEG) {
@@ -376,7 +390,7 @@ mod tests {
         serde_json::from_value(value).unwrap()
     }
 
-    /// Straight down a pixel is a cell, and each looks at its middle.
+    /// Straight down, each pixel is a cell and looks at its centre.
     #[test]
     fn val_a_nadir_image_is_a_map() {
         let heights = hill();
@@ -391,7 +405,7 @@ mod tests {
         }
     }
 
-    /// Pixels that do not divide the surface reach beyond it in the north and east.
+    /// If pixels do not divide the surface, the image extends beyond it in the north and east.
     #[test]
     fn val_a_nadir_image_covers_the_surface() {
         let CameraPose::Parallel { rows, cols, centre_m, .. } =
@@ -414,6 +428,34 @@ mod tests {
         };
         assert!((position_m[2] - 1.5 - heights.height(105.0, -45.0).unwrap()).abs() < 1e-12);
         assert!((target_m[2] - heights.height(110.0, -40.0).unwrap()).abs() < 1e-12);
+    }
+
+    /// A parallel camera with a target and a size shows that ground at its centre; sizes are columns, then rows.
+    #[test]
+    fn val_parallel_cameras_look_at_their_target() {
+        let heights = hill();
+        let camera = json!({ "kind": "parallel", "azimuth_deg": 40.0, "elevation_deg": 60.0, "pixel_m": 0.25,
+            "size_px": [50, 20], "target_m": [107.0, -41.0] });
+        let pose = parameters(camera).pose(&heights).unwrap();
+        assert_eq!((pose.camera().shape(), pose.pixel_m(), pose.is_nadir()), ([20, 50], Some(0.25), false));
+        let target_m = [107.0, -41.0, heights.height(107.0, -41.0).unwrap()];
+        let [col, row] = pose.camera().project(target_m).unwrap();
+        assert!((col - 25.0).abs() < 1e-9 && (row - 10.0).abs() < 1e-9, "{col} {row}");
+        // An oblique image is counted in pixels, a map lies on the ground.
+        assert_eq!(pose.geometry(), Geometry::square(20, 50, 1.0));
+        assert_eq!(CameraParameters::default().pose(&heights).unwrap().geometry(), heights.geometry);
+    }
+
+    /// Pixels are counted as if an image of the complete surface were seen from above.
+    #[test]
+    fn val_pixels_are_estimated_from_the_surface() {
+        let count = |camera: serde_json::Value| parameters(camera).pixels([20.0, 15.0], 0.5);
+        assert_eq!(count(json!({ "kind": "nadir" })), 1200.0);
+        assert_eq!(count(json!({ "kind": "nadir", "pixel_m": 0.25 })), 4800.0);
+        let oblique = json!({ "kind": "parallel", "azimuth_deg": 0.0, "elevation_deg": 45.0, "size_px": [50, 20] });
+        assert_eq!(count(oblique), 1000.0);
+        let pinhole = json!({ "kind": "pinhole", "position_m": [0.0, 0.0, 1.5], "target_m": [1.0, 0.0, 0.0] });
+        assert_eq!((count(pinhole.clone()), parameters(pinhole).kind()), (307_200.0, "pinhole"));
     }
 
     #[test]
@@ -442,9 +484,9 @@ mod tests {
     }
 
     proptest! {
-        /// The image of a parallel camera holds every point of the surface, and little more than it needs.
+        /// The image of a parallel camera covers every point of the surface, and is hardly larger than necessary.
         #[test]
-        fn prop_parallel_images_hold_the_surface(azimuth in 0.0..360.0f64, elevation in 5.0..90.0f64, pixel in 0.1..3.0f64) {
+        fn prop_parallel_images_cover_the_surface(azimuth in 0.0..360.0f64, elevation in 5.0..90.0f64, pixel in 0.1..3.0f64) {
             let heights = hill();
             let camera = json!({ "kind": "parallel", "azimuth_deg": azimuth, "elevation_deg": elevation, "pixel_m": pixel });
             let camera = parameters(camera).pose(&heights).unwrap().camera();
@@ -457,7 +499,7 @@ mod tests {
             prop_assert!(cols as f64 * pixel < 26.0 + pixel && rows as f64 * pixel < 30.0 + pixel);
         }
 
-        /// What stands in the file beside an image makes the same camera.
+        /// A pose written to the JSON file of an image and read back gives the same camera.
         #[test]
         fn prop_poses_survive_json(azimuth in 0.0..360.0f64, elevation in 5.0..90.0f64) {
             let camera = CameraParameters::Parallel {

@@ -1,25 +1,25 @@
-//! Where the sun stands.
+//! Position of the sun.
 
 use crate::direction::{Vector, direction};
 use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Azimuths of a light may be written as -360 to 720 degrees.
+/// Range of azimuths accepted for a light, deg.
 const AZIMUTHS_DEG: [f64; 2] = [-360.0, 720.0];
 
-/// A sun so far away that its rays are parallel.
+/// A distant sun with parallel rays.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sun {
-    /// Azimuth that the light comes from, clockwise from north, deg.
+    /// Azimuth from which the light comes, clockwise from north, deg.
     pub azimuth_deg: f64,
     /// Elevation above the horizon, above 0 to 90 deg.
     pub elevation_deg: f64,
 }
 
 impl Default for Sun {
-    /// In the north-west, as relief on maps is lit.
+    /// In the north-west, the convention for relief on maps.
     fn default() -> Self {
         Self { azimuth_deg: 315.0, elevation_deg: 45.0 }
     }
@@ -27,18 +27,18 @@ impl Default for Sun {
 
 impl Sun {
     /// # Errors
-    /// An azimuth that is not an angle, or a sun that is not above the horizon.
+    /// An azimuth out of range, or a sun that is not above the horizon.
     pub fn check(&self) -> Result<(), ParameterError> {
         check_direction(self.azimuth_deg, self.elevation_deg)
     }
 
-    /// Unit vector towards it.
+    /// Unit vector towards the sun.
     pub fn direction(&self) -> Vector {
         direction(self.azimuth_deg, self.elevation_deg)
     }
 }
 
-/// Refuses directions that are not above the horizon.
+/// Rejects directions that are not above the horizon.
 pub(crate) fn check_direction(azimuth_deg: f64, elevation_deg: f64) -> Result<(), ParameterError> {
     let [low, high] = AZIMUTHS_DEG;
     if !(low..=high).contains(&azimuth_deg) {

@@ -1,4 +1,4 @@
-//! The list of vehicles and surfaces, and every number of a run with its source.
+//! Registry of vehicles and surface presets; every parameter of a run with its source.
 
 use crate::vehicle::{
     HUSKY_A200, MATERIALS, Material, ROCKER_BOGIE_ROVER, SurfaceParameters, TraverseSettings, UGV_4X4, Vehicle,
@@ -9,7 +9,7 @@ use sastrugi_schemas::{Kind, ParameterError};
 use serde_json::{Map, Value};
 use toml_edit::{DocumentMut, Item};
 
-/// One vehicle: its name, and its data file.
+/// One vehicle: its name and its data file.
 struct Entry {
     kind: &'static str,
     summary: &'static str,
@@ -38,7 +38,16 @@ const ENTRIES: [Entry; 3] = [
     },
 ];
 
-/// Every vehicle and every surface preset, with the JSON Schema of its parameters, their values and sources.
+/// Every vehicle and every surface preset, with the JSON Schema of its parameters, their values and their sources.
+///
+/// ```
+/// use sastrugi_mobility::registry::kinds;
+///
+/// let kinds = kinds();
+/// let husky = kinds.iter().find(|kind| kind.kind == "husky_a200").unwrap();
+/// assert_eq!(husky.values().unwrap()["wheels"]["radius_m"], 0.1651);
+/// assert!(kinds.iter().any(|kind| kind.family == "surface" && kind.kind == "ice"));
+/// ```
 pub fn kinds() -> Vec<Kind> {
     ENTRIES.iter().map(Entry::describe).chain(MATERIALS.iter().map(surface)).collect()
 }
@@ -51,14 +60,30 @@ fn surface(material: &Material) -> Kind {
     Kind { family: "surface", kind: material.name, summary: material.summary, source: material.source, parameters }
 }
 
-/// A vehicle of the study's own: all of its parameters are given as changes.
+/// A vehicle defined by the study: `vehicle_changes` holds all of its parameters.
 pub const CUSTOM: &str = "custom";
 
-/// The vehicle `kind` with `changes`: those of its parameters that differ from the data file, nested as there; a table of
-/// another `kind` (of suspension or drive) replaces the data file's. For [`CUSTOM`], all parameters.
+/// The vehicle `kind` with `changes`: the parameters that differ from its data file, nested as in that file. A table with
+/// another `kind` (of suspension or drive) replaces the whole table. For [`CUSTOM`], `changes` holds all parameters.
 ///
 /// # Errors
 /// A [`ParameterError`] for an unknown vehicle, an unknown or missing parameter, or a value out of range.
+///
+/// ```
+/// use sastrugi_mobility::registry::vehicle;
+/// use serde_json::{Map, json};
+///
+/// let husky = vehicle("husky_a200", &Map::new()).unwrap();
+/// assert!((husky.wheelbase_m() - 0.512).abs() < 1e-12);
+///
+/// let longer = json!({ "wheels": { "axles_m": [0.4, -0.4] } });
+/// let longer = vehicle("husky_a200", longer.as_object().unwrap()).unwrap();
+/// assert!((longer.wheelbase_m() - 0.8).abs() < 1e-12);
+///
+/// let flat = json!({ "wheels": { "radius_m": 0.0 } });
+/// let error = vehicle("husky_a200", flat.as_object().unwrap()).unwrap_err();
+/// assert_eq!(error.key, "vehicle_changes.wheels.radius_m");
+/// ```
 pub fn vehicle(kind: &str, changes: &Map<String, Value>) -> Result<Vehicle, ParameterError> {
     let mut parameters = match ENTRIES.iter().find(|e| e.kind == kind) {
         Some(entry) => entry.section("parameters"),
@@ -70,25 +95,25 @@ pub fn vehicle(kind: &str, changes: &Map<String, Value>) -> Result<Vehicle, Para
     Vehicle::new(kind, parameters).map_err(|e| e.within("vehicle_changes"))
 }
 
-/// Doubts about a vehicle that [`vehicle`] accepts, a sentence each: numbers that do not fit each other.
+/// Warnings about a vehicle that [`vehicle`] accepts, one sentence each: parameters that are inconsistent with each other.
 pub fn doubts(kind: &str, changes: &Map<String, Value>) -> Vec<String> {
     let base = vehicle(kind, &Map::new()).ok();
     let base = base.as_ref().map(Vehicle::parameters);
     vehicle(kind, changes).map(|changed| crate::vehicle::doubts(changed.parameters(), base)).unwrap_or_default()
 }
 
-/// One number of a run: what it is, its value as JSON, and where it comes from.
+/// One parameter of a run: its path, its value as JSON and its source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Number {
-    /// Dotted path, `vehicle.` before those of the vehicle.
+    /// Dotted path; vehicle parameters start with `vehicle.`.
     pub parameter: String,
     /// Value as JSON.
     pub value: String,
-    /// Source of a vehicle's or a surface's number; absent where the study states it, or where it is a setting.
+    /// Source of a vehicle or surface parameter; absent where the study sets the value, and for settings of the run.
     pub source: Option<String>,
 }
 
-/// Every number of a run, those that were left open included: the vehicle's by the names of its data file, then the run's.
+/// Every parameter of a run, defaults included: first the vehicle's, named as in its data file, then those of the run.
 pub fn numbers(vehicle: &Vehicle, settings: &TraverseSettings) -> Vec<Number> {
     let entry = ENTRIES.iter().find(|e| e.kind == vehicle.name());
     let section = |name: &str| entry.map_or(Value::Null, |e| e.section(name));
@@ -107,14 +132,14 @@ pub fn numbers(vehicle: &Vehicle, settings: &TraverseSettings) -> Vec<Number> {
     let json = |value: Result<Value, _>| value.unwrap_or(Value::Null);
     let mut run = json(serde_json::to_value(settings.parameters()));
     if let Value::Object(run) = &mut run {
-        // The vehicle is written out above, its changes included.
+        // The vehicle's parameters are listed above, with the changes applied.
         run.retain(|key, _| key != "vehicle" && key != "vehicle_changes");
     }
     let of_vehicle = leaves(&json(serde_json::to_value(vehicle.parameters())), "").into_iter().map(of_vehicle);
     of_vehicle.chain(stated("", &run).into_iter().map(with_source)).collect()
 }
 
-/// Settings without a source: all leaves of a JSON value but nulls, by dotted path below `prefix`.
+/// Settings without a source: all non-null leaves of a JSON value, by dotted path below `prefix`.
 pub fn stated(prefix: &str, value: &Value) -> Vec<Number> {
     let number = |(path, value): (String, Value)| Number {
         parameter: path.trim_start_matches('.').to_owned(),
@@ -124,7 +149,7 @@ pub fn stated(prefix: &str, value: &Value) -> Vec<Number> {
     leaves(value, prefix).into_iter().map(number).collect()
 }
 
-/// Dotted paths of all leaves but nulls, with their values.
+/// Dotted paths and values of all non-null leaves.
 fn leaves(value: &Value, path: &str) -> Vec<(String, Value)> {
     match value {
         Value::Object(map) => map.iter().flat_map(|(k, v)| leaves(v, &format!("{path}.{k}"))).collect(),
@@ -133,7 +158,7 @@ fn leaves(value: &Value, path: &str) -> Vec<(String, Value)> {
     }
 }
 
-/// Equal as numbers: 1 and 1.0 are.
+/// Equality by numerical value: 1 equals 1.0.
 fn same(a: &Value, b: &Value) -> bool {
     match (a, b) {
         (Value::Array(a), Value::Array(b)) => a.len() == b.len() && a.iter().zip(b).all(|(a, b)| same(a, b)),
@@ -144,8 +169,7 @@ fn same(a: &Value, b: &Value) -> bool {
 fn unknown(kind: &str) -> ParameterError {
     let known: Vec<String> = ENTRIES.iter().map(|e| format!("`{}`", e.kind)).collect();
     let known = known.join(", ");
-    let message =
-        format!("`{kind}` is no vehicle; the known ones are {known}, and `custom` with all of its parameters");
+    let message = format!("is `{kind}`; it must be one of {known}, or `custom` with all of its parameters");
     ParameterError::new("vehicle", message)
 }
 
@@ -159,14 +183,14 @@ impl Entry {
         Kind { family: "vehicle", kind: self.kind, summary: self.summary, source: self.source, parameters }
     }
 
-    /// A table of the data file; null when the file has none (a test reads every file).
+    /// A table of the data file; null if it is missing (a test reads every file).
     fn section(&self, name: &str) -> Value {
         let file = self.data.parse::<DocumentMut>().unwrap_or_default();
         file.get(name).map_or(Value::Null, from_toml)
     }
 }
 
-/// A TOML item as JSON. Data files hold numbers, words, arrays and tables.
+/// A TOML item as JSON. Data files hold numbers, strings, arrays and tables.
 fn from_toml(item: &Item) -> Value {
     match item {
         Item::Table(table) => Value::Object(table.iter().map(|(k, v)| (k.to_owned(), from_toml(v))).collect()),
@@ -181,17 +205,17 @@ fn from_toml(item: &Item) -> Value {
     }
 }
 
-/// True when both name a `kind`, and not the same.
-fn of_another_kind(base: &Value, change: &Map<String, Value>) -> bool {
+/// True when both have a `kind` and the two differ.
+fn kinds_differ(base: &Value, change: &Map<String, Value>) -> bool {
     base.get("kind").zip(change.get("kind")).is_some_and(|(old, new)| old != new)
 }
 
-/// Lays `changes` over `base`, table by table.
+/// Merges `changes` into `base`, table by table.
 fn merge(base: &mut Value, changes: &Map<String, Value>) {
     let Value::Object(base) = base else { return };
     for (key, change) in changes {
         match (base.get_mut(key), change) {
-            (Some(below @ Value::Object(_)), Value::Object(change)) if !of_another_kind(below, change) => {
+            (Some(below @ Value::Object(_)), Value::Object(change)) if !kinds_differ(below, change) => {
                 merge(below, change);
             }
             _ => {
@@ -217,7 +241,7 @@ mod tests {
         }
     }
 
-    /// Every number of a run, with its source unless the study changed it.
+    /// Every parameter of a run has its source, unless the study changed it.
     #[test]
     fn val_numbers_of_a_run() {
         let mut parameters = TraverseParameters::default();
@@ -233,15 +257,18 @@ mod tests {
         assert_eq!(of("vehicle_changes.drive.torque_limit_n_m"), None);
     }
 
-    /// A vehicle of the study's own drives like the shipped one with its numbers; a drive of another kind replaces the table.
+    /// A custom vehicle equals the shipped one with the same parameters; a drive of another kind replaces the table.
     #[test]
-    fn val_own_vehicles() {
+    fn val_custom_vehicles() {
         let Value::Object(all) = ENTRIES[1].section("parameters") else { panic!() };
         let own = vehicle(CUSTOM, &all).unwrap();
         assert_eq!((own.name(), own.parameters()), ("custom", vehicle("ugv_4x4", &Map::new()).unwrap().parameters()));
         assert!(vehicle(CUSTOM, &Map::new()).unwrap_err().message.contains("missing field"));
         let drive = [("drive".to_owned(), all["drive"].clone())].into_iter().collect();
-        assert!(vehicle("husky_a200", &drive).is_ok());
+        let mixed = vehicle("husky_a200", &drive).unwrap();
+        let shipped = vehicle("husky_a200", &Map::new()).unwrap();
+        assert_eq!(mixed.parameters().drive, own.parameters().drive);
+        assert_eq!(mixed.parameters().wheels, shipped.parameters().wheels);
     }
 
     #[test]

@@ -1,9 +1,8 @@
-//! Room beside a path: whether a team of some width fits, and what it costs where it does not (the thesis, Algorithm 4, CanFit).
+//! Clearance: whether a team of a given width fits through a gap, and the extra cost if it does not (the thesis, Algorithm 4, CanFit).
 //!
-//! On the line across the direction of travel the ground is walked to the left and to the right, step by step while each may be
-//! taken, as far as the width; the gap is the distance between the last points reached. (The listing keeps the first point that
-//! cannot be reached, and mixes cells and units.) Where the gap is narrower than the width the cost is multiplied by
-//! `min(most, 1 + weight (width / gap - 1))`: "the smaller the gap, the higher the cost".
+//! From each node, steps are taken to the left and to the right across the direction of travel, while they are allowed and up to the width; the gap
+//! is the distance between the last points reached. (The listing takes the first unreachable point instead, and mixes cells and units.) If the gap is
+//! narrower than the width, the cost is multiplied by `min(most, 1 + weight (width / gap - 1))`: "the smaller the gap, the higher the cost".
 
 use crate::map::{Direction, Node, TravelMap};
 use sastrugi_schemas::ParameterError;
@@ -11,18 +10,18 @@ use sastrugi_schemas::ParameterError;
 #[cfg(test)]
 mod tests;
 
-/// Most steps to one side.
+/// Largest number of steps to one side.
 const STEPS_MAX: u16 = u16::MAX / 2;
-/// Rounding of whole numbers of cells, as a share: three cells of 0.1 m are 0.3 m.
+/// Relative rounding of integer numbers of cells: three cells of 0.1 m are 0.3 m.
 const ROUNDING: f64 = 1e-9;
 
-/// Gaps across the four lines through each node.
+/// Gaps across the four axes through each node.
 #[derive(Clone, Debug)]
 pub struct Clearance {
     width_m: f64,
     weight: f64,
     most: f64,
-    /// Steps across a path along the directions 0 to 3 of [`AXES`], node by node.
+    /// Steps across a path along each of [`AXES`], per node.
     gaps: Vec<[u16; 4]>,
     /// Length of these steps, m.
     steps_m: [f64; 4],
@@ -30,7 +29,7 @@ pub struct Clearance {
     cell_m: f64,
 }
 
-/// A line of travel: east, north-east, north, north-west, and the same backwards.
+/// Axes of travel: east, north-east, north, north-west; each includes the opposite direction.
 const AXES: [Direction; 4] = [
     Direction { rows: 0, cols: 1 },
     Direction { rows: -1, cols: 1 },
@@ -39,15 +38,36 @@ const AXES: [Direction; 4] = [
 ];
 
 impl Clearance {
-    /// The room beside paths for a width in m.
+    /// Clearance for a width in m.
     ///
     /// # Errors
     /// A width, weight or factor out of range.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_navigation::clearance::Clearance;
+    /// use sastrugi_navigation::{Direction, SlopeLimits, TravelMap};
+    /// use sastrugi_numeric::{Geometry, Grid};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // A corridor of three free rows: 2 m from the centre of the first to that of the last.
+    /// let heights = Grid::filled(Geometry::square(5, 5, 1.0), 0.0);
+    /// let mut map = TravelMap::new(heights, SlopeLimits::new(30.0, 30.0)?)?;
+    /// for col in 0..5 {
+    ///     map.block(map.node(0, col));
+    ///     map.block(map.node(4, col));
+    /// }
+    /// let clearance = Clearance::new(&map, 4.0, 1.0, 10.0)?;
+    /// let (middle, east) = (map.node(2, 2), Direction { rows: 0, cols: 1 });
+    /// assert_eq!((clearance.gap_m(middle, east), clearance.multiplier(middle, east)), (2.0, 2.0));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn new(map: &TravelMap, width_m: f64, weight: f64, most: f64) -> Result<Self, ParameterError> {
         ParameterError::positive("width_m", width_m)?;
         ParameterError::not_negative("clearance_weight", weight)?;
         if !(most >= 1.0 && most.is_finite()) {
-            return Err(ParameterError::new("clearance_max", format!("is {most}; it must be 1 or above")));
+            return Err(ParameterError::new("clearance_max", format!("is {most}; it must be finite and at least 1")));
         }
         let lefts = AXES.map(|along| Direction { rows: -along.cols, cols: along.rows });
         let steps_m = lefts.map(|left| map.step_m(left));
@@ -76,7 +96,7 @@ impl Clearance {
         f64::from(self.gaps[node as usize][axis]) * self.steps_m[axis]
     }
 
-    /// Factor of the cost of a path through a node.
+    /// Cost factor of a path through a node.
     pub fn multiplier(&self, node: Node, along: Direction) -> f64 {
         let gap_m = self.gap_m(node, along);
         if gap_m >= self.width_m * (1.0 - ROUNDING) {
@@ -86,11 +106,11 @@ impl Clearance {
     }
 }
 
-/// How many steps may be taken from each node in a direction, at most `limit`.
+/// Number of steps allowed from each node in a direction, at most `limit`.
 fn runs(map: &TravelMap, direction: Direction, limit: u16) -> Vec<u16> {
     let mut runs = vec![0u16; map.len()];
     let count = map.len() as Node;
-    // A run is one longer than that of the next node, which is looked at before.
+    // A run is one longer than that of the next node, which is visited first.
     let forward = (i32::from(direction.rows), i32::from(direction.cols)) > (0, 0);
     let mut visit = |node: Node| {
         if let Some(next) = map.accessible(node, direction) {

@@ -1,23 +1,22 @@
-//! A planner on a map that is known only as far as it has been seen, without the whole map at hand.
+//! Planner for a rover on a map that it discovers as it goes, without access to the complete map.
 //!
-//! The explorer is told of areas that are safe or hold a hazard, cell by cell (a cell belongs to the area that holds its centre, on an edge to the one with the hazard). Cells that
-//! it has not seen it takes for free. As in [`crate::replan`], [`DStarLite`] gives the cheapest steps to the goal over that and searches again
-//! only what new sights change.
+//! The explorer is given areas that are safe or contain a hazard, and applies them cell by cell (a cell belongs to the area that contains its centre;
+//! on an edge, to the area with the hazard). Unseen cells count as free. As in [`crate::replan`], [`DStarLite`] finds the cheapest steps to the goal
+//! and searches again only what new observations change.
 //!
-//! * What a cell is known to be only ever rises: unseen, suspect (in an area with a hazard, which lies anywhere in it), safe, fixed
-//!   hazard. A suspect cell is freed by a look that finds it safe; a safe one stays so, and is no longer where a hazard of an area may
-//!   lie. An area with a hazard for which no cell near it is left becomes a fixed hazard as a whole: an earlier look has missed
-//!   something. A hazard that is seen at a place, not in an area, fixes its cell at once. So there is an end to what can be learnt, and with it
-//!   to changes of the plan.
-//! * Suspect cells and fixed hazards block all cells nearer than a margin, so that the body is kept clear of them.
-//! * Where no way is left, what is known may be wrong; it can be forgotten ([`Explorer::forget`]).
-//! * Every free cell within the tolerance of the goal leads to it: the goal itself may be blocked.
-//! * A start among blocked cells is left by the nearest free one.
-//! * The map holds start and goal with room around. Where the plan touches its edge, or none is found though the edge can be reached
-//!   from both ends, it grows; at [`CELLS_MAX`] cells it grows no more, and its edge bounds all plans.
+//! * Knowledge of a cell only rises: unseen, suspect (in an area with a hazard, which may lie anywhere in it), safe, fixed hazard. A look that finds
+//!   a suspect cell safe frees it; a safe cell stays safe, and no longer counts as a possible position of an area's hazard. If no cell near an area
+//!   with a hazard can still hold it, an earlier look must have missed something, and all cells of the area become fixed hazards. A hazard seen at a
+//!   position, rather than in an area, fixes its cell at once. Knowledge is therefore bounded, and with it the number of changes of the plan.
+//! * Suspect cells and fixed hazards block all cells nearer than a margin, which keeps the body clear of them.
+//! * If no path is left, the knowledge may be wrong; it can be discarded ([`Explorer::forget`]).
+//! * Every free cell within the tolerance of the goal leads to it, because the goal itself may be blocked.
+//! * A start among blocked cells is left via the nearest free one.
+//! * The map contains start and goal and a border around them. It grows if the plan touches its edge, or if there is no plan although the edge can be
+//!   reached from both ends. At [`CELLS_MAX`] cells it stops growing, and its edge bounds all plans.
 //!
 //! # Cost
-//! 50 bytes a cell: 50 MB at most.
+//! 50 bytes per cell, at most 50 MB.
 
 use crate::cost::{CostModel, SlopeCost};
 use crate::line::Ground;
@@ -32,42 +31,43 @@ use std::collections::VecDeque;
 #[cfg(test)]
 mod tests;
 
-/// Most cells of a map: a square of 102 m at cells of 0.1 m.
+/// Largest number of cells of a map: a square of 102 m with cells of 0.1 m.
 pub const CELLS_MAX: usize = 1 << 20;
-/// Limit of slopes of a level map, deg: any.
+/// Slope limit on the level map, degrees; any value will do.
 const LEVEL_DEG: f64 = 45.0;
-/// The goal counts as reached this much of a cell before its tolerance, so that a rover anywhere in the cell is within it.
+/// A cell counts as at the goal if its centre is within the tolerance less this share of a cell, so that a rover anywhere in the cell is within the
+/// tolerance.
 const CELL_CORNER: f64 = 0.75;
-/// Steps of a plan that are looked along for the next way point.
+/// Number of steps of a plan that are checked for the next waypoint.
 const STEPS_AHEAD: usize = 60;
-/// Rounding of squared distances, as a share.
+/// Relative rounding of squared distances.
 const ROUNDING: f64 = 1e-9;
-/// A way point this near, in cells, has been reached.
+/// A waypoint within this distance, in cells, has been reached.
 const AT_CENTRE: f64 = 0.05;
 
-/// How an explorer plans.
+/// Settings of an explorer.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ExplorerSettings {
     /// Side of a cell, m.
     pub cell_m: f64,
-    /// Least distance between a hazard and a place of the rover, each anywhere in its cell, m.
+    /// Least distance between a hazard and the rover's position, each anywhere in its cell, m.
     pub margin_m: f64,
-    /// Distance from the goal at which it is reached, m.
+    /// Distance at which the goal counts as reached, m.
     pub arrive_m: f64,
-    /// How far the map reaches beyond start and goal at first, m.
+    /// Initial border of the map around start and goal, m.
     pub beyond_m: f64,
 }
 
-/// What a look says of an area.
+/// Result of a look at an area.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Sight {
-    /// There is no hazard in it.
+    /// The area contains no hazard.
     Safe,
-    /// Somewhere in it is one.
+    /// The area contains a hazard somewhere.
     Hazard,
 }
 
-/// Knowledge of a cell, rising.
+/// Knowledge of a cell, in rising order.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 enum Cell {
     Unseen,
@@ -82,7 +82,7 @@ impl Cell {
     }
 }
 
-/// What an explorer knows, and its search.
+/// Knowledge of an explorer, and its search.
 #[derive(Clone, Debug)]
 pub struct Explorer {
     settings: ExplorerSettings,
@@ -92,9 +92,9 @@ pub struct Explorer {
     map: TravelMap,
     costs: CostModel,
     cells: Vec<Cell>,
-    /// Cells with hazards nearer to each than the margin.
+    /// Number of cells with hazards nearer than the margin, per cell.
     near: Vec<u16>,
-    /// Offsets in rows and columns of the cells within the margin of one.
+    /// Offsets in rows and columns of the cells within the margin of a cell.
     margin: Vec<[i64; 2]>,
     goal: Node,
     search: DStarLite,
@@ -103,10 +103,27 @@ pub struct Explorer {
 }
 
 impl Explorer {
-    /// An explorer that has seen nothing.
+    /// An explorer without knowledge.
     ///
     /// # Errors
-    /// Settings out of range, or a map of too many cells.
+    /// Settings out of range, or a map with too many cells.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_navigation::explorer::{Explorer, ExplorerSettings, Sight};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let settings = ExplorerSettings { cell_m: 0.1, margin_m: 0.2, arrive_m: 0.5, beyond_m: 2.0 };
+    /// let mut explorer = Explorer::new(settings, [0.0, 0.0], [3.0, 0.4])?;
+    /// // Nothing is known yet: straight to the goal.
+    /// assert_eq!(explorer.plan([0.02, 0.03]), Some(vec![[0.02, 0.03], [3.0, 0.4]]));
+    /// // A wall across the way: around it.
+    /// explorer.see(&[[1.0, -1.0], [1.2, -1.0], [1.2, 1.0], [1.0, 1.0]], Sight::Hazard);
+    /// assert!(explorer.is_blocked([1.1, 0.1]));
+    /// assert!(explorer.plan([0.02, 0.03]).is_some_and(|points_m| points_m.len() > 2));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn new(settings: ExplorerSettings, start_m: [f64; 2], goal_m: [f64; 2]) -> Result<Self, ParameterError> {
         settings.check()?;
         let geometry = settings.geometry(start_m, goal_m, settings.beyond_m)?;
@@ -130,28 +147,28 @@ impl Explorer {
         })
     }
 
-    /// Cells of the map.
+    /// Number of cells of the map.
     pub fn len(&self) -> usize {
         self.map.len()
     }
 
-    /// Never so.
+    /// Always false.
     pub fn is_empty(&self) -> bool {
         self.map.is_empty()
     }
 
-    /// Vertices expanded by all searches on the present map.
+    /// Vertices expanded by all searches on the current map.
     pub fn expansions(&self) -> u64 {
         self.search.expansions()
     }
 
-    /// Whether a point lies in a cell that plans keep clear of.
+    /// Whether a point lies in a blocked cell.
     pub fn is_blocked(&self, at_m: [f64; 2]) -> bool {
         self.node_at(at_m).is_some_and(|node| self.map.is_blocked(node))
     }
 
-    /// Takes a look at the convex area with these corners, in order around it. What lies beyond the map is not remembered: the map grows
-    /// before a plan leads there.
+    /// Adds a look at the convex area with these corners, given in order around it. Observations outside the map are dropped: the map grows before a
+    /// plan leads there.
     pub fn see(&mut self, corners_m: &[[f64; 2]; 4], sight: Sight) {
         let end = |axis: usize, pick: fn(f64, f64) -> f64| {
             corners_m.iter().map(|corner| corner[axis]).reduce(pick).unwrap_or_default()
@@ -171,20 +188,20 @@ impl Explorer {
         }
         let seen = if sight == Sight::Hazard { Cell::Suspect } else { Cell::Safe };
         nodes.iter().for_each(|node| self.learn(*node, seen));
-        // What lies there was taken for safe.
+        // All cells of the area were believed to be safe.
         if sight == Sight::Hazard && !nodes.iter().any(|node| self.map.is_blocked(*node)) {
             nodes.iter().for_each(|node| self.learn(*node, Cell::Fixed));
         }
     }
 
-    /// Takes a look that found a hazard at a place: its cell is one for good. What lies beyond the map is not remembered.
+    /// Adds a look that found a hazard at a position: its cell becomes a fixed hazard. Observations outside the map are dropped.
     pub fn see_hazard_at(&mut self, at_m: [f64; 2]) {
         if let Some(node) = self.node_at(at_m) {
             self.learn(node, Cell::Fixed);
         }
     }
 
-    /// Forgets all that it has seen.
+    /// Discards all knowledge.
     pub fn forget(&mut self) {
         for node in 0..self.map.len() as Node {
             self.cells[node as usize] = Cell::Unseen;
@@ -195,7 +212,7 @@ impl Explorer {
         }
     }
 
-    /// Raises what is known of a cell.
+    /// Raises the knowledge of a cell.
     fn learn(&mut self, node: Node, seen: Cell) {
         let before = self.cells[node as usize];
         if seen <= before {
@@ -209,7 +226,7 @@ impl Explorer {
         }
     }
 
-    /// Blocks, or frees, what lies within the margin of a cell.
+    /// Blocks or frees the cells within the margin of a cell.
     fn keep_clear(&mut self, node: Node, of_hazard: bool) {
         let ([row, col], [rows, cols]) = (self.map.place(node), self.map.shape());
         for k in 0..self.margin.len() {
@@ -230,12 +247,12 @@ impl Explorer {
         }
     }
 
-    /// Way points from a place to the goal over what is known: the first is the place itself, the next ones are as far along the plan as
-    /// straight lines lead. `None` where there is no way.
+    /// Waypoints from a position to the goal over the cells known so far. The first is the position itself; each next one is as far along the plan as
+    /// a straight line reaches. `None` if there is no path.
     pub fn plan(&mut self, at_m: [f64; 2]) -> Option<Vec<[f64; 2]>> {
         loop {
             let Some(at) = self.node_at(at_m).filter(|node| !self.is_edge(*node)) else {
-                // Beyond the map, or at its edge.
+                // Outside the map or at its edge.
                 self.grow(at_m).then_some(())?;
                 continue;
             };
@@ -246,7 +263,7 @@ impl Explorer {
                 None => self.leads_out([start].into()) && self.leads_out(self.arrival().cells_at_goal().collect()),
             };
             if !(grows && self.grow(at_m)) {
-                return path.map(|path| self.way_points(at_m, at, &path));
+                return path.map(|path| self.waypoints(at_m, at, &path));
             }
         }
     }
@@ -265,19 +282,19 @@ impl Explorer {
         search.search(&network).map(|found| found.path)
     }
 
-    /// Way points along a path of nodes from the cell of a place, or from the free one that is nearest to it.
-    fn way_points(&self, at_m: [f64; 2], at: Node, path: &[Node]) -> Vec<[f64; 2]> {
+    /// Waypoints along a path of nodes that starts at the cell of a position, or at the free cell nearest to it.
+    fn waypoints(&self, at_m: [f64; 2], at: Node, path: &[Node]) -> Vec<[f64; 2]> {
         let Some((first, rest)) = path.split_first() else { return vec![at_m] };
         let mut points_m = vec![at_m];
         let mut from = self.map.point_at(at_m);
         let mut rest = rest;
-        // The map is level: what is free may be passed.
+        // The map is level, so whatever is free is passable.
         let passable = |from: Point, node: Node| self.map.is_free_along(from, self.map.point(node));
         let centred = |from: Point| {
             let to = self.map.point(*first);
             (from[0] - to[0]).abs().max((from[1] - to[1]).abs()) <= AT_CENTRE
         };
-        // Out of blocked cells, and from off the centre of a cell where a step from there would touch a blocked one.
+        // Needed to leave blocked cells, and when the position is off its cell's centre and a step from there would touch a blocked cell.
         if *first != at || !(centred(from) || rest.first().is_none_or(|next| passable(from, *next))) {
             points_m.push(self.map.position_m(*first));
             from = self.map.point(*first);
@@ -290,7 +307,7 @@ impl Explorer {
             from = self.map.point(*last);
             rest = &rest[seen..];
         }
-        // The goal itself rather than the centre of its cell.
+        // Ends at the goal itself, not at the centre of its cell.
         if points_m.len() > 1 {
             points_m.pop();
         }
@@ -298,7 +315,8 @@ impl Explorer {
         points_m
     }
 
-    /// The free node that is nearest to one, by steps over cells that hold no hazard themselves, then over any; `None` where all are blocked.
+    /// The free node reached in the fewest steps from a node, over cells that hold no hazard themselves, else over any cells; `None` if all are
+    /// blocked.
     fn nearest_free(&self, at: Node) -> Option<Node> {
         let free = |node: &Node| !self.map.is_blocked(*node);
         let over = |all: bool| {
@@ -308,14 +326,14 @@ impl Explorer {
         if free(&at) { Some(at) } else { over(false).or_else(|| over(true)) }
     }
 
-    /// Whether free cells lead from one of these to the edge of the map.
+    /// Whether free cells lead from one of these nodes to the edge of the map.
     fn leads_out(&self, from: Vec<Node>) -> bool {
         let free = |node: Node| !self.map.is_blocked(node);
         let from = from.into_iter().filter(|node| free(*node)).collect();
         self.flood(from, free, &mut |node| self.is_edge(node)).is_some()
     }
 
-    /// The first node, in order of steps along the axes over open cells, that is looked for.
+    /// The first node that satisfies `found`, in order of steps along the axes over open cells.
     fn flood(&self, from: Vec<Node>, open: impl Fn(Node) -> bool, found: &mut dyn FnMut(Node) -> bool) -> Option<Node> {
         let mut met = vec![false; self.map.len()];
         from.iter().for_each(|node| met[*node as usize] = true);
@@ -343,7 +361,7 @@ impl Explorer {
         row == 0 || col == 0 || row + 1 == rows || col + 1 == cols
     }
 
-    /// Doubles the room around start, goal and a place; `false`, and no change, where that would make too many cells.
+    /// Doubles the border around start, goal and a position; false, without a change, if that would take too many cells.
     fn grow(&mut self, at_m: [f64; 2]) -> bool {
         let beyond_m = 2.0 * self.beyond_m;
         let low = [0, 1].map(|axis| self.start_m[axis].min(at_m[axis]));
@@ -379,7 +397,7 @@ impl ExplorerSettings {
         ParameterError::positive("beyond_m", self.beyond_m).map(|_| ())
     }
 
-    /// Shape and place of a map that holds two places and room around them: cells lie at whole multiples of their side.
+    /// Geometry of a map that contains two positions and a border around them; cells lie at integer multiples of their side.
     ///
     /// # Errors
     /// Too many cells.
@@ -401,7 +419,7 @@ impl ExplorerSettings {
         })
     }
 
-    /// Distance of cell centres from the goal at which it is reached, m.
+    /// Distance from the goal within which a cell's centre counts as at the goal, m.
     fn arrive(&self) -> f64 {
         (self.arrive_m - CELL_CORNER * self.cell_m).max(0.0)
     }
@@ -422,13 +440,13 @@ impl ExplorerSettings {
 /// A level map without hazards.
 fn level(geometry: Geometry) -> Result<(TravelMap, CostModel), ParameterError> {
     let limits = SlopeLimits::new(LEVEL_DEG, LEVEL_DEG)?;
-    let refused = |error| ParameterError::new("cell_m", format!("gives no map: failed to {error}"));
+    let refused = |error| ParameterError::new("cell_m", format!("cannot form a map: failed to {error}"));
     let map = TravelMap::new(Grid::filled(geometry, 0.0), limits).map_err(refused)?;
     let costs = CostModel::new(SlopeCost::Linear { up: 0.0, down: 0.0 }, None, &map)?;
     Ok((map, costs))
 }
 
-/// Whether a convex area holds a point: it lies on one side of all edges, or on one of them.
+/// Whether a convex area contains a point: it lies on the same side of all edges, or on one of them if `edges_too`.
 fn holds(corners: &[[f64; 2]; 4], [x, y]: [f64; 2], edges_too: bool) -> bool {
     let turn = |k: usize| {
         let ([ax, ay], [bx, by]) = (corners[k], corners[(k + 1) % 4]);
@@ -439,7 +457,7 @@ fn holds(corners: &[[f64; 2]; 4], [x, y]: [f64; 2], edges_too: bool) -> bool {
     inside(1.0) || inside(-1.0)
 }
 
-/// Steps over free cells, and from every free cell within reach of the goal to it.
+/// Steps between free cells, and an edge from every free cell within the tolerance to the goal.
 struct Arrival<'a> {
     grid: GridNetwork<'a>,
     goal: Node,
@@ -459,7 +477,7 @@ impl<'a> Arrival<'a> {
         node != self.goal && away <= self.arrive_m * self.arrive_m && !map.is_blocked(node)
     }
 
-    /// Free cells within reach of the goal.
+    /// Free cells within the tolerance of the goal.
     fn cells_at_goal(&self) -> impl Iterator<Item = Node> {
         let map = self.grid.ground.map;
         let ([row, col], [rows, cols]) = (map.place(self.goal), map.shape());

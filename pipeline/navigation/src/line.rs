@@ -1,8 +1,8 @@
-//! Straight lines over a map: whether they may be travelled, and what that costs.
+//! Straight lines over a map: whether they are passable, and what they cost.
 //!
-//! A line between two nodes is cut into pieces of at most a quarter of a cell; heights between nodes are bilinear. It may be travelled if
-//! every piece is within the limits of slope and no cell that it touches is blocked, in full or at a corner (supercover). Every returned
-//! path is scored by this one integral, whatever found it, so that paths of different searches compare.
+//! A line between two nodes is divided into pieces of at most a quarter of a cell; heights between nodes are bilinear. The line is passable if every
+//! piece is within the slope limits and no cell that it touches, even at a corner, is blocked (supercover). All returned paths are scored by this one
+//! integral, whichever search found them, so that paths of different searches are comparable.
 
 use crate::clearance::Clearance;
 use crate::cost::CostModel;
@@ -11,14 +11,14 @@ use crate::map::{Direction, Node, Point, TravelMap};
 #[cfg(test)]
 mod tests;
 
-/// Pieces for each cell.
+/// Pieces per cell.
 const PIECES: f64 = 4.0;
-/// Rounding of the slope of a piece, as a share: a step at the very limit stays within it when it is cut into pieces.
+/// Relative rounding of a piece's slope: a step exactly at the limit stays within it when divided into pieces.
 const ROUNDING: f64 = 1e-9;
-/// A point this near to the side between two cells lies in both, cells: lines that mirror each other cost the same.
+/// A point within this distance of the side between two cells, in cells, counts for both, so that mirrored lines cost the same.
 const SIDE: f64 = 1e-9;
 
-/// What a line costs, and how steep it is.
+/// Cost, length and steepness of a line.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Travelled {
     /// Cost, metres of level ground.
@@ -32,10 +32,10 @@ pub struct Travelled {
 }
 
 impl Travelled {
-    /// Nothing yet.
+    /// A line of length 0.
     pub const NONE: Self = Self { cost: 0.0, length_m: 0.0, horizontal_m: 0.0, steepest: [0.0; 2] };
 
-    /// Two lines one after the other.
+    /// Appends another line.
     pub fn then(self, next: Self) -> Self {
         let steepest = [0, 1].map(|k| self.steepest[k].max(next.steepest[k]));
         Self {
@@ -47,24 +47,42 @@ impl Travelled {
     }
 }
 
-/// Ground with what travel over it costs.
+/// A map with costs of travel.
 #[derive(Clone, Copy, Debug)]
 pub struct Ground<'a> {
     /// The map.
     pub map: &'a TravelMap,
     /// Costs of travel.
     pub costs: &'a CostModel,
-    /// Room for a team, where it has a width.
+    /// Clearance, for a team of a given width.
     pub clearance: Option<&'a Clearance>,
 }
 
 impl Ground<'_> {
-    /// The straight line between two nodes; `None` where it may not be travelled.
+    /// The straight line between two nodes; `None` if it is not passable.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_navigation::{CostModel, Ground, SlopeCost, SlopeLimits, TravelMap};
+    /// use sastrugi_numeric::{Geometry, Grid};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let heights = Grid::filled(Geometry::square(3, 5, 1.0), 0.0);
+    /// let mut map = TravelMap::new(heights, SlopeLimits::new(30.0, 30.0)?)?;
+    /// map.block(map.node(1, 2));
+    /// let costs = CostModel::new(SlopeCost::THESIS, None, &map)?;
+    /// let ground = Ground { map: &map, costs: &costs, clearance: None };
+    /// assert_eq!(ground.line(map.node(0, 0), map.node(0, 4)).map(|line| line.cost), Some(4.0));
+    /// // Through the blocked cell.
+    /// assert_eq!(ground.line(map.node(1, 0), map.node(1, 4)), None);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn line(&self, from: Node, to: Node) -> Option<Travelled> {
         self.segment(self.map.point(from), self.map.point(to))
     }
 
-    /// The straight line between two points, `[row, column]`; `None` where it may not be travelled or leaves the map.
+    /// The straight line between two points, `[row, column]`; `None` if it is not passable or leaves the map.
     pub fn segment(&self, start: Point, end: Point) -> Option<Travelled> {
         let along = direction_of([end[0] - start[0], end[1] - start[1]]);
         let mut travelled = Travelled::NONE;
@@ -80,7 +98,7 @@ impl Ground<'_> {
         Some(travelled)
     }
 
-    /// Factor of the cost at a point: of its cell, or the mean of the free cells that share the side or corner it lies on.
+    /// Cost factor at a point: that of its cell, or the mean over the free cells that share the side or corner that it lies on.
     fn factor(&self, point: Point, along: Direction) -> f64 {
         if self.clearance.is_none() && !self.costs.has_factors() {
             return 1.0;
@@ -94,19 +112,18 @@ impl Ground<'_> {
         sum / count
     }
 
-    /// Straight lines from node to node; `None` where one may not be travelled.
+    /// Straight lines from node to node; `None` if one is not passable.
     pub fn path(&self, nodes: &[Node]) -> Option<Travelled> {
         nodes.windows(2).try_fold(Travelled::NONE, |sum, pair| Some(sum.then(self.line(pair[0], pair[1])?)))
     }
 }
 
-/// Whether the straight line between two points, `[row, column]`, may be travelled; never where it leaves the map.
+/// Whether the straight line between two points, `[row, column]`, is passable; false if it leaves the map.
 pub fn is_passable(map: &TravelMap, start: Point, end: Point) -> bool {
     for_each_piece(map, start, end, |_, _, _| ()).is_some()
 }
 
-/// Calls `visit` with run (m), rise (m) and middle of the pieces of a line, up to the first that is too steep; `None` where the line may not
-/// be travelled.
+/// Calls `visit` with run (m), rise (m) and midpoint of each piece of a line, up to the first that is too steep; `None` if the line is not passable.
 fn for_each_piece(map: &TravelMap, start: Point, end: Point, mut visit: impl FnMut(f64, f64, Point)) -> Option<()> {
     if !map.is_free_along(start, end) {
         return None;
@@ -131,9 +148,9 @@ fn for_each_piece(map: &TravelMap, start: Point, end: Point, mut visit: impl FnM
     Some(())
 }
 
-/// The one of the eight directions that a line is nearest to, `[rows, columns]`.
+/// The nearest of the eight directions to a line, `[rows, columns]`.
 fn direction_of([down, across]: [f64; 2]) -> Direction {
-    // Half of the angle between the directions: tan(22.5 degrees).
+    // Half the angle between directions: tan(22.5 degrees).
     const HALF: f64 = 0.414_213_562_373_095_05;
     let sign = |value: f64, other: f64| match value.abs() > HALF * other.abs() {
         true if value > 0.0 => 1,

@@ -1,4 +1,4 @@
-//! The ground to plan on: heights, what is blocked, and how steep may be travelled.
+//! The map to plan on: heights, blocked cells and slope limits.
 
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::ParameterError;
@@ -9,19 +9,19 @@ use std::ops::Range;
 #[cfg(test)]
 mod tests;
 
-/// A cell: row times columns, plus column.
+/// A cell: row times the number of columns, plus column.
 pub type Node = u32;
 
-/// A position between nodes: row and column, nodes at whole numbers.
+/// A position between nodes, as row and column; nodes are at integers.
 pub type Point = [f64; 2];
 
-/// Most cells of a map.
+/// Largest number of cells of a map.
 const NODES_MAX: usize = 1 << 30;
 
-/// A map that cannot be planned on. Messages read after "failed to".
+/// Why a map was refused. Messages read after "failed to".
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MapError {
-    /// Too few or too many cells: a path needs cells in both directions.
+    /// Too few or too many cells; a path needs cells in both directions.
     #[error("plan on {rows} x {cols} cells: a map needs at least 2 x 2 and at most {NODES_MAX} in all")]
     Size {
         /// Rows.
@@ -29,7 +29,7 @@ pub enum MapError {
         /// Columns.
         cols: usize,
     },
-    /// Values that do not fill the raster.
+    /// The number of values differs from the number of cells.
     #[error("plan on {values} heights for {rows} x {cols} cells: there must be one for each cell")]
     Length {
         /// Number of values.
@@ -39,13 +39,13 @@ pub enum MapError {
         /// Columns.
         cols: usize,
     },
-    /// A cell size that is not positive.
+    /// The cell size is not positive.
     #[error("plan on cells of {} m by {} m: both sides must be finite and above 0", cell_m[0], cell_m[1])]
     Cell {
         /// Cell size east-west and north-south, m.
         cell_m: [f64; 2],
     },
-    /// An infinite height.
+    /// A height is infinite.
     #[error(
         "plan on a height of {height_m} m (row {row}, column {col}): heights must be finite; cells without data are NaN"
     )]
@@ -59,7 +59,7 @@ pub enum MapError {
     },
 }
 
-/// Steepest slopes that may be travelled.
+/// Steepest slopes that are allowed.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SlopeLimits {
     up_deg: f64,
@@ -70,7 +70,7 @@ pub struct SlopeLimits {
 }
 
 impl SlopeLimits {
-    /// Limits uphill and downhill, degrees above 0 and below 90.
+    /// Limits uphill and downhill, degrees, above 0 and below 90.
     ///
     /// # Errors
     /// A limit out of range.
@@ -96,14 +96,14 @@ impl SlopeLimits {
     }
 }
 
-/// The nodes that a step may lead to.
+/// The neighbours that a step may lead to.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Neighbourhood {
     /// East, north, west, south (the thesis).
     #[default]
     Four,
-    /// The diagonals as well, without cutting the corner of a blocked cell.
+    /// The diagonals too, without cutting the corner of a blocked cell.
     Eight,
 }
 
@@ -116,7 +116,7 @@ impl Neighbourhood {
         }
     }
 
-    /// Its directions, in the order of every loop.
+    /// Its directions, in the order used by every loop.
     pub fn directions(self) -> &'static [Direction] {
         match self {
             Self::Four => &Direction::ALL[..4],
@@ -125,7 +125,7 @@ impl Neighbourhood {
     }
 }
 
-/// A step to a neighbour.
+/// A step to a neighbouring cell.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Direction {
     /// Rows, southward.
@@ -147,43 +147,61 @@ impl Direction {
         Self { rows: 1, cols: 1 },
     ];
 
-    /// Place in [`Self::ALL`]; 8 for anything else.
+    /// Index in [`Self::ALL`]; 8 for any other direction.
     fn index(self) -> usize {
         const INDICES: [[usize; 3]; 3] = [[5, 1, 4], [2, 8, 0], [6, 3, 7]];
         let at = |k: i8| usize::try_from(i16::from(k) + 1).unwrap_or(3);
         INDICES.get(at(self.rows)).and_then(|row| row.get(at(self.cols))).copied().unwrap_or(8)
     }
 
-    /// The opposite one.
+    /// The opposite direction.
     pub fn back(self) -> Self {
         Self { rows: -self.rows, cols: -self.cols }
     }
 
-    /// True for those between the axes.
+    /// True for diagonal directions.
     pub fn is_diagonal(self) -> bool {
         self.rows != 0 && self.cols != 0
     }
 }
 
-/// Heights with what is blocked and the limits of travel.
+/// Heights with blocked cells and slope limits.
 #[derive(Clone, Debug)]
 pub struct TravelMap {
     heights: Grid,
     blocked: Vec<bool>,
     limits: SlopeLimits,
-    /// Bit k: the step in the k-th of [`Direction::ALL`] may be taken.
+    /// Bit k: the k-th step of [`Direction::ALL`] is allowed.
     steps: Vec<u8>,
 }
 
-/// Directions east, north and between: with their opposites, two places later, all eight.
+/// Indices of east, north, north-east and north-west; with their opposites, two indices later, these are all eight directions.
 const HALF: [usize; 4] = [0, 1, 4, 5];
 
 impl TravelMap {
-    /// Heights in m, NaN where there are none: such cells are blocked.
+    /// Builds a map from heights in m; cells without data (NaN) are blocked.
     ///
     /// # Errors
-    /// Fewer than two rows or columns, too many cells, values that do not fill them, a cell size that is not positive, or an infinite
+    /// Fewer than two rows or columns, too many cells, a number of values other than that of cells, a cell size that is not positive, or an infinite
     /// height.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_navigation::{Direction, SlopeLimits, TravelMap};
+    /// use sastrugi_numeric::{Geometry, Grid};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // Cells of 2 m. The ground rises by 1 m from the first column to the second; one cell has no data.
+    /// let heights = Grid::new(Geometry::square(2, 3, 2.0), vec![0.0, 1.0, 1.0, 0.0, 1.0, f64::NAN]);
+    /// let map = TravelMap::new(heights, SlopeLimits::new(20.0, 30.0)?)?;
+    /// let east = Direction { rows: 0, cols: 1 };
+    /// // 26.6 degrees: too steep to climb, gentle enough to descend.
+    /// assert_eq!(map.accessible(map.node(0, 0), east), None);
+    /// assert_eq!(map.accessible(map.node(0, 1), east.back()), Some(map.node(0, 0)));
+    /// assert!(map.is_blocked(map.node(1, 2)));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn new(heights: Grid, limits: SlopeLimits) -> Result<Self, MapError> {
         let (rows, cols, cell_m) = (heights.rows(), heights.cols(), heights.geometry.cell);
         if rows < 2 || cols < 2 || rows.checked_mul(cols).is_none_or(|count| count > NODES_MAX) {
@@ -209,7 +227,7 @@ impl TravelMap {
         &self.heights
     }
 
-    /// The limits of travel.
+    /// The slope limits.
     pub fn limits(&self) -> SlopeLimits {
         self.limits
     }
@@ -219,7 +237,7 @@ impl TravelMap {
         self.blocked.len()
     }
 
-    /// True without nodes; never so for a checked map.
+    /// True without nodes; a checked map always has some.
     pub fn is_empty(&self) -> bool {
         self.blocked.is_empty()
     }
@@ -255,7 +273,7 @@ impl TravelMap {
         [self.heights.geometry.x(col), self.heights.geometry.y(row)]
     }
 
-    /// Height of a node, m; NaN where there is none.
+    /// Height of a node, m; NaN without data.
     #[inline]
     pub fn height_m(&self, node: Node) -> f64 {
         self.heights.values[node as usize]
@@ -273,13 +291,13 @@ impl TravelMap {
         self.update_around(node);
     }
 
-    /// Frees a node; one without a height stays blocked.
+    /// Unblocks a node; a node without a height stays blocked.
     pub fn unblock(&mut self, node: Node) {
         self.blocked[node as usize] = self.height_m(node).is_nan();
         self.update_around(node);
     }
 
-    /// Changes the height of a node, m; NaN takes it away, which blocks the node.
+    /// Sets the height of a node, m; NaN removes it and blocks the node.
     ///
     /// # Errors
     /// An infinite height.
@@ -294,7 +312,7 @@ impl TravelMap {
         Ok(())
     }
 
-    /// The node and its neighbours: all nodes whose steps depend on it.
+    /// The node and its neighbours, which are all nodes whose steps depend on it.
     pub fn around(&self, node: Node) -> impl Iterator<Item = Node> {
         let ([row, col], [rows, cols]) = (self.place(node), self.shape());
         let near = |at: usize, count: usize| at.saturating_sub(1)..(at + 2).min(count);
@@ -307,7 +325,7 @@ impl TravelMap {
         self.update_steps(near(row, rows), near(col, cols));
     }
 
-    /// Looks again at the steps from some nodes, and at those back.
+    /// Recomputes the steps from these nodes, and the steps back.
     fn update_steps(&mut self, rows: Range<usize>, cols: Range<usize>) {
         for row in rows {
             for col in cols.clone() {
@@ -316,13 +334,13 @@ impl TravelMap {
         }
     }
 
-    /// Looks again at the k-th step from a node, and at the one back.
+    /// Recomputes the k-th step from a node, and the step back.
     fn update_step(&mut self, row: usize, col: usize, k: usize) {
         let direction = Direction::ALL[k];
         let Some([target_row, target_col]) = self.place_beside([row, col], direction) else { return };
         let [node, target] = [self.node(row, col) as usize, self.node(target_row, target_col) as usize];
         let beside = [self.node(row, target_col) as usize, self.node(target_row, col) as usize];
-        // Along an axis, the cells beside are the two nodes themselves.
+        // Along an axis, the adjacent cells are the two nodes themselves.
         let free = ![node, target, beside[0], beside[1]].iter().any(|n| self.blocked[*n]);
         let z = |n: usize| self.heights.values[n];
         let run_m = self.step_m(direction);
@@ -336,7 +354,7 @@ impl TravelMap {
         self.steps[target] = self.steps[target] & !(4 << k) | back << (k + 2);
     }
 
-    /// The neighbour of a node; `None` beyond the map.
+    /// The neighbour of a node; `None` off the map.
     pub fn neighbour(&self, node: Node, direction: Direction) -> Option<Node> {
         self.place_beside(self.place(node), direction).map(|[row, col]| self.node(row, col))
     }
@@ -359,21 +377,20 @@ impl TravelMap {
         }
     }
 
-    /// The node that a step from `node` leads to, if the step may be taken: the target is on the map and free, the slope within the
-    /// limits, and for a diagonal both cells beside it are free. Along a diagonal the bilinear ground is curved: its slope is that of
-    /// quarters of the step.
+    /// The node that a step from `node` leads to, if the step is allowed: the target is on the map and free, the slope is within the limits, and for
+    /// a diagonal both adjacent cells are free. Bilinear ground is curved along a diagonal, so its slope is checked over quarters of the step.
     #[inline]
     pub fn accessible(&self, node: Node, direction: Direction) -> Option<Node> {
         self.may_step(node, direction.index()).then(|| self.beside(node, direction))
     }
 
-    /// Whether the step in the k-th of [`Direction::ALL`] may be taken.
+    /// Whether the k-th step of [`Direction::ALL`] is allowed.
     #[inline]
     pub(crate) fn may_step(&self, node: Node, k: usize) -> bool {
         u16::from(self.steps[node as usize]) >> k & 1 == 1
     }
 
-    /// The node beside one, which must be on the map.
+    /// The adjacent node in a direction; it must be on the map.
     #[inline]
     pub(crate) fn beside(&self, node: Node, direction: Direction) -> Node {
         let offset = i64::from(direction.rows) * self.heights.cols() as i64 + i64::from(direction.cols);
@@ -385,7 +402,7 @@ impl TravelMap {
         self.place(node).map(|k| k as f64)
     }
 
-    /// The node that a point is nearest to.
+    /// The node nearest to a point.
     pub fn nearest(&self, point: Point) -> Node {
         let [rows, cols] = self.shape();
         let [row, col] = point.map(|k| libm::floor(k + 0.5) as usize);
@@ -400,13 +417,13 @@ impl TravelMap {
         [(geometry.y(0) - y_m) / dy, (x_m - geometry.x(0)) / dx]
     }
 
-    /// Whether a point lies between the outer nodes, where heights are defined.
+    /// Whether a point lies within the outer nodes, where heights are defined.
     pub fn holds(&self, [row, col]: Point) -> bool {
         let [rows, cols] = self.shape();
         row >= 0.0 && row <= (rows - 1) as f64 && col >= 0.0 && col <= (cols - 1) as f64
     }
 
-    /// Bilinear height, m; `None` beyond the outer nodes and where a height is missing.
+    /// Bilinear height, m; `None` outside the outer nodes and where a height is missing.
     pub fn height_at_m(&self, point: Point) -> Option<f64> {
         if !self.holds(point) {
             return None;
@@ -415,13 +432,13 @@ impl TravelMap {
         let (r, c) = (row as usize, col as usize);
         let [v, u] = [row - r as f64, col - c as f64];
         let at = |r: usize, c: usize| self.height_m(self.node(r, c));
-        // A neighbour without weight may have no height.
+        // A neighbour of weight 0 may lack a height.
         let across = |r: usize| if u > 0.0 { at(r, c) + (at(r, c + 1) - at(r, c)) * u } else { at(r, c) };
         let height_m = if v > 0.0 { across(r) + (across(r + 1) - across(r)) * v } else { across(r) };
         height_m.is_finite().then_some(height_m)
     }
 
-    /// Whether all cells that the line between two points touches, in full or at a corner (supercover), are on the map and free.
+    /// Whether all cells that the line between two points touches, even at a corner (supercover), are on the map and free.
     pub fn is_free_along(&self, start: Point, end: Point) -> bool {
         if !(self.holds(start) && self.holds(end)) {
             return false;
@@ -430,7 +447,7 @@ impl TravelMap {
         let ([mut row, mut col], [last_row, last_col]) = (cell(start), cell(end));
         let (row_step, col_step) = ((last_row - row).signum(), (last_col - col).signum());
         let [down, across] = [0, 1].map(|axis| (end[axis] - start[axis]).abs());
-        // From the start to the first side that the line can leave its cell by, in cells.
+        // Distance from the start to the first side through which the line can leave its cell, in cells.
         let first = |at: f64, cell: i64, step: i64| 0.5 + step as f64 * (cell as f64 - at);
         let (mut to_side, mut to_end) = (first(start[1], col, col_step), first(start[0], row, row_step));
         let free = |row: i64, col: i64| !self.is_blocked(self.node(row as usize, col as usize));
@@ -438,7 +455,7 @@ impl TravelMap {
             if (row, col) == (last_row, last_col) {
                 return true;
             }
-            // to_side / across against to_end / down, exact between nodes.
+            // Compares to_side / across with to_end / down; exact between nodes.
             let (side, end) = (to_side * down, to_end * across);
             let sideways = row == last_row || col != last_col && side <= end;
             let lengthways = col == last_col || row != last_row && end <= side;
@@ -456,8 +473,8 @@ impl TravelMap {
     }
 }
 
-/// Slopes of the first and the last quarter of a diagonal step; those between lie between them, as the height along it is quadratic.
-/// `beside_m` is the sum of the heights of the two cells beside it.
+/// Slopes over the first and the last quarter of a diagonal step. Those of the middle quarters lie between them, because the height along the step is
+/// quadratic. `beside_m` is the sum of the heights of the two adjacent cells.
 fn diagonal_slopes(start_m: f64, beside_m: f64, end_m: f64, run_m: f64) -> [f64; 2] {
     let height_m = |t: f64| start_m * (1.0 - t) * (1.0 - t) + beside_m * t * (1.0 - t) + end_m * t * t;
     [(height_m(0.25) - start_m) / (0.25 * run_m), (end_m - height_m(0.75)) / (0.25 * run_m)]

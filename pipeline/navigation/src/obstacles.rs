@@ -1,7 +1,7 @@
-//! Obstacles drawn as polygons, blocked on a map.
+//! Polygonal obstacles that are blocked on a map.
 //!
-//! Every cell that the polygon's edge touches (supercover) or whose centre lies inside (even-odd rule) is blocked, and all cells within
-//! a margin of those. (The thesis marks the cells of the edge as vertices, which would then lie inside the obstacle.)
+//! Blocked are the cells that the polygon's edge touches (supercover) or whose centre lies inside (even-odd rule), and all cells within a margin of
+//! those. (The thesis marks the cells of the edge as vertices, which would then lie inside the obstacle.)
 
 use crate::map::{Node, TravelMap};
 use sastrugi_schemas::ParameterError;
@@ -9,13 +9,13 @@ use sastrugi_schemas::ParameterError;
 #[cfg(test)]
 mod tests;
 
-/// A polygon that cannot be an obstacle. Messages read after "failed to".
+/// Why a polygon was refused. Messages read after "failed to".
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObstacleError {
-    /// Fewer than three different points.
-    #[error("block a polygon of {0} points: it needs at least 3 different ones")]
+    /// Fewer than three distinct points.
+    #[error("block a polygon of {0} points: it needs at least 3 distinct points")]
     Points(usize),
-    /// A coordinate that is not finite.
+    /// A coordinate is not finite.
     #[error("block a polygon with the point ({x}, {y}): coordinates must be finite")]
     Coordinate {
         /// Easting, m.
@@ -23,31 +23,31 @@ pub enum ObstacleError {
         /// Northing, m.
         y: f64,
     },
-    /// No area.
+    /// The polygon has no area.
     #[error("block a polygon without area")]
     Flat,
-    /// Edges that cross.
-    #[error("block a polygon whose edges {first} and {second} cross (counted from 0); draw it as two")]
+    /// Edges cross.
+    #[error("block a polygon whose edges {first} and {second} cross (counted from 0); split it into two polygons")]
     Crossing {
         /// Number of an edge.
         first: usize,
-        /// Number of another one.
+        /// Number of the other edge.
         second: usize,
     },
 }
 
-/// A checked polygon with its holes, in the raster's coordinates, m.
+/// A validated polygon with its holes, in the raster's coordinates, m.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Polygon {
     rings: Vec<Vec<[f64; 2]>>,
 }
 
 impl Polygon {
-    /// A polygon from the points of its outline in order, and of each of its holes; points that repeat the one before are dropped, and a
-    /// last one that repeats the first.
+    /// A polygon from the points of its outline in order, and those of each hole. Points that repeat the previous one are dropped, and a last point
+    /// that repeats the first.
     ///
     /// # Errors
-    /// A ring of fewer than three points, coordinates that are not finite, no area, or edges of a ring that cross.
+    /// A ring of fewer than three points, coordinates that are not finite, no area, or crossing edges of a ring.
     pub fn new(rings: Vec<Vec<[f64; 2]>>) -> Result<Self, ObstacleError> {
         if rings.is_empty() {
             return Err(ObstacleError::Points(0));
@@ -74,7 +74,7 @@ impl Polygon {
         self.edges().filter(crosses).count() % 2 == 1
     }
 
-    /// Distance of an edge to a rectangle, 0 where they touch, m.
+    /// Distance from the polygon's edges to a rectangle, m; 0 if they touch.
     fn distance_m(&self, low: [f64; 2], high: [f64; 2]) -> f64 {
         self.edges().map(|edge| distance_to_rectangle(edge, low, high)).fold(f64::INFINITY, f64::min)
     }
@@ -84,7 +84,7 @@ fn edges(ring: &[[f64; 2]]) -> impl Iterator<Item = [[f64; 2]; 2]> {
     (0..ring.len()).map(|k| [ring[k], ring[(k + 1) % ring.len()]])
 }
 
-/// A ring without repeated points.
+/// Validates a ring and removes repeated points.
 fn checked(mut ring: Vec<[f64; 2]>) -> Result<Vec<[f64; 2]>, ObstacleError> {
     ring.dedup();
     while ring.len() > 1 && ring.first() == ring.last() {
@@ -97,7 +97,7 @@ fn checked(mut ring: Vec<[f64; 2]>) -> Result<Vec<[f64; 2]>, ObstacleError> {
         return Err(ObstacleError::Points(ring.len()));
     }
     let edges: Vec<[[f64; 2]; 2]> = edges(&ring).collect();
-    // From the first point: far from the origin the area would be lost in rounding.
+    // Relative to the first point, because far from the origin the area would be lost in rounding.
     if edges.iter().map(|[a, b]| turn(ring[0], *a, *b)).sum::<f64>() == 0.0 {
         return Err(ObstacleError::Flat);
     }
@@ -120,6 +120,23 @@ fn checked(mut ring: Vec<[f64; 2]>) -> Result<Vec<[f64; 2]>, ObstacleError> {
 ///
 /// # Errors
 /// A margin below 0 or not finite.
+///
+/// # Examples
+/// ```
+/// use sastrugi_navigation::obstacles::{Polygon, block};
+/// use sastrugi_navigation::{SlopeLimits, TravelMap};
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // The south-west corner of the map is at (0, 0). The square touches 3 x 3 cells of 1 m.
+/// let heights = Grid::filled(Geometry::square(6, 6, 1.0), 0.0);
+/// let mut map = TravelMap::new(heights, SlopeLimits::new(30.0, 30.0)?)?;
+/// let square = Polygon::new(vec![vec![[1.5, 1.5], [3.5, 1.5], [3.5, 3.5], [1.5, 3.5]]])?;
+/// block(&mut map, &square, 0.0)?;
+/// assert_eq!((0..36).filter(|node| map.is_blocked(*node)).count(), 9);
+/// # Ok(())
+/// # }
+/// ```
 pub fn block(map: &mut TravelMap, polygon: &Polygon, margin_m: f64) -> Result<(), ParameterError> {
     ParameterError::not_negative("margin_m", margin_m)?;
     let geometry = map.heights().geometry;
@@ -142,7 +159,7 @@ pub fn block(map: &mut TravelMap, polygon: &Polygon, margin_m: f64) -> Result<()
     Ok(())
 }
 
-/// Blocks marked cells (`rows * cols` from the north-west), and those whose rectangle lies within `margin_m` of a marked one's.
+/// Blocks marked cells (`rows * cols` from the north-west), and those whose rectangle lies within `margin_m` of a marked cell's.
 ///
 /// # Errors
 /// A margin below 0 or not finite.
@@ -174,7 +191,7 @@ fn turn(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// Whether an edge runs back over the one before.
+/// Whether an edge reverses over the previous one.
 fn folds_back([a, b]: [[f64; 2]; 2], [_, c]: [[f64; 2]; 2]) -> bool {
     let ahead = (0..2).map(|k| (b[k] - a[k]) * (c[k] - b[k])).sum::<f64>();
     turn(a, b, c) == 0.0 && ahead < 0.0

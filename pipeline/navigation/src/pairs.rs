@@ -1,8 +1,8 @@
 //! Random starts and goals.
 //!
-//! Both are cells drawn uniformly from those that lie more than a border from the edge, drawn again until both are free and far enough
-//! apart. Whether a path joins them is for the search to say. Pair k draws from its own stream (`pair-0001`, `pair-0002`, ...), so
-//! that asking for more pairs changes none of those before; on maps with the same cells draw n of a pair is the same on all of them.
+//! Both are cells drawn uniformly from those farther than a border from the edge, and redrawn until both are free and far enough apart. Whether a
+//! path connects them is left to the search. Pair k draws from its own stream (`pair-0001`, `pair-0002`, ...), so requesting more pairs does not
+//! change earlier ones; on maps with the same cells, draw n of a pair is the same on all of them.
 
 use crate::map::{Node, TravelMap};
 use sastrugi_numeric::Streams;
@@ -10,24 +10,24 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Draws after which a pair is given up.
+/// Draws after which a pair is abandoned.
 const DRAWS_MAX: u32 = 100_000;
 
 /// Rules for drawing starts and goals.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PairParameters {
-    /// Least straight distance from start to goal, m; half the shorter side of the terrain when absent.
+    /// Least straight-line distance from start to goal, m; half the shorter side of the terrain if absent.
     pub distance_min_m: Option<f64>,
-    /// Distance of starts and goals from the edge of the terrain, m.
+    /// Least distance of starts and goals from the edge of the terrain, m.
     pub border_m: f64,
 }
 
 impl PairParameters {
-    /// Refuses numbers out of range.
+    /// Refuses values out of range.
     ///
     /// # Errors
-    /// The first one.
+    /// The first value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
         ParameterError::not_negative("border_m", self.border_m)?;
         self.distance_min_m.map(|m| ParameterError::positive("distance_min_m", m)).transpose().map(drop)
@@ -41,16 +41,16 @@ pub struct Pair {
     pub start: Node,
     /// Goal node.
     pub goal: Node,
-    /// Draws that were needed, at least 1.
+    /// Number of draws, at least 1.
     pub draws: u32,
 }
 
-/// Why a map has no pairs. Messages read after "failed to".
+/// Why no pairs could be drawn. Messages read after "failed to".
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PairError {
-    /// The border leaves nothing.
+    /// The border leaves no cells.
     #[error(
-        "draw starts and goals: a border of {border_m} m leaves no cells of the {rows} x {cols}; take a narrower one"
+        "draw starts and goals: a border of {border_m} m leaves no cells of the {rows} x {cols}; use a narrower border"
     )]
     Border {
         /// Border, m.
@@ -60,15 +60,15 @@ pub enum PairError {
         /// Columns.
         cols: usize,
     },
-    /// No draw met the rules.
+    /// No draw satisfied the rules.
     #[error(
-        "draw pair {number}: none of {draws} draws gave two free cells {distance_min_m} m apart or more; lower `distance_min_m`, or \
+        "draw pair {number}: none of {draws} draws gave two free cells at least {distance_min_m} m apart; lower `distance_min_m`, or \
          block less of the terrain"
     )]
     Exhausted {
         /// Number of the pair, from 1.
         number: usize,
-        /// Draws made.
+        /// Number of draws.
         draws: u32,
         /// Least distance, m.
         distance_min_m: f64,
@@ -78,7 +78,26 @@ pub enum PairError {
 /// Draws pairs on a map.
 ///
 /// # Errors
-/// A border that leaves no cells, or rules that no draw meets.
+/// A border that leaves no cells, or rules that no draw satisfies.
+///
+/// # Examples
+/// ```
+/// use sastrugi_navigation::pairs::{PairParameters, draw_pairs};
+/// use sastrugi_navigation::{SlopeLimits, TravelMap};
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let heights = Grid::filled(Geometry::square(20, 20, 1.0), 0.0);
+/// let map = TravelMap::new(heights, SlopeLimits::new(30.0, 30.0)?)?;
+/// let rules = PairParameters { distance_min_m: Some(5.0), border_m: 2.0 };
+/// let streams = Streams::for_seed(7, "route");
+/// let pairs = draw_pairs(&map, &rules, 10, &streams)?;
+/// assert!(pairs.iter().all(|pair| map.place(pair.start).iter().all(|at| (2..18).contains(at))));
+/// // Requesting fewer gives the first of the same pairs.
+/// assert_eq!(draw_pairs(&map, &rules, 4, &streams)?, pairs[..4]);
+/// # Ok(())
+/// # }
+/// ```
 pub fn draw_pairs(
     map: &TravelMap,
     rules: &PairParameters,
@@ -107,7 +126,7 @@ pub fn draw_pairs(
     (0..count).map(pair).collect()
 }
 
-/// First row and number of rows inside of the border, and the same of columns.
+/// First row and number of rows inside the border, and the same for columns.
 fn inside(map: &TravelMap, border_m: f64) -> Result<[[usize; 2]; 2], PairError> {
     let ([rows, cols], [dx, dy]) = (map.shape(), map.cell_m());
     let within = |cells: usize, cell_m: f64| {
@@ -143,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn prop_pairs_keep_the_rules() {
+    fn prop_pairs_satisfy_the_rules() {
         let map = map(40, 60, |row, col| (row + col) % 3 == 0);
         let rules = PairParameters { distance_min_m: Some(8.0), border_m: 2.0 };
         let pairs = draw_pairs(&map, &rules, 200, &streams()).unwrap();
@@ -157,8 +176,8 @@ mod tests {
         assert_eq!(draw_pairs(&map, &rules, 20, &streams()).unwrap(), pairs[..20]);
     }
 
-    /// Starts of 4000 pairs over 4 quarters of a free map: chi-square of 3 degrees of freedom below 30.7 (false alarm 1e-6); a quarter
-    /// drawn 15 % too often is found.
+    /// Starts of 4000 pairs over 4 quarters of a free map: chi-square with 3 degrees of freedom below 30.7 (false alarm 1e-6); detects a quarter
+    /// drawn 15 % too often.
     #[test]
     fn stat_starts_are_uniform() {
         let map = map(40, 40, |_, _| false);
@@ -172,6 +191,30 @@ mod tests {
         assert!(chi_square < 30.7, "{counts:?}");
     }
 
+    /// The default distance is half the shorter side: 10 m on 20 m x 30 m. A rule of half the longer side would allow none below 15 m.
+    #[test]
+    fn val_the_default_distance_is_half_the_shorter_side() {
+        let map = map(40, 60, |_, _| false);
+        let pairs = draw_pairs(&map, &PairParameters::default(), 300, &streams()).unwrap();
+        let least_m = pairs.iter().map(|pair| distance_m(&map, pair.start, pair.goal)).fold(f64::INFINITY, f64::min);
+        assert!((10.0..12.0).contains(&least_m), "{least_m}");
+    }
+
+    /// A border of 8 m leaves out two rows of 4 m and three columns of 3 m at each side, and nothing else.
+    #[test]
+    fn val_the_border_is_in_metres() {
+        let map = crate::testing::oblong_map_of(10, 20, SlopeLimits::new(30.0, 30.0).unwrap(), |_, _| 0.0);
+        let rules = PairParameters { distance_min_m: Some(1.0), border_m: 8.0 };
+        let pairs = draw_pairs(&map, &rules, 1000, &streams()).unwrap();
+        let nodes = pairs.iter().flat_map(|pair| [pair.start, pair.goal]);
+        let places: Vec<[usize; 2]> = nodes.map(|node| map.place(node)).collect();
+        let range = |axis: usize| {
+            let along = places.iter().map(|place| place[axis]);
+            [along.clone().min(), along.max()]
+        };
+        assert_eq!([range(0), range(1)], [[Some(2), Some(7)], [Some(3), Some(16)]]);
+    }
+
     #[test]
     fn val_impossible_rules_are_refused() {
         let rules = |distance_min_m, border_m| PairParameters { distance_min_m: Some(distance_min_m), border_m };
@@ -179,7 +222,7 @@ mod tests {
         let error = draw_pairs(&free, &rules(1.0, 2.5), 1, &streams()).unwrap_err();
         assert_eq!(
             error.to_string(),
-            "draw starts and goals: a border of 2.5 m leaves no cells of the 10 x 10; take a narrower one"
+            "draw starts and goals: a border of 2.5 m leaves no cells of the 10 x 10; use a narrower border"
         );
         let error = draw_pairs(&free, &rules(100.0, 0.0), 1, &streams()).unwrap_err();
         assert!(error.to_string().contains("pair 1: none of 100000 draws"), "{error}");

@@ -1,4 +1,4 @@
-//! Parameters of a route as a study writes them.
+//! Route parameters, as a study states them.
 
 use crate::cost::SlopeCost;
 use crate::map::{Neighbourhood, SlopeLimits};
@@ -8,26 +8,29 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Steepest climb and descent where neither the study nor a vehicle states them, degrees. The thesis prints none.
+#[cfg(test)]
+mod tests;
+
+/// Steepest climb and descent if neither the study nor a vehicle states them, degrees. The thesis gives no value.
 const SLOPE_MAX_DEG: f64 = 30.0;
 
-/// How a route is searched.
+/// Search method of a route.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Search {
-    /// A* over every cell.
+    /// A* over all cells.
     #[default]
     Grid,
     /// A* over a roadmap of the cells where the ground changes (Bayrak, 2008).
     Roadmap,
-    /// Lazy Theta* over every cell: straight legs at any angle (Nash, Koenig and Tovey, 2010).
+    /// Lazy Theta* over all cells, with straight legs at any angle (Nash, Koenig and Tovey, 2010).
     ThetaStar,
-    /// Weighted A* over every cell that improves its path until it is the cheapest, or its expansions are used up.
+    /// Anytime weighted A* over all cells: it improves its path until the path is the cheapest or the expansions are used up.
     Anytime,
 }
 
 impl Search {
-    /// All of them.
+    /// All methods.
     pub const ALL: [Self; 4] = [Self::Grid, Self::Roadmap, Self::ThetaStar, Self::Anytime];
 
     /// Name in studies and tables.
@@ -41,20 +44,20 @@ impl Search {
     }
 }
 
-/// What travel costs besides its length.
+/// Costs of travel besides length.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Cost {
     /// Slope: `1 + up_weight s` uphill, `1 + down_weight s` downhill.
     #[default]
     Slope,
-    /// Energy of the vehicle over that on level ground, from its rolling resistance.
+    /// Energy that the vehicle needs, relative to level ground, from its rolling resistance.
     Energy,
-    /// Slope, times the factor of the cell's roughness class.
+    /// Slope, multiplied by a factor for the cell's roughness class.
     Class,
-    /// Slope, times `1 + band_rms_weight_per_m` times the RMS of the heights around the cell in the vehicle's band of wavelengths.
+    /// Slope, multiplied by `1 + band_rms_weight_per_m` times the RMS of heights around the cell in the vehicle's band of wavelengths.
     BandRms,
-    /// Slope, times the factor of a raster.
+    /// Slope, multiplied by a factor from a raster.
     Raster,
 }
 
@@ -75,50 +78,49 @@ impl Cost {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RouteParameters {
-    /// How the route is searched.
+    /// Search method.
     pub method: Search,
-    /// Neighbours of a cell: 4, or 8 (diagonals too, which never cut the corner of a blocked cell).
+    /// Neighbours of a cell: 4, or 8 with the diagonals, which never cut the corner of a blocked cell.
     pub neighbours: u8,
-    /// Plan on cells of about this size, m: each the mean of a whole number of the terrain's; the terrain's own when absent.
+    /// Plan on cells of about this size, m, each the mean of an integer number of terrain cells; the terrain's own cells if absent.
     pub plan_cell_m: Option<f64>,
-    /// `roadmap`: critical points that differ from the next ones by no more than this are dropped, m; the cell size when absent.
+    /// `roadmap`: drop critical points that differ in height from the adjacent ones by no more than this, m; the cell size if absent.
     pub step_over_m: Option<f64>,
-    /// `roadmap`: change of height after which a line of cells gets another vertex, m (height-difference threshold); none when
-    /// absent.
+    /// `roadmap`: height-difference threshold: change of height after which a line of cells gets another vertex, m; none if absent.
     pub threshold_m: Option<f64>,
-    /// `roadmap`: add vertices until the roadmap connects what the ground connects.
+    /// `roadmap`: add vertices until the roadmap connects everything that the ground connects.
     pub repair: bool,
-    /// `roadmap`: the thesis' listings as printed, where they differ from its prose or do nothing.
+    /// `roadmap`: follow the thesis' listings as printed, even where they contradict its text or have no effect.
     pub literal: bool,
-    /// `anytime`: the first path costs at most this many times the least.
+    /// `anytime`: the first path costs at most this many times the optimum.
     pub suboptimality: f64,
-    /// `anytime`: expansions after which the best path so far is taken.
+    /// `anytime`: number of expansions after which the best path so far is used.
     pub expansions_max: Option<u64>,
-    /// What straightening the path may add to its cost for each point that goes, metres of level ground.
+    /// Cost that smoothing may add for each waypoint that it removes, metres of level ground.
     pub smoothing_tolerance_m: f64,
-    /// Steepest climb, degrees; the vehicle's, or 30, when absent.
+    /// Steepest climb, degrees; the vehicle's if absent, or 30 without a vehicle.
     pub max_up_deg: Option<f64>,
-    /// Steepest descent, degrees; the vehicle's, or 30, when absent.
+    /// Steepest descent, degrees; the vehicle's if absent, or 30 without a vehicle.
     pub max_down_deg: Option<f64>,
-    /// What travel costs besides its length.
+    /// Costs of travel besides length.
     pub cost: Cost,
     /// Weight of climbing.
     pub up_weight: f64,
     /// Weight of descending.
     pub down_weight: f64,
-    /// `cost = "energy"`: least cost of a metre, above 0 and at most 1: a descent gives no energy back.
+    /// `cost = "energy"`: least cost per metre, above 0 and at most 1, because descents return no energy.
     pub energy_floor: f64,
     /// `cost = "class"`: factors of low, semi and high roughness.
     pub class_factors: [f64; 3],
     /// `cost = "band_rms"`: weight of the RMS, 1/m.
     pub band_rms_weight_per_m: f64,
-    /// Width that a team needs, m: narrower gaps cost more (CanFit); no team when absent.
+    /// Width of the team, m: narrower gaps cost more (CanFit); gaps are ignored if absent.
     pub width_m: Option<f64>,
-    /// Weight of a narrow gap: the cost is multiplied by `1 + weight (width / gap - 1)` at most `clearance_max`.
+    /// Weight of narrow gaps: cost is multiplied by `1 + weight (width / gap - 1)`, at most `clearance_max`.
     pub clearance_weight: f64,
-    /// Largest factor of a narrow gap.
+    /// Largest factor for a narrow gap.
     pub clearance_max: f64,
-    /// Distance that is kept from obstacles, m.
+    /// Distance kept from obstacles, m.
     pub obstacle_margin_m: f64,
 }
 
@@ -152,10 +154,10 @@ impl Default for RouteParameters {
 }
 
 impl RouteParameters {
-    /// Refuses numbers out of range, whatever the terrain.
+    /// Refuses values that are out of range on any terrain.
     ///
     /// # Errors
-    /// The first one.
+    /// The first value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
         self.neighbourhood()?;
         for (key, value) in
@@ -168,7 +170,7 @@ impl RouteParameters {
             return Err(at_least_1("suboptimality", self.suboptimality));
         }
         if self.expansions_max == Some(0) {
-            return Err(ParameterError::new("expansions_max", "is 0; it must be 1 or more"));
+            return Err(ParameterError::new("expansions_max", "is 0; it must be at least 1"));
         }
         ParameterError::not_negative("smoothing_tolerance_m", self.smoothing_tolerance_m)?;
         self.limits([SLOPE_MAX_DEG; 2])?;
@@ -185,10 +187,10 @@ impl RouteParameters {
         ParameterError::not_negative("obstacle_margin_m", self.obstacle_margin_m).map(drop)
     }
 
-    /// Refuses a cost whose input is missing, or an input that its cost has no use for.
+    /// Refuses a cost whose input is missing, or an input that the cost does not use.
     ///
     /// # Errors
-    /// A cost without the vehicle or the raster that it needs; a raster beside another cost.
+    /// A cost without the vehicle or raster that it needs, or a raster with another cost.
     pub fn check_given(&self, has_vehicle: bool, has_raster: bool) -> Result<(), ParameterError> {
         let refuse = |message: String| Err(ParameterError::new("cost", message));
         match self.cost {
@@ -199,15 +201,17 @@ impl RouteParameters {
                 refuse("is \"raster\", which needs the `cost_raster` of a [[route]]".to_owned())
             }
             Cost::Raster => Ok(()),
-            _ if has_raster => refuse(format!("is \"{}\"; `cost_raster` is for `cost = \"raster\"`", self.cost.name())),
+            _ if has_raster => {
+                refuse(format!("is \"{}\"; `cost_raster` requires `cost = \"raster\"`", self.cost.name()))
+            }
             _ => Ok(()),
         }
     }
 
-    /// The steps that may be taken.
+    /// The steps that are allowed.
     ///
     /// # Errors
-    /// Neither 4 nor 8 neighbours.
+    /// A number of neighbours other than 4 or 8.
     pub fn neighbourhood(&self) -> Result<Neighbourhood, ParameterError> {
         match self.neighbours {
             4 => Ok(Neighbourhood::Four),
@@ -216,7 +220,7 @@ impl RouteParameters {
         }
     }
 
-    /// The limits of slope; `vehicle_deg` are the vehicle's, up and down, in degrees.
+    /// Slope limits; `vehicle_deg` holds the vehicle's limits uphill and downhill, degrees.
     ///
     /// # Errors
     /// A limit that is not above 0 and below 90 degrees.
@@ -225,13 +229,13 @@ impl RouteParameters {
         SlopeLimits::new(self.max_up_deg.unwrap_or(up_deg), self.max_down_deg.unwrap_or(down_deg))
     }
 
-    /// Limits of slope where there is no vehicle, degrees.
+    /// Slope limits without a vehicle, degrees.
     pub const WITHOUT_VEHICLE_DEG: [f64; 2] = [SLOPE_MAX_DEG; 2];
 
-    /// The cost of slopes, for a vehicle of that rolling resistance where `cost` is `energy`.
+    /// Cost of slopes; `rolling_resistance` is the vehicle's, for `cost = "energy"`.
     ///
     /// # Errors
-    /// Numbers out of range.
+    /// Values out of range.
     pub fn slope_cost(&self, rolling_resistance: f64) -> Result<SlopeCost, ParameterError> {
         let cost = match self.cost {
             Cost::Energy => SlopeCost::Energy { resistance: rolling_resistance, floor: self.energy_floor },
@@ -245,20 +249,20 @@ impl RouteParameters {
         SlopeCost::Linear { up: self.up_weight, down: self.down_weight }
     }
 
-    /// The factor of a cell by its roughness class (0 low, 1 semi, 2 high); cells without a class count as high.
+    /// Factor of a cell for its roughness class (0 low, 1 semi, 2 high); cells without a class count as high.
     pub fn class_factor(&self, code: u8) -> f64 {
         self.class_factors.get(usize::from(code)).copied().unwrap_or(self.class_factors[2])
     }
 
-    /// The factor of a cell by the RMS around it, m.
+    /// Factor of a cell for the RMS around it, m.
     pub fn band_rms_factor(&self, rms_m: f64) -> f64 {
         1.0 + self.band_rms_weight_per_m * rms_m
     }
 
-    /// Settings of the search; `cell_m` is the size of a cell.
+    /// Settings of the search, for cells of size `cell_m`.
     ///
     /// # Errors
-    /// Numbers out of range.
+    /// Values out of range.
     pub fn settings(&self, cell_m: f64) -> Result<RouteSettings, ParameterError> {
         let method = match self.method {
             Search::Grid => route::Method::GridAstar,
@@ -293,5 +297,5 @@ impl RouteParameters {
 }
 
 fn at_least_1(key: &str, value: f64) -> ParameterError {
-    ParameterError::new(key, format!("is {value}; it must be a finite number, 1 or above"))
+    ParameterError::new(key, format!("is {value}; it must be finite and at least 1"))
 }

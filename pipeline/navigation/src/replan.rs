@@ -1,9 +1,8 @@
-//! A walk over ground that is known only as far as it has been seen.
+//! A walk over ground that is discovered on the way.
 //!
-//! At every node the walker senses all cells within a radius, remembers them, and goes one step along the cheapest path to the goal as far as
-//! is known. Cells that it has not seen it takes for free and level: a step to or from such a cell costs its horizontal length. What it
-//! sees changes these costs, and [`DStarLite`] searches again only what that changes. Costs are by slope alone: factors and clearance
-//! would have to be known ahead.
+//! At every node the walker senses all cells within a radius, remembers them, and takes one step along the cheapest path to the goal given what it
+//! has seen. Unseen cells count as free and level: a step to or from one costs its horizontal length. New cells change these costs, and [`DStarLite`]
+//! searches again only what they affect. Costs depend on slope alone: factors and clearance would have to be known in advance.
 
 use crate::cost::{CostModel, SlopeCost};
 use crate::line::{Ground, Travelled};
@@ -20,15 +19,15 @@ use std::ops::Range;
 #[cfg(test)]
 mod tests;
 
-/// How a walker sees and steps.
+/// Settings of a walk.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WalkSettings {
-    /// Distance within which cells are seen, m; at least the diagonal of a cell, so that every step is seen before it is taken.
+    /// Sensing radius, m; at least the diagonal of a cell, so that every step is seen before it is taken.
     pub sensing_radius_m: f64,
     /// Cost of slopes.
     pub slope: SlopeCost,
-    /// Steps that may be taken.
+    /// Allowed steps.
     #[serde(default)]
     pub neighbourhood: Neighbourhood,
 }
@@ -36,15 +35,15 @@ pub struct WalkSettings {
 /// A walk to the goal.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Walk {
-    /// Nodes from start to goal, in steps.
+    /// Nodes from start to goal, one step apart.
     pub path: Vec<Node>,
-    /// What the walk cost, by the fine integral.
+    /// Score of the walk, by the line integral.
     pub travelled: Travelled,
-    /// Cost of its steps.
+    /// Sum of the costs of its steps.
     pub cost: f64,
-    /// Cost of the cheapest steps with full knowledge.
+    /// Cost of the cheapest path of steps with full knowledge.
     pub informed_cost: f64,
-    /// Searches after the first, each because something seen changed the costs.
+    /// Searches after the first, each triggered by a change of costs.
     pub replans: u64,
     /// Vertices expanded by all searches.
     pub expansions: u64,
@@ -55,7 +54,31 @@ pub struct Walk {
 /// Walks from start to goal.
 ///
 /// # Errors
-/// A radius below the diagonal of a cell, weights out of range, ends that are outside, blocked or equal, or no path between them.
+/// A radius below the diagonal of a cell; weights out of range; ends outside the map, blocked or equal; no path between them.
+///
+/// # Examples
+/// ```
+/// use sastrugi_navigation::replan::{WalkSettings, walk};
+/// use sastrugi_navigation::{Neighbourhood, SlopeCost, SlopeLimits, TravelMap};
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // A wall leaves only the southernmost row open.
+/// let heights = Grid::filled(Geometry::square(5, 7, 1.0), 0.0);
+/// let mut map = TravelMap::new(heights, SlopeLimits::new(30.0, 30.0)?)?;
+/// for row in 0..4 {
+///     map.block(map.node(row, 3));
+/// }
+/// let settings =
+///     |sensing_radius_m| WalkSettings { sensing_radius_m, slope: SlopeCost::THESIS, neighbourhood: Neighbourhood::Four };
+/// let sees_little = walk(&map, &settings(1.5), [0, 0], [0, 6])?;
+/// assert!(sees_little.replans > 0 && sees_little.cost >= sees_little.informed_cost);
+/// // With everything in sight, the first plan is the cheapest path.
+/// let sees_all = walk(&map, &settings(100.0), [0, 0], [0, 6])?;
+/// assert_eq!((sees_all.cost, sees_all.informed_cost, sees_all.replans), (14.0, 14.0, 0));
+/// # Ok(())
+/// # }
+/// ```
 pub fn walk(map: &TravelMap, settings: &WalkSettings, start: Cell, goal: Cell) -> Result<Walk, RouteError> {
     check_radius(map, settings.sensing_radius_m)?;
     let costs = CostModel::new(settings.slope, None, map)?;
@@ -103,7 +126,7 @@ impl<'a> Walker<'a> {
         Self { known, search, at: start, goal, cost: 0.0, replans: 0 }
     }
 
-    /// Nodes to the goal; `None` once no path is left.
+    /// Nodes to the goal; `None` once there is no path.
     fn walk(&mut self) -> Option<Vec<Node>> {
         let mut walked = vec![self.at];
         let mut plan = self.search.search(&self.known)?.path.into_iter().skip(1);
@@ -124,18 +147,18 @@ impl<'a> Walker<'a> {
     }
 }
 
-/// The grid as far as it has been seen.
+/// The part of the grid seen so far.
 #[derive(Clone, Debug)]
 pub(crate) struct Known<'a> {
     grid: GridNetwork<'a>,
     radius_m: f64,
-    /// Where it was last seen from.
+    /// Node that the last look was taken from.
     from: Node,
     seen: Vec<bool>,
 }
 
 impl<'a> Known<'a> {
-    /// The grid as far as it is seen from a node.
+    /// The grid as seen from a node.
     pub(crate) fn new(grid: GridNetwork<'a>, radius_m: f64, from: Node) -> Self {
         let mut known = Self { grid, radius_m, from, seen: vec![false; grid.len()] };
         for row in 0..grid.ground.map.shape()[0] {
@@ -146,8 +169,8 @@ impl<'a> Known<'a> {
         known
     }
 
-    /// Sees the cells within the radius; returns those whose steps may have changed, ascending. Only the part of the circle is looked at that
-    /// lies outside the last one.
+    /// Senses the cells within the radius and returns those whose steps may have changed, ascending. Only the part of the circle outside the previous
+    /// one is visited.
     pub(crate) fn sense(&mut self, from: Node) -> Vec<Node> {
         let map = self.grid.ground.map;
         let before = std::mem::replace(&mut self.from, from);
@@ -166,7 +189,7 @@ impl<'a> Known<'a> {
         changed
     }
 
-    /// Columns of a row with their centres within the radius of a node.
+    /// Columns of a row whose centres lie within the radius of a node.
     fn in_sight(&self, from: Node, row: usize) -> Range<usize> {
         let map = self.grid.ground.map;
         let ([from_row, from_col], [dx, dy], cols) = (map.place(from), map.cell_m(), map.shape()[1]);
@@ -178,7 +201,7 @@ impl<'a> Known<'a> {
         from_col.saturating_sub(reach)..from_col.saturating_add(reach).saturating_add(1).min(cols)
     }
 
-    /// Cost of a step as far as is known; `None` where it may not be taken.
+    /// Cost of a step given what has been seen; `None` if the step is not allowed.
     fn step(&self, node: Node, target: Node, direction: Direction) -> Option<f64> {
         let Ground { map, costs, .. } = self.grid.ground;
         let ([row, col], [target_row, target_col]) = (map.place(node), map.place(target));
@@ -204,7 +227,7 @@ impl Network for Known<'_> {
         }
     }
 
-    /// By horizontal length: heights are not known ahead.
+    /// From the horizontal length alone, because heights are not known in advance.
     fn bound(&self, from: Node, to: Node) -> f64 {
         self.grid.ground.costs.level_bound(self.grid.ground.map, from, to, self.grid.neighbourhood)
     }

@@ -1,9 +1,8 @@
-//! The roadmap: vertices joined along rows and columns, and along diagonals where steps may be diagonal.
+//! The roadmap: vertices linked along rows and columns, and along diagonals if steps may be diagonal.
 //!
-//! Two marks of one line with no other between them have an edge if every step from one to the other may be taken; it is directed, as
-//! limits are. (The thesis looks at the slope from end to end, which can hide a cliff.) An edge costs the sum of its steps, times the
-//! factors of [`crate::clearance`] at both ends. Vertices lie where heights say so, whatever travel costs: other costs than slope are
-//! better planned on the grid.
+//! Two marked nodes on a line with no other between them have an edge if every step from one to the other is allowed. Edges are directed, because
+//! slope limits are. (The thesis uses the slope from end to end, which can hide a cliff.) An edge costs the sum of its steps, multiplied by the
+//! factors of [`crate::clearance`] at both ends. Vertices depend on heights only, so costs other than slope are better planned on the grid.
 
 use crate::cost::Spot;
 use crate::line::Ground;
@@ -15,7 +14,7 @@ use crate::search::{NONE, Network};
 #[cfg(test)]
 mod tests;
 
-/// Neighbouring marks of each vertex along the lines of a map.
+/// Neighbouring vertices along the lines of a map.
 pub struct Lines<'a> {
     map: &'a TravelMap,
     nodes: Vec<Node>,
@@ -25,7 +24,7 @@ pub struct Lines<'a> {
 }
 
 impl<'a> Lines<'a> {
-    /// The lines between marked nodes.
+    /// Lines between marked nodes.
     pub fn new(map: &'a TravelMap, marks: &[bool], neighbourhood: Neighbourhood) -> Self {
         let nodes: Vec<Node> = (0..map.len() as Node).filter(|node| marks[*node as usize]).collect();
         let mut vertices = vec![NONE; map.len()];
@@ -38,13 +37,13 @@ impl<'a> Lines<'a> {
         &self.nodes
     }
 
-    /// Component of the roadmap that each vertex belongs to.
+    /// Roadmap component of each vertex.
     pub fn components(&self) -> Vec<u32> {
         let target = |vertex: u32, k: u32| self.follow(vertex, self.directions[k as usize], |_, _| ());
         components(self.nodes.len() as u32, |_| self.directions.len() as u32, target)
     }
 
-    /// The next vertex in a direction, if every step to it may be taken; `step` is called with both nodes of each.
+    /// The next vertex in a direction, if every step to it is allowed; `step` is called with both nodes of each step.
     fn follow(&self, vertex: u32, direction: Direction, mut step: impl FnMut(Node, Node)) -> Option<u32> {
         let mut node = self.nodes[vertex as usize];
         loop {
@@ -58,13 +57,13 @@ impl<'a> Lines<'a> {
     }
 }
 
-/// Vertices with their edges and costs.
+/// Vertices, edges and their costs.
 #[derive(Clone, Debug)]
 pub struct Roadmap<'a> {
     ground: Ground<'a>,
     neighbourhood: Neighbourhood,
     nodes: Vec<Node>,
-    /// Where they are: a search would look far apart in the map for it.
+    /// Positions of the vertices, kept together because lookups in the map are scattered.
     spots: Vec<Spot>,
     graph: Graph,
 }
@@ -107,12 +106,12 @@ impl<'a> Roadmap<'a> {
         self.ground.costs.bound_between(self.ground.map, self.spots[vertex as usize], goal, self.neighbourhood)
     }
 
-    /// Where a node is.
+    /// Position of a node.
     pub(crate) fn spot(&self, node: Node) -> Spot {
         Spot::of(self.ground.map, node)
     }
 
-    /// Edges from a node to the first vertex, or to `other`, in each direction; [`Way::To`] those from there to the node.
+    /// Edges between a node and the first vertex, or `other`, in each direction: from the node, or to it with [`Way::To`].
     pub fn links(&self, node: Node, way: Way, other: Option<Node>) -> Vec<(Node, f64)> {
         let link = |direction: &Direction| self.link(node, *direction, way, other);
         self.neighbourhood.directions().iter().filter_map(link).collect()
@@ -137,7 +136,7 @@ impl<'a> Roadmap<'a> {
     }
 }
 
-/// Whether links lead from a node or to it.
+/// Direction of links.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Way {
     /// From the node.
@@ -146,7 +145,7 @@ pub enum Way {
     To,
 }
 
-/// Factor of an edge by the room at both ends.
+/// Factor of an edge for the clearance at both ends.
 fn room(ground: &Ground<'_>, from: Node, to: Node, along: Direction) -> f64 {
     ground.clearance.map_or(1.0, |clearance| clearance.multiplier(from, along) * clearance.multiplier(to, along))
 }

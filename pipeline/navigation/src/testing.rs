@@ -1,4 +1,4 @@
-//! Ground for the tests.
+//! Test grounds.
 
 use crate::cost::{CostModel, SlopeCost};
 use crate::line::Ground;
@@ -12,7 +12,7 @@ pub const NEIGHBOURHOODS: [Neighbourhood; 2] = [Neighbourhood::Four, Neighbourho
 pub struct Random(pub u64);
 
 impl Random {
-    /// A number of 0 or above and below `end`.
+    /// A number at least 0 and below `end`.
     pub fn below(&mut self, end: u64) -> u64 {
         self.0 = self.0.wrapping_add(0x9e37_79b9_7f4a_7c15);
         let z = (self.0 ^ (self.0 >> 30)).wrapping_mul(0xbf58_476d_1ce4_e5b9);
@@ -20,21 +20,29 @@ impl Random {
         (z ^ (z >> 31)) % end
     }
 
-    /// A number of 0 or above and below 1.
+    /// A number at least 0 and below 1.
     pub fn unit(&mut self) -> f64 {
         self.below(1 << 53) as f64 / (1u64 << 53) as f64
     }
 }
 
-/// Limits, degrees.
+/// Slope limits, degrees.
 pub fn limits(up_deg: f64, down_deg: f64) -> SlopeLimits {
     SlopeLimits::new(up_deg, down_deg).unwrap()
 }
 
-/// A map of cells of 1 m with heights by row and column.
+/// A map with cells of 1 m and heights given by row and column.
 pub fn map_of(rows: usize, cols: usize, limits: SlopeLimits, z: impl Fn(usize, usize) -> f64) -> TravelMap {
     let heights = (0..rows * cols).map(|k| z(k / cols, k % cols)).collect();
     TravelMap::new(Grid::new(Geometry::square(rows, cols, 1.0), heights), limits).unwrap()
+}
+
+/// A map whose cells are 3 m east-west and 4 m north-south, so that diagonals are 5 m; its south-west corner is at (100, 200). It shows exchanged axes,
+/// which square cells hide.
+pub fn oblong_map_of(rows: usize, cols: usize, limits: SlopeLimits, z: impl Fn(usize, usize) -> f64) -> TravelMap {
+    let heights = (0..rows * cols).map(|k| z(k / cols, k % cols)).collect();
+    let geometry = Geometry { rows, cols, cell: [3.0, 4.0], origin: [100.0, 200.0] };
+    TravelMap::new(Grid::new(geometry, heights), limits).unwrap()
 }
 
 /// Level ground; `#` is blocked.
@@ -46,7 +54,7 @@ pub fn drawn(lines: &[&str]) -> TravelMap {
     map
 }
 
-/// Hills as upper halves of random spheroids (the thesis, Algorithm 10), `per_million` of them for a million nodes.
+/// Hills made of upper halves of random spheroids (the thesis, Algorithm 10), `per_million` of them per million nodes.
 pub fn hills(size: usize, per_million: f64, minor_max: u64, seed: u64) -> TravelMap {
     let mut random = Random(seed);
     let mut heights = Grid::filled(Geometry::square(size, size, 1.0), 0.0);
@@ -73,7 +81,7 @@ pub fn rough(rows: usize, cols: usize, blocked: f64, relief_m: f64, random: &mut
     map
 }
 
-/// Two free nodes that differ.
+/// Two distinct free nodes.
 pub fn ends(map: &TravelMap, random: &mut Random) -> Option<[Node; 2]> {
     let free: Vec<Node> = (0..map.len() as Node).filter(|node| !map.is_blocked(*node)).collect();
     let mut draw = || free.get(random.below(free.len().max(1) as u64) as usize).copied();
@@ -81,7 +89,7 @@ pub fn ends(map: &TravelMap, random: &mut Random) -> Option<[Node; 2]> {
     (start != goal).then_some([start, goal])
 }
 
-/// Costs as the thesis has them.
+/// Costs as in the thesis.
 pub fn thesis_costs(map: &TravelMap) -> CostModel {
     CostModel::new(SlopeCost::THESIS, None, map).unwrap()
 }
@@ -91,7 +99,7 @@ pub fn ground<'a>(map: &'a TravelMap, costs: &'a CostModel) -> Ground<'a> {
     Ground { map, costs, clearance: None }
 }
 
-/// Whether a step may be taken, from the definition and without any table.
+/// Whether a step is allowed, from the definition and without a table.
 pub fn may_step_by_definition(map: &TravelMap, node: Node, direction: Direction) -> bool {
     let Some(target) = map.neighbour(node, direction) else { return false };
     let [row, col] = map.place(node);
@@ -108,7 +116,7 @@ pub fn may_step_by_definition(map: &TravelMap, node: Node, direction: Direction)
     })
 }
 
-/// Levels below the ground of a tilted plane: heights rise northward by `slope` a metre.
+/// A tilted plane whose heights rise northward by `slope` per metre.
 pub fn plane(rows: usize, cols: usize, slope: f64, limit_deg: f64) -> TravelMap {
     map_of(rows, cols, limits(limit_deg, limit_deg), |row, _| slope * (rows - 1 - row) as f64)
 }

@@ -1,22 +1,35 @@
-//! Counter-based random numbers, keyed by a named stream and by the place of a lattice point.
+//! Counter-based random numbers, keyed by a named stream and by lattice point.
 //!
-//! A surface without an edge cannot draw from a stream: which point comes first would depend on the patch that is looked at. A
-//! [`Counter`] is a pure function of its words instead: `counter.at(purpose).at(i).at(j)` is the same number whoever asks, in
-//! whatever order.
+//! An unbounded surface cannot draw from a stream, because the order of the draws would depend on the patch being generated. A
+//! [`Counter`] is instead a pure function of its words: `counter.at(purpose).at(i).at(j)` is always the same number, in any order of
+//! evaluation.
 //!
-//! Every word `w` (an integer modulo 2^64) takes the state `s` to `mix(s + (w + 1) g)`, with the golden-ratio step `g` and the
-//! finaliser `mix` of SplitMix64 (Steele, Lea and Flood, 2014, doi:10.1145/2660193.2660195, variant 13 of Stafford): consecutive
-//! words below one state are the outputs of that generator. The first state is a 64-bit word of a named stream
-//! ([`crate::Streams`]), so that every draw still has a name. For one state the map from words to states is one to one.
+//! Every word `w` (an integer modulo 2^64) maps the state `s` to `mix(s + (w + 1) g)`, with the golden-ratio step `g` and the
+//! finaliser `mix` of SplitMix64 (Steele, Lea and Flood, 2014, doi:10.1145/2660193.2660195, variant 13 of Stafford). The states for
+//! consecutive words are therefore the outputs of that generator. The first state is a 64-bit word of a named stream
+//! ([`crate::Streams`]), so that every draw still has a name. For a given state, the map from words to states is one to one.
 
 use crate::streams::Stream;
 
 /// Step of SplitMix64: 2^64 over the golden ratio, odd.
 const STEP: u64 = 0x9e37_79b9_7f4a_7c15;
-/// Largest mean whose probability of 0 is still a normal number, with room.
+/// Largest mean of a Poisson distribution, chosen so that the probability of 0 is well within the normal floating-point range.
 pub const POISSON_MEAN_MAX: f64 = 600.0;
 
-/// A place in the tree of words.
+/// A node in the tree of words.
+///
+/// ```
+/// use sastrugi_numeric::{Counter, Streams};
+///
+/// let root = Counter::new(&mut Streams::for_seed(42, "terrain").stream("texture-1"));
+/// let at = |row: i64, col: i64| root.at(row).at(col).normal();
+/// // The number of a lattice point does not depend on the order in which the points are visited.
+/// let ahead: Vec<f64> = (-3..3).map(|col| at(5, col)).collect();
+/// let mut behind: Vec<f64> = (-3..3).rev().map(|col| at(5, col)).collect();
+/// behind.reverse();
+/// assert_eq!(ahead, behind);
+/// assert_ne!(at(1, 2), at(2, 1));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Counter {
     state: u64,
@@ -28,7 +41,7 @@ impl Counter {
         Self { state: stream.bits() }
     }
 
-    /// The place one word further on.
+    /// The child node for a word.
     #[inline]
     pub fn at(self, word: i64) -> Self {
         Self { state: mix(self.state.wrapping_add(STEP.wrapping_mul((word as u64).wrapping_add(1)))) }
@@ -40,7 +53,7 @@ impl Counter {
         self.state
     }
 
-    /// Uniform in the open interval (0, 1): the middles of 2^52 equal parts.
+    /// Uniform in the open interval (0, 1): the midpoints of 2^52 equal parts.
     #[inline]
     pub fn uniform(self) -> f64 {
         ((self.state >> 12) as f64 + 0.5) * (1.0 / (1u64 << 52) as f64)
@@ -61,8 +74,15 @@ fn mix(z: u64) -> u64 {
     z ^ (z >> 31)
 }
 
-/// Value below which a standard normal falls with probability `p`, 0 < p < 1; relative error about 1e-16 (Wichura, 1988,
+/// Quantile of the standard normal distribution at probability `p`, 0 < p < 1; relative error about 1e-16 (Wichura, 1988,
 /// algorithm AS 241, doi:10.2307/2347330).
+///
+/// ```
+/// use sastrugi_numeric::counter::normal_quantile;
+///
+/// assert_eq!(normal_quantile(0.5), 0.0);
+/// assert!((normal_quantile(0.975) - 1.959_963_984_540_054).abs() < 1e-14);
+/// ```
 #[inline]
 pub fn normal_quantile(p: f64) -> f64 {
     let q = p - 0.5;
@@ -79,7 +99,7 @@ fn tail_quantile(p: f64, q: f64) -> f64 {
     if q < 0.0 { -value } else { value }
 }
 
-/// Quotient of two polynomials, highest power first.
+/// Quotient of two polynomials, coefficients of the highest powers first.
 #[inline]
 fn ratio([above, below]: &[[f64; 8]; 2], r: f64) -> f64 {
     let value = |c: &[f64; 8]| c[1..].iter().fold(c[0], |sum, a| sum * r + a);
@@ -154,27 +174,35 @@ const FAR_TAIL: [[f64; 8]; 2] = [
 ];
 
 /// Poisson counts by the inverse of their distribution function.
+///
+/// ```
+/// use sastrugi_numeric::Poisson;
+///
+/// // With a mean of 3, the probability of 0 is 0.0498, and that of at most 2 is 0.4232.
+/// let rocks = Poisson::new(3.0);
+/// assert_eq!([0.01, 0.42, 0.43].map(|u| rocks.count(u)), [0, 2, 3]);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poisson {
     mean: f64,
-    none: f64,
+    probability_of_zero: f64,
 }
 
 impl Poisson {
-    /// Counts of the given mean, 0 to [`POISSON_MEAN_MAX`].
+    /// Counts with the given mean, 0 to [`POISSON_MEAN_MAX`].
     pub fn new(mean: f64) -> Self {
-        Self { mean, none: libm::exp(-mean) }
+        Self { mean, probability_of_zero: libm::exp(-mean) }
     }
 
-    /// The count of a uniform number: `count(u) <= n` for a share `P(N <= n)` of all `u`. Time goes with the mean.
+    /// The count for a uniform number: `count(u) <= n` for a share `P(N <= n)` of all `u`. Time is proportional to the mean.
     #[inline]
     pub fn count(&self, u: f64) -> u32 {
-        if u <= self.none { 0 } else { self.count_from_one(u) }
+        if u <= self.probability_of_zero { 0 } else { self.count_from_one(u) }
     }
 
     fn count_from_one(&self, u: f64) -> u32 {
-        let (mut count, mut share, mut below) = (0, self.none, self.none);
-        // Far beyond the mean the rest is smaller than what rounding lost from `below`.
+        let (mut count, mut share, mut below) = (0, self.probability_of_zero, self.probability_of_zero);
+        // Far beyond the mean, the remaining probability is smaller than the rounding error of `below`.
         while u > below && (share > 1e-18 || f64::from(count) < self.mean) {
             count += 1;
             share *= self.mean / f64::from(count);
@@ -193,7 +221,7 @@ mod tests {
         Counter::new(&mut Streams::for_seed(42, "terrain").stream("phases"))
     }
 
-    /// The same numbers from the Python of `docs/random-streams.md`.
+    /// The Python code in `docs/random-streams.md` gives the same numbers.
     #[test]
     fn gold_words_are_frozen() {
         let place = root().at(1).at(-3).at(1 << 40).at(0);
@@ -223,6 +251,48 @@ mod tests {
         }
     }
 
+    /// The distribution function by the error function, which is independent of the quotients: out to 1e-300, past both of their ends.
+    #[test]
+    fn val_quantiles_give_back_their_probabilities() {
+        let tails = (1..=300).map(|k| libm::pow(10.0, -f64::from(k)));
+        let rest = (1..1000).map(|k| f64::from(k) / 1000.0);
+        for p in tails.chain(rest).chain([0.0749, 0.0751, 0.9249, 0.9251]) {
+            let z = normal_quantile(p);
+            let back = 0.5 * libm::erfc(-z * std::f64::consts::FRAC_1_SQRT_2);
+            // An error of one unit in the last place of z counts for z^2 units of p.
+            assert!((back / p - 1.0).abs() < 4e-15 * (1.0 + z * z), "{p}: {z} {back}");
+        }
+    }
+
+    #[test]
+    fn val_uniform_numbers_are_neither_0_nor_1() {
+        let [lowest, highest] = [0, u64::MAX].map(|state| Counter { state }.uniform());
+        assert_eq!((lowest, highest), (0.5 / (1_u64 << 52) as f64, 1.0 - f64::EPSILON / 2.0));
+        assert!(Counter { state: 0 }.normal().is_finite() && Counter { state: u64::MAX }.normal().is_finite());
+    }
+
+    /// By hand: the probabilities of at most 0 to 4 are 1, 4, 8.5, 13 and 16.375 times e^-3.
+    #[test]
+    fn val_counts_of_mean_three() {
+        let poisson = Poisson::new(3.0);
+        let u = [0.0497, 0.0498, 0.1991, 0.1992, 0.4231, 0.4232, 0.6472, 0.6473, 0.8152, 0.8153];
+        assert_eq!(u.map(|u| poisson.count(u)), [0, 1, 1, 2, 2, 3, 3, 4, 4, 5]);
+        let nothing = Poisson::new(0.0);
+        assert_eq!([1e-300, 0.5, 1.0 - 1e-16].map(|u| nothing.count(u)), [0; 3]);
+    }
+
+    /// Both the mean and the variance of the counts are the mean, here over 20 000 evenly spaced numbers.
+    #[test]
+    fn val_counts_have_equal_mean_and_variance() {
+        for mean in [0.2, 3.0, 80.0, 600.0] {
+            let poisson = Poisson::new(mean);
+            let off = |k: u32| f64::from(poisson.count((f64::from(k) + 0.5) / 20_000.0)) - mean;
+            let bias = crate::sums::mean(&(0..20_000).map(off).collect::<Vec<_>>());
+            let spread = crate::sums::mean(&(0..20_000).map(off).map(|d| d * d).collect::<Vec<_>>());
+            assert!(bias.abs() < 1e-3 && (spread / mean - 1.0).abs() < 1e-3, "{mean}: {bias} {spread}");
+        }
+    }
+
     #[test]
     fn val_counts_invert_the_distribution() {
         for mean in [0.0, 0.2, 3.0, 80.0, 600.0] {
@@ -242,7 +312,7 @@ mod tests {
     }
 
     /// Null: values at the points of a lattice are independent standard normals. Moments one to four of 512 x 512 values, and the
-    /// correlations over eight shifts and across words, at 5 standard errors each (6e-7 a figure, 13 figures); a
+    /// correlations over eight shifts and across words, at 5 standard errors each (6e-7 per statistic, 13 statistics); a
     /// correlation of 0.01 would be caught.
     #[test]
     fn stat_lattice_draws_are_normal_and_uncorrelated() {

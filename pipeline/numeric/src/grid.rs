@@ -1,8 +1,18 @@
-//! Regular grids of cells, and where their cells lie.
+//! Regular grids of cells, and their positions.
 
 use rayon::prelude::*;
 
-/// Shape and place of a regular grid (convention: see the crate header).
+/// Shape and position of a regular grid (conventions: see the crate header).
+///
+/// ```
+/// use sastrugi_numeric::Geometry;
+///
+/// let g = Geometry { rows: 3, cols: 4, cell: [2.0, 1.0], origin: [10.0, 100.0] };
+/// // Centre of the north-west cell.
+/// assert_eq!((g.x(0), g.y(0)), (11.0, 102.5));
+/// assert_eq!(g.cell_at(17.5, 100.2), Some((2, 3)));
+/// assert_eq!(g.cell_at(18.5, 100.2), None);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Geometry {
     /// Number of rows (north to south), at least 1.
@@ -26,7 +36,7 @@ impl Geometry {
         self.rows * self.cols
     }
 
-    /// True when the grid has no cell.
+    /// True if the grid has no cells.
     pub fn is_empty(&self) -> bool {
         self.len() == 0
     }
@@ -46,7 +56,7 @@ impl Geometry {
         [self.cols as f64 * self.cell[0], self.rows as f64 * self.cell[1]]
     }
 
-    /// True when the two grids have ground in common.
+    /// True if the two grids overlap.
     pub fn overlaps(&self, other: &Self) -> bool {
         let (size, others) = (self.size(), other.size());
         (0..2).all(|axis| {
@@ -54,7 +64,7 @@ impl Geometry {
         })
     }
 
-    /// The cell that contains the point, or `None` outside of the grid (or for a point that is not finite).
+    /// The cell that contains the point; `None` outside the grid, or if the point is not finite.
     pub fn cell_at(&self, x: f64, y: f64) -> Option<(usize, usize)> {
         let col = (x - self.origin[0]) / self.cell[0];
         let row = self.rows as f64 - (y - self.origin[1]) / self.cell[1];
@@ -62,7 +72,7 @@ impl Geometry {
         inside.then_some((row as usize, col as usize))
     }
 
-    /// Mean of the two cell sizes: for square cells their size.
+    /// Mean of the two cell sizes; for square cells, their size.
     pub fn mean_cell(&self) -> f64 {
         0.5 * (self.cell[0] + self.cell[1])
     }
@@ -76,16 +86,27 @@ impl Geometry {
 }
 
 /// Values on a [`Geometry`], row-major from the north-west cell.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// let grid = Grid::new(Geometry::square(2, 3, 0.5), vec![1.0, 2.0, f64::NAN, 4.0, 5.0, 6.0]);
+/// assert_eq!(grid.at(1, 0), 4.0);
+/// assert_eq!((grid.finite_count(), grid.range()), (5, Some((1.0, 6.0))));
+/// // A window keeps its position: its south-west corner is one cell further east.
+/// let part = grid.window(1, 1, 1, 2);
+/// assert_eq!((part.row(0), part.geometry.origin), (&[5.0, 6.0][..], [0.5, 0.0]));
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct Grid<T = f64> {
-    /// Shape and place.
+    /// Shape and position.
     pub geometry: Geometry,
     /// `rows * cols` values, row 0 (north) first.
     pub values: Vec<T>,
 }
 
 impl<T> Grid<T> {
-    /// A grid from its values.
+    /// Creates a grid from its values.
     ///
     /// # Panics
     /// If the number of values is not `rows * cols` (a bug of the caller).
@@ -124,9 +145,9 @@ impl<T: Copy> Grid<T> {
     /// The part of the grid that starts at `(row, col)`.
     ///
     /// # Panics
-    /// If the part reaches beyond the grid (a bug of the caller).
+    /// If the part extends beyond the grid (a bug of the caller).
     pub fn window(&self, row: usize, col: usize, rows: usize, cols: usize) -> Self {
-        assert!(row + rows <= self.rows() && col + cols <= self.cols(), "window beyond the grid");
+        assert!(row + rows <= self.rows() && col + cols <= self.cols(), "window extends beyond the grid");
         let values = (row..row + rows).flat_map(|r| self.row(r)[col..col + cols].iter().copied()).collect();
         Self { geometry: self.geometry.window(row, col, rows, cols), values }
     }
@@ -146,7 +167,7 @@ impl Grid<f64> {
         self.values.iter().filter(|v| v.is_finite()).count()
     }
 
-    /// Lowest and highest value, or `None` when no cell has data.
+    /// Lowest and highest value, or `None` if no cell has data.
     pub fn range(&self) -> Option<(f64, f64)> {
         let finite = self.values.iter().copied().filter(|v| v.is_finite());
         finite.fold(None, |range, v| match range {
@@ -171,7 +192,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_grids_overlap_where_they_share_ground() {
+    fn val_overlap_of_grids() {
         let a = Geometry::square(10, 20, 0.5);
         let at = |origin: [f64; 2]| Geometry { origin, ..Geometry::square(4, 4, 1.0) };
         assert!(a.overlaps(&at([9.5, 4.5])) && at([-3.5, -3.5]).overlaps(&a) && a.overlaps(&a));
@@ -186,10 +207,46 @@ mod tests {
         assert_eq!(g.cell_at(11.0, 102.5), Some((0, 0)));
         assert_eq!(g.cell_at(18.0, 100.5), None);
         assert_eq!(g.cell_at(f64::NAN, 100.5), None);
+        assert_eq!((g.size(), g.len(), g.mean_cell()), ([8.0, 3.0], 12, 1.5));
+    }
+
+    /// A cell holds its northern and western edges.
+    #[test]
+    fn val_cells_hold_their_northern_and_western_edges() {
+        let g = Geometry { rows: 3, cols: 4, cell: [2.0, 1.0], origin: [10.0, 100.0] };
+        let inside = [(10.0, 103.0, (0, 0)), (12.0, 102.0, (1, 1)), (17.9, 100.1, (2, 3)), (15.0, 102.5, (0, 2))];
+        for (x, y, cell) in inside {
+            assert_eq!(g.cell_at(x, y), Some(cell), "{x} {y}");
+        }
+        for (x, y) in [(9.99, 101.5), (18.0, 101.5), (11.0, 100.0), (11.0, 103.01)] {
+            assert_eq!(g.cell_at(x, y), None, "{x} {y}");
+        }
+    }
+
+    /// Cells without data have no part in the range; a release rounds to single precision.
+    #[test]
+    fn val_range_and_single_precision() {
+        let grid = Grid::new(Geometry::square(1, 5, 1.0), vec![f64::NAN, 2.0, -3.0, f64::INFINITY, 0.1]);
+        assert_eq!((grid.range(), grid.finite_count()), (Some((-3.0, 2.0)), 3));
+        assert_eq!(Grid::filled(Geometry::square(2, 2, 1.0), f64::NAN).range(), None);
+        assert_eq!((grid.to_f32().at(0, 4), grid.as_stored().at(0, 4)), (0.1_f32, f64::from(0.1_f32)));
+        assert!(grid.as_stored().at(0, 0).is_nan());
     }
 
     #[test]
-    fn val_a_window_keeps_its_place() {
+    #[should_panic(expected = "a grid needs rows * cols values")]
+    fn val_a_missing_value_is_refused() {
+        Grid::new(Geometry::square(2, 2, 1.0), vec![0.0; 3]);
+    }
+
+    #[test]
+    #[should_panic(expected = "window extends beyond the grid")]
+    fn val_a_window_beyond_the_grid_is_refused() {
+        Grid::filled(Geometry::square(3, 3, 1.0), 0.0).window(1, 1, 2, 3);
+    }
+
+    #[test]
+    fn val_a_window_keeps_its_position() {
         let g = Geometry { rows: 3, cols: 4, cell: [2.0, 1.0], origin: [10.0, 100.0] };
         let grid = Grid::new(g, (0..12).map(f64::from).collect());
         let part = grid.window(1, 2, 2, 2);

@@ -1,8 +1,8 @@
-//! What the ground is at a point: its height, whether it is sand or rock, and its albedo.
+//! Properties of the ground at a point: height, class (sand or rock) and albedo.
 
 use crate::grid::{Geometry, Grid};
 
-/// What the ground is made of.
+/// Class of the ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum GroundClass {
     /// Everything but rock.
@@ -16,13 +16,13 @@ pub enum GroundClass {
 pub struct GroundPoint {
     /// Height, m.
     pub height_m: f64,
-    /// What it is made of.
+    /// Sand or rock.
     pub class: GroundClass,
-    /// Share of the light that it gives back, 0 to 1; NaN where it is not known.
+    /// Share of the light that is reflected, 0 to 1; NaN if unknown.
     pub albedo: f64,
 }
 
-/// A point whose ground is not known. It is an error, never a height of 0.
+/// A point where the ground is unknown. This is an error, never a height of 0.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 #[error("there is no ground at x = {x_m:.3}, y = {y_m:.3} m")]
 pub struct NoGround {
@@ -32,12 +32,13 @@ pub struct NoGround {
     pub y_m: f64,
 }
 
-/// Ground that can be asked point by point. Heights lie bilinearly between samples; class and albedo are those of the nearest one.
+/// Ground that is evaluated point by point. Heights are interpolated bilinearly between samples; class and albedo are those of the nearest
+/// sample.
 pub trait Ground {
     /// The ground at a point, in the coordinates of the terrain, m.
     ///
     /// # Errors
-    /// A point whose ground is not known.
+    /// A point where the ground is unknown.
     fn at(&self, x_m: f64, y_m: f64) -> Result<GroundPoint, NoGround>;
 
     /// Distance between neighbouring samples, m.
@@ -54,14 +55,27 @@ impl<G: Ground + ?Sized> Ground for &G {
     }
 }
 
-/// Samples of a piece of ground, as many bytes as files hold.
+/// Samples of a piece of ground, in the same precision as in files.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, Ground, GroundClass, GroundGrid};
+///
+/// let mut ground = GroundGrid::of_heights(Grid::new(Geometry::square(2, 2, 1.0), vec![0.0, 0.0, 0.0, 1.0]));
+/// ground.class = Some(vec![0, 0, 0, 1]);
+/// // Heights are interpolated; the class is that of the nearest sample, here the rock in the south-east.
+/// let point = ground.at(1.25, 0.75)?;
+/// assert_eq!((point.height_m, point.class), (0.5625, GroundClass::Rock));
+/// // Beyond the outer samples, there is no ground.
+/// assert!(ground.at(1.75, 0.75).is_err());
+/// # Ok::<(), sastrugi_numeric::NoGround>(())
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct GroundGrid {
     /// Heights, m.
     pub heights: Grid<f32>,
-    /// Codes: 0 sand, 1 rock; all is sand where this is absent.
+    /// Codes: 0 sand, 1 rock. If absent, all ground is sand.
     pub class: Option<Vec<u8>>,
-    /// Albedo; not known where this is absent.
+    /// Albedo. If absent, it is unknown.
     pub albedo: Option<Vec<f32>>,
 }
 
@@ -71,7 +85,7 @@ impl GroundGrid {
         Self { heights, class: None, albedo: None }
     }
 
-    /// The ground at a point, `None` beyond the outer samples and next to one without data.
+    /// The ground at a point; `None` beyond the outer samples and next to a sample without data.
     pub fn sample(&self, x_m: f64, y_m: f64) -> Option<GroundPoint> {
         let g = &self.heights.geometry;
         let (i, across) = along((x_m - g.origin[0]) / g.cell[0] - 0.5, g.cols)?;
@@ -90,13 +104,13 @@ impl GroundGrid {
         })
     }
 
-    /// Shape and place.
+    /// Shape and position.
     pub fn geometry(&self) -> Geometry {
         self.heights.geometry
     }
 }
 
-/// The sample before a position counted in samples, and how far beyond it the position lies, 0 to 1.
+/// The sample before a position measured in samples, and the fraction by which the position exceeds it, 0 to 1.
 fn along(position: f64, count: usize) -> Option<(usize, f64)> {
     let last = count.checked_sub(2)?;
     if !(position >= 0.0 && position <= (last + 1) as f64) {
@@ -129,7 +143,7 @@ mod tests {
         GroundGrid { heights, class: Some(class), albedo: Some(albedo) }
     }
 
-    /// Heights are those of [`Surface`]; class and albedo are the nearest sample's.
+    /// Heights are those of [`Surface`]; class and albedo are those of the nearest sample.
     #[test]
     fn val_ground_is_bilinear_and_nearest() {
         let ground = saddle();
@@ -143,7 +157,7 @@ mod tests {
         }
     }
 
-    /// Beyond the outer samples, and beside a hole, there is no ground, and no height of 0.
+    /// Beyond the outer samples and next to a hole, there is no ground, not a height of 0.
     #[test]
     fn val_unknown_ground_is_an_error() {
         let mut ground = saddle();
@@ -153,5 +167,22 @@ mod tests {
         ground.heights.values[0] = f32::NAN;
         assert!(ground.at(3.3, -0.9).is_err() && ground.at(4.9, -1.5).is_ok());
         assert!(GroundGrid::of_heights(Grid::filled(Geometry::square(1, 3, 1.0), 0.0)).at(1.0, 0.5).is_err());
+    }
+
+    /// Without maps, all ground is sand of unknown albedo; a point without ground is named.
+    #[test]
+    fn val_ground_without_maps() {
+        let g = Geometry { rows: 3, cols: 3, cell: [2.0, 1.0], origin: [10.0, 100.0] };
+        let ground = GroundGrid::of_heights(Grid::filled(g, 0.5));
+        let point = ground.at(13.0, 101.0).unwrap();
+        assert_eq!((point.height_m, point.class, ground.cell_m()), (0.5, GroundClass::Sand, 1.5));
+        assert!(point.albedo.is_nan());
+        let nowhere = ground.at(9.5, 101.25).unwrap_err();
+        assert_eq!(nowhere, NoGround { x_m: 9.5, y_m: 101.25 });
+        assert_eq!(nowhere.to_string(), "there is no ground at x = 9.500, y = 101.250 m");
+        // The outer centres themselves are ground.
+        let beyond = [(10.99, 101.0), (15.01, 101.0), (13.0, 100.49), (13.0, 102.51)];
+        assert!([(11.0, 100.5), (15.0, 102.5)].iter().all(|(x, y)| ground.at(*x, *y).is_ok()));
+        assert!(beyond.iter().all(|(x, y)| ground.at(*x, *y).is_err()));
     }
 }

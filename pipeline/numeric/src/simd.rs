@@ -1,23 +1,23 @@
-//! Wide vectors where the CPU has them, with the bits of the baseline.
+//! Wide vectors on CPUs that have them, with the same bits as the baseline.
 //!
-//! An operation is compiled twice, for AVX2 and for any CPU, and is run as this one can. Its source is `+ - *` alone, each
-//! rounded by itself (the compiler never fuses a product and a sum), so the choice changes no bit; tests run both and
-//! compare.
+//! An operation is compiled twice, for AVX2 and for any CPU, and the best version for the present CPU is run. It consists only of `+ - *`,
+//! each rounded separately (the compiler never fuses a product and a sum), so the choice changes no bit; tests run both versions and
+//! compare them.
 
 use pulp::{Scalar256b, Simd, WithSimd};
 
 /// Vectors of four numbers.
 #[derive(Clone, Copy, Debug)]
 pub enum Vectors {
-    /// One instruction for all four.
+    /// One instruction for all four numbers.
     #[cfg(target_arch = "x86_64")]
     Avx2(pulp::x86::V3),
-    /// What every CPU has.
+    /// Instructions that every CPU has.
     Baseline,
 }
 
 impl Vectors {
-    /// The best of this CPU.
+    /// The widest vectors of this CPU.
     pub fn best() -> Self {
         #[cfg(target_arch = "x86_64")]
         if let Some(avx2) = pulp::x86::V3::try_new() {

@@ -1,9 +1,8 @@
 //! Named random streams.
 //!
-//! Every draw of the project comes from a stream that is named by words: who asks, in which stage, for which item, for
-//! what purpose. The words are hashed with BLAKE3 (key derivation mode, context [`CONTEXT`]) to the seed of a ChaCha20
-//! generator. Nothing else (thread, shard, order, time) enters. `docs/random-streams.md` is the page for people;
-//! golden values below freeze the derivation.
+//! Every draw of the project comes from a stream that is named by words: the caller, the stage, the item and the purpose. The words
+//! are hashed with BLAKE3 (key derivation mode, context [`CONTEXT`]) to the seed of a ChaCha20 generator. Nothing else (thread, shard,
+//! order, time) has any influence. `docs/random-streams.md` describes the derivation for users; golden values below freeze it.
 
 use rand_chacha::ChaCha20Rng;
 use rand_core::{Rng, SeedableRng};
@@ -12,6 +11,18 @@ use rand_core::{Rng, SeedableRng};
 pub const CONTEXT: &str = "sastrugi 2026-11 random streams v1";
 
 /// The family of streams of one item in one stage.
+///
+/// ```
+/// use sastrugi_numeric::Streams;
+///
+/// let streams = Streams::for_seed(42, "terrain");
+/// // The words name the stream, so whoever asks for it, whenever, gets the same numbers.
+/// assert_eq!(streams.stream("phases").bits(), 14_865_957_119_134_067_284);
+/// let mut of_mission = streams.child("mission-0001").stream("start");
+/// let east_m = of_mission.uniform_in(-5.0, 5.0);
+/// assert!((-5.0..5.0).contains(&east_m));
+/// assert_eq!(streams.child("mission-0001").label(), "seed/42/terrain/mission-0001");
+/// ```
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Streams {
     words: Vec<String>,
@@ -31,7 +42,7 @@ impl Streams {
         Self { words: words.to_vec() }
     }
 
-    /// The family one level below, as for one mission of a terrain.
+    /// The family one level below, for example for one mission of a terrain.
     pub fn child(&self, word: &str) -> Self {
         let mut words = self.words.clone();
         words.push(word.to_owned());
@@ -72,7 +83,7 @@ impl Stream {
         unit(self.bits())
     }
 
-    /// The next values of [`Self::uniform`], all at once.
+    /// Fills `values` with the next values of [`Self::uniform`].
     pub fn fill_uniform(&mut self, values: &mut [f64]) {
         values.iter_mut().for_each(|v| *v = self.uniform());
     }
@@ -97,7 +108,7 @@ impl Stream {
         }
     }
 
-    /// Standard normal, by Box and Muller (1958); values come in pairs, the second is kept for the next call.
+    /// Standard normal, by Box and Muller (1958). Values are computed in pairs; the second is kept for the next call.
     pub fn normal(&mut self) -> f64 {
         if let Some(value) = self.spare_normal.take() {
             return value;
@@ -136,9 +147,74 @@ mod tests {
         assert_ne!(a, b);
     }
 
-    /// Many at once are the draws one by one, also after single ones.
+    /// A child's name ends where the purpose begins.
     #[test]
-    fn prop_filling_changes_no_draw() {
+    fn val_children_and_labels() {
+        let streams = Streams::for_item(7, "terrain", "a-0001").child("process-2");
+        assert_eq!(streams.label(), "item/7/terrain/a-0001/process-2");
+        assert_eq!(Streams::for_seed(7, "terrain").label(), "seed/7/terrain");
+        let first = |streams: &Streams, purpose: &str| streams.stream(purpose).bits();
+        let root = Streams::for_seed(7, "terrain");
+        let (apart, joined) = (root.child("ab"), root.child("a"));
+        assert_ne!(first(&apart, "c"), first(&joined, "bc"));
+        assert_eq!(first(&apart, "c"), first(&Streams::for_seed(7, "terrain").child("ab"), "c"));
+        assert_ne!(first(&root, "c"), first(&Streams::for_seed(8, "terrain"), "c"));
+    }
+
+    /// From the two frozen words: their top 53 bits times 2^-53, computed with exact integers.
+    #[test]
+    fn val_uniform_numbers_are_the_top_bits() {
+        let stream = Streams::for_seed(42, "terrain").stream("phases");
+        let mut one = stream.clone();
+        assert_eq!([one.uniform(), one.uniform()], [0.805_885_150_232_075_3, 0.081_099_652_150_442_24]);
+        assert!((stream.clone().uniform_in(-2.0, 6.0) - 4.447_081_201_856_602).abs() < 1e-14);
+        assert_eq!((unit(0), unit(u64::MAX)), (0.0, 1.0 - f64::EPSILON / 2.0));
+    }
+
+    /// From the same words: remainders, and the second word where the first lies at or above the largest multiple of n.
+    #[test]
+    fn val_integers_below_n() {
+        let stream = Streams::for_seed(42, "terrain").stream("phases");
+        let mut tens = stream.clone();
+        assert_eq!([tens.below(10), tens.below(10)], [4, 7]);
+        assert_eq!(stream.clone().below((1 << 63) + 1), GOLD_SEED[1]);
+        assert_eq!(stream.clone().below(1), 0);
+    }
+
+    #[test]
+    #[should_panic(expected = "below(0) has no value")]
+    fn val_nothing_lies_below_zero() {
+        Streams::for_seed(42, "terrain").stream("phases").below(0);
+    }
+
+    /// Null: draws below 7 are uniform. n = 70 000; chi-squared with 6 degrees of freedom exceeds 38.3 with a probability of 1e-6; would
+    /// catch a class with 8 % too many draws.
+    #[test]
+    fn stat_integers_below_n_are_uniform() {
+        let mut s = Streams::for_seed(7, "test").stream("below");
+        let mut counts = [0_u32; 7];
+        (0..70_000).for_each(|_| counts[s.below(7) as usize] += 1);
+        let chi2: f64 = counts.iter().map(|n| f64::from(*n) - 1e4).map(|off| off * off / 1e4).sum();
+        assert!(chi2 < 38.3, "{chi2} {counts:?}");
+    }
+
+    /// Box and Muller backwards: both normal numbers of a pair, in this order, give back the uniform numbers they came from.
+    #[test]
+    fn val_pairs_of_normal_numbers_give_back_their_uniform_numbers() {
+        let mut normals = Streams::for_seed(3, "test").stream("pairs");
+        let mut uniforms = normals.clone();
+        for _ in 0..1000 {
+            let (x, y) = (normals.normal(), normals.normal());
+            let (u, v) = (uniforms.uniform(), uniforms.uniform());
+            let turn = libm::atan2(y, x) / (2.0 * std::f64::consts::PI);
+            assert!((1.0 - libm::exp(-0.5 * (x * x + y * y)) - u).abs() < 1e-14, "{u}");
+            assert!((turn - turn.floor() - v).abs() < 1e-14, "{v}");
+        }
+    }
+
+    /// Filling a slice gives the same draws as single calls, even when both are mixed.
+    #[test]
+    fn prop_filling_gives_the_same_draws() {
         let mut one_by_one = Streams::for_seed(3, "test").stream("uniform");
         let mut at_once = one_by_one.clone();
         for n in [1, 5, 128, 300, 7] {

@@ -1,9 +1,9 @@
-//! Sums in a fixed order, so that no thread count changes a bit.
+//! Sums in a fixed order, so that the number of threads changes no bit.
 
-/// Values summed one after another before the partial sums are joined in pairs.
+/// Number of values summed sequentially before partial sums are added in pairs.
 const BLOCK: usize = 128;
 
-/// Pairwise sum: the rounding error grows with log n, and the order depends on the length alone.
+/// Pairwise sum. The rounding error grows with log n, and the order depends only on the length.
 pub fn sum(values: &[f64]) -> f64 {
     if values.len() <= BLOCK {
         return values.iter().sum();
@@ -24,13 +24,24 @@ pub fn variance(values: &[f64]) -> f64 {
     mean(&squares)
 }
 
-/// The values that are data (finite), in order.
+/// The finite values (those that are data), in order.
 pub fn finite(values: &[f64]) -> Vec<f64> {
     values.iter().copied().filter(|v| v.is_finite()).collect()
 }
 
 /// Quantile `q` in [0, 1] of sorted values by linear interpolation between order statistics
 /// (type 7 of Hyndman and Fan, 1996); NaN for no values.
+///
+/// ```
+/// use sastrugi_numeric::sums::{median, quantile_sorted};
+///
+/// let sorted = [1.0, 2.0, 4.0, 8.0];
+/// assert_eq!(quantile_sorted(&sorted, 0.0), 1.0);
+/// assert_eq!(quantile_sorted(&sorted, 0.5), 3.0);
+/// // The median needs no sorting.
+/// assert_eq!(median(&[8.0, 1.0, 4.0, 2.0]), 3.0);
+/// assert!(median(&[]).is_nan());
+/// ```
 pub fn quantile_sorted(sorted: &[f64], q: f64) -> f64 {
     let Some(last) = sorted.len().checked_sub(1) else { return f64::NAN };
     let position = q.clamp(0.0, 1.0) * last as f64;
@@ -39,11 +50,11 @@ pub fn quantile_sorted(sorted: &[f64], q: f64) -> f64 {
     sorted[low] + (sorted[high] - sorted[low]) * (position - low as f64)
 }
 
-/// Median of the values in any order, as [`quantile_sorted`] gives it; NaN for no values. Cost: two passes or so, no sorting.
+/// Median of values in any order, equal to that of [`quantile_sorted`]; NaN for no values. Cost: about two passes, no sorting.
 pub fn median(values: &[f64]) -> f64 {
     let Some(last) = values.len().checked_sub(1) else { return f64::NAN };
-    let mut parted = values.to_vec();
-    let (_, low, above) = parted.select_nth_unstable_by(last / 2, f64::total_cmp);
+    let mut partitioned = values.to_vec();
+    let (_, low, above) = partitioned.select_nth_unstable_by(last / 2, f64::total_cmp);
     let low = *low;
     let high = if last % 2 == 0 { low } else { above.iter().copied().min_by(f64::total_cmp).unwrap_or(low) };
     quantile_sorted(&[low, high], if last % 2 == 0 { 0.0 } else { 0.5 })
@@ -59,7 +70,7 @@ mod tests {
         assert!((sum(&values) - 100_000.3).abs() < 1e-9);
     }
 
-    /// Of every length, with ties and signed zeros: the bits that sorting gives.
+    /// For every length, with ties and signed zeros: the same bits as sorting.
     #[test]
     fn prop_the_median_is_the_middle_quantile() {
         let values: Vec<f64> = (0..200u32).map(|k| f64::from(k.wrapping_mul(2_654_435_761) % 61) - 30.1).collect();
@@ -82,5 +93,34 @@ mod tests {
         assert!(median(&[]).is_nan());
         assert_eq!(median(&[4.0, 1.0, 3.0, 2.0]), 2.5);
         assert_eq!(variance(&[1.0, 3.0]), 1.0);
+    }
+
+    /// A single 1 is lost beside 1e16, whose neighbours are 2 apart, but a block of ones is not: the sums show where blocks begin.
+    #[test]
+    fn val_sums_are_added_in_blocks_of_128() {
+        for (ones, kept) in [(127, 0.0), (255, 128.0), (299, 172.0)] {
+            let values: Vec<f64> = std::iter::once(1e16).chain(std::iter::repeat_n(1.0, ones)).collect();
+            assert_eq!(sum(&values) - 1e16, kept, "{ones}");
+        }
+    }
+
+    #[test]
+    fn val_mean_and_variance() {
+        assert_eq!(mean(&[1.0, 2.0, 6.0]), 3.0);
+        // Deviations of -2, -1 and 3; the divisor is n, not n - 1.
+        assert_eq!(variance(&[1.0, 2.0, 6.0]), 14.0 / 3.0);
+        assert!(mean(&[]).is_nan() && variance(&[]).is_nan() && quantile_sorted(&[], 0.5).is_nan());
+        assert_eq!(finite(&[1.0, f64::NAN, f64::INFINITY, -2.0, f64::NEG_INFINITY]), [1.0, -2.0]);
+    }
+
+    /// The ends are the extremes, also for shares beyond 0 and 1.
+    #[test]
+    fn val_quantiles_end_at_the_extremes() {
+        let sorted = [1.0, 2.0, 4.0, 8.0];
+        let expected = [(-1.0, 1.0), (0.0, 1.0), (0.5, 3.0), (0.9, 6.8), (1.0, 8.0), (2.0, 8.0)];
+        for (share, value) in expected {
+            assert!((quantile_sorted(&sorted, share) - value).abs() < 1e-14, "{share}");
+        }
+        assert_eq!(quantile_sorted(&[5.0], 0.7), 5.0);
     }
 }

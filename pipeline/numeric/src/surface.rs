@@ -1,8 +1,18 @@
-//! Heights and gradients at any point of a grid.
+//! Heights and gradients at arbitrary points of a grid.
 
 use crate::grid::Grid;
 
-/// A surface z(x, y) over part of the plane.
+/// A surface z(x, y) defined on part of the plane.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, Surface};
+///
+/// // Rows run from north to south: this plane rises by 1 m per metre to the east and by 2 m per metre to the north.
+/// let plane = Grid::new(Geometry::square(2, 2, 1.0), vec![2.0, 3.0, 0.0, 1.0]);
+/// assert_eq!(plane.height_and_gradient(1.0, 1.0), Some((1.5, 1.0, 2.0)));
+/// // Beyond the outer cell centres, the surface is undefined.
+/// assert_eq!(plane.height(0.25, 1.0), None);
+/// ```
 pub trait Surface {
     /// Height in m at the point, or `None` where undefined (outside, or next to a cell without data).
     fn height(&self, x: f64, y: f64) -> Option<f64>;
@@ -11,7 +21,7 @@ pub trait Surface {
     fn height_and_gradient(&self, x: f64, y: f64) -> Option<(f64, f64, f64)>;
 }
 
-/// Bilinear between the cell centres; undefined beyond the outer centres.
+/// Bilinear between cell centres; undefined beyond the outer centres.
 impl<T: Copy + Into<f64>> Surface for Grid<T> {
     fn height(&self, x: f64, y: f64) -> Option<f64> {
         self.height_and_gradient(x, y).map(|(z, _, _)| z)
@@ -62,12 +72,30 @@ mod tests {
     }
 
     #[test]
-    fn val_undefined_beyond_outer_centres_and_beside_nodata() {
+    fn val_undefined_beyond_outer_centres_and_next_to_no_data() {
         let mut grid = Grid::filled(Geometry::square(4, 4, 1.0), 1.0);
         assert_eq!(grid.height(0.49, 2.0), None);
         assert_eq!(grid.height(3.5, 3.5), Some(1.0));
         grid.values[0] = f64::NAN;
         assert_eq!(grid.height(0.6, 3.4), None);
+        assert_eq!(grid.height(1.6, 3.4), Some(1.0));
         assert_eq!(grid.height(f64::NAN, 1.0), None);
+    }
+
+    /// A saddle looks the same from every cell, so it does not tell which four centres are used; these heights do. Computed by hand.
+    #[test]
+    fn val_interpolates_between_the_four_nearest_centres() {
+        let g = Geometry { rows: 3, cols: 3, cell: [2.0, 1.0], origin: [10.0, 100.0] };
+        let grid = Grid::new(g, vec![0.0, 1.0, 4.0, 9.0, 16.0, 25.0, 36.0, 49.0, 64.0]);
+        assert_eq!(grid.height_and_gradient(12.0, 102.25), Some((3.5, 1.25, -12.0)));
+        assert_eq!(grid.height_and_gradient(14.0, 100.75), Some((47.5, 6.75, -36.0)));
+        let corners = [(11.0, 102.5, 0.0), (15.0, 102.5, 4.0), (11.0, 100.5, 36.0), (15.0, 100.5, 64.0)];
+        corners.iter().for_each(|(x, y, z)| assert_eq!(grid.height(*x, *y), Some(*z)));
+        for (x, y) in [(10.99, 101.5), (15.01, 101.5), (13.0, 102.51), (13.0, 100.49)] {
+            assert_eq!(grid.height(x, y), None, "{x} {y}");
+        }
+        let row = Grid::filled(Geometry::square(1, 3, 1.0), 1.0);
+        let column = Grid::filled(Geometry::square(3, 1, 1.0), 1.0);
+        assert_eq!((row.height(1.5, 0.5), column.height(0.5, 1.5)), (None, None));
     }
 }

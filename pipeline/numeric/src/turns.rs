@@ -1,18 +1,18 @@
-//! Sine and cosine of many angles, in turns, with the bits of one at a time.
+//! Sine and cosine of many angles, given in turns, with the same bits as one at a time.
 //!
-//! An angle of `u` turns is `j` quarters and a rest of at most an eighth, both exact; the rest goes through the
-//! polynomials of FreeBSD's `k_sin.c` and `k_cos.c` (Sun Microsystems 1993, errors below 2^-58). The error of the result is
-//! below 2e-16: less than that of a sine of the rounded product `2 pi u`. Plain `+ - *`, so that the compiler takes
-//! several at a time, and no CPU changes a bit.
+//! An angle of `u` turns is split exactly into `j` quarter turns and a remainder of at most an eighth of a turn. The sine and cosine of
+//! the remainder come from the polynomials of FreeBSD's `k_sin.c` and `k_cos.c` (Sun Microsystems 1993, errors below 2^-58). The error of
+//! the result is below 2e-16, less than that of a sine of the rounded product `2 pi u`. Only `+ - *` are used, so that the compiler can
+//! vectorise the loop and the CPU changes no bit.
 
 use crate::simd::Vectors;
 use pulp::{Simd, WithSimd};
 use std::f64::consts::FRAC_PI_2;
 
-/// Sine and cosine of `2 pi turns`, for less than 2^49 turns either way.
+/// Sine and cosine of `2 pi turns`, for less than 2^49 turns in either direction.
 #[inline(always)]
 fn sincos(turns: f64) -> (f64, f64) {
-    /// Adding it leaves no room below the ones, whose last bits are those of the whole number.
+    /// Adding this number leaves no fractional bits, and the last bits of the sum are those of the integer.
     const ROUND: f64 = 1.5 * (1u64 << 52) as f64;
     let quarters = 4.0 * turns;
     let rounded = quarters + ROUND;
@@ -24,7 +24,7 @@ fn sincos(turns: f64) -> (f64, f64) {
     (f64::from_bits(first.to_bits() ^ sign(quarter)), f64::from_bits(second.to_bits() ^ sign(quarter.wrapping_add(1))))
 }
 
-/// Sine of at most pi / 4.
+/// Sine of an angle of at most pi / 4.
 #[inline(always)]
 fn sin_of_eighth(x: f64) -> f64 {
     const S: [f64; 6] = [
@@ -39,7 +39,7 @@ fn sin_of_eighth(x: f64) -> f64 {
     x + z * x * (S[0] + z * (S[1] + z * (S[2] + z * (S[3] + z * (S[4] + z * S[5])))))
 }
 
-/// Cosine of at most pi / 4.
+/// Cosine of an angle of at most pi / 4.
 #[inline(always)]
 fn cos_of_eighth(x: f64) -> f64 {
     const C: [f64; 6] = [
@@ -53,11 +53,20 @@ fn cos_of_eighth(x: f64) -> f64 {
     let z = x * x;
     let half = 0.5 * z;
     let most = 1.0 - half;
-    // What the subtraction lost comes back with the polynomial.
+    // The rounding error of the subtraction is added back with the polynomial.
     most + ((1.0 - most - half) + z * z * (C[0] + z * (C[1] + z * (C[2] + z * (C[3] + z * (C[4] + z * C[5]))))))
 }
 
-/// Sine and cosine of `2 pi turns` for each of many turns.
+/// Sine and cosine of `2 pi turns` for each value of `turns`.
+///
+/// ```
+/// let turns = [0.0, 0.25, 0.5, -0.25, 0.125];
+/// let (mut sin, mut cos) = ([0.0; 5], [0.0; 5]);
+/// sastrugi_numeric::turns::sincos_each(&turns, &mut sin, &mut cos);
+/// // Quarter turns are exact.
+/// assert_eq!((&sin[..4], &cos[..4]), (&[0.0, 1.0, 0.0, -1.0][..], &[1.0, 0.0, -1.0, 0.0][..]));
+/// assert!((sin[4] - 0.5_f64.sqrt()).abs() < 1e-15);
+/// ```
 ///
 /// # Panics
 /// If the slices differ in length.
@@ -77,7 +86,7 @@ impl WithSimd for Each<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, _simd: S) {
         let Self { turns, sin, cos } = self;
-        assert_eq!((turns.len(), turns.len()), (sin.len(), cos.len()), "as many sines and cosines as angles");
+        assert_eq!((turns.len(), turns.len()), (sin.len(), cos.len()), "slices must have the same length");
         for k in 0..turns.len() {
             (sin[k], cos[k]) = sincos(turns[k]);
         }
@@ -95,7 +104,7 @@ mod tests {
         angles
     }
 
-    /// `libm` on the rest of the nearest quarter, where its argument is rounded to 2^-54, as an independent reference.
+    /// Independent reference: `libm` for the remainder from the nearest quarter turn, where its argument is rounded to 2^-54.
     #[test]
     fn val_equals_libm() {
         let edges = (0..=4096).map(|k| f64::from(k) / 4096.0);
@@ -118,7 +127,7 @@ mod tests {
         }
     }
 
-    /// Wide vectors, the baseline's and one at a time.
+    /// Wide vectors, those of the baseline, and one value at a time.
     #[test]
     fn prop_vectors_change_no_bit() {
         let turns = angles(10_007);
@@ -130,5 +139,11 @@ mod tests {
             assert_eq!([sin[k], cos[k]].map(f64::to_bits), [s, c].map(f64::to_bits), "{u}");
             assert_eq!([sin_base[k], cos_base[k]].map(f64::to_bits), [s, c].map(f64::to_bits), "{u}");
         }
+    }
+
+    #[test]
+    #[should_panic(expected = "slices must have the same length")]
+    fn val_short_slices_are_refused() {
+        sincos_each(&[0.0; 3], &mut [0.0; 3], &mut [0.0; 2]);
     }
 }

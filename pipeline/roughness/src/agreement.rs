@@ -1,14 +1,14 @@
-//! Statistics of a surface that a fitted covariance does not set: what a synthetic texture is to be judged by.
+//! Statistics that a fitted covariance does not prescribe, for judging a synthetic texture against the measured surface.
 //!
 //! # What
-//! Of a residual (heights less background), in cells with data:
-//! * `slope_distribution`: quantiles of the slope's magnitude (central differences), m/m;
+//! For a residual (heights minus background), over cells with data:
+//! * `slope_distribution`: quantiles of the slope magnitude (central differences), m/m;
 //! * `curvature_distribution`: quantiles of the Laplacian (five points), 1/m;
 //! * `increment_flatness`: `ln (<d^4> / <d^2>^2)` of the increments d over lags of 1, 2, 4 ... cells, both axes together; ln 3 for
 //!   a normal surface at every lag, more at short lags where roughness comes in patches;
-//! * `third_order_structure`: `<d^3> / <d^2>^(3/2)` by lag, eastwards and northwards; 0 for a surface that looks the same
-//!   from both sides, and for every normal one;
-//! * `extrema_density`: `ln` of the share of cells above, or below, all eight neighbours;
+//! * `third_order_structure`: `<d^3> / <d^2>^(3/2)` by lag, eastwards and northwards; 0 for a surface whose statistics do not
+//!   change on reversing the axis, and for any normal surface;
+//! * `extrema_density`: `ln` of the share of cells higher, or lower, than all eight neighbours;
 //! * `directional_psd`: `ln` of the mean power in sectors of 30 degrees over the mean of all, between the longest increment and half
 //!   the Nyquist frequency.
 //!
@@ -16,16 +16,16 @@
 //! Flatness and third-order structure function: Frisch, Turbulence (1995), sections 6.2 and 8.2. Density of extrema: Longuet-Higgins (1957).
 //!
 //! # Cost
-//! Some 20 passes, two sorts and one transform of the raster; 80 bytes a cell. Statistics of one mask are compared with
-//! those of the same mask only: holes leak into the spectrum.
+//! Some 20 passes, two sorts and one transform of the raster; 80 bytes per cell. Compare statistics only between surfaces with
+//! the same mask: holes leak into the spectrum.
 
 use sastrugi_numeric::fft::{RealFft2, smooth_length};
 use sastrugi_numeric::{Grid, sums};
 use std::f64::consts::{PI, TAU};
 
-/// Quantiles of slopes and curvatures, at `(k + 1/2) / 19`.
+/// Number of quantiles of slopes and curvatures, at `(k + 1/2) / 19`.
 const QUANTILES: usize = 19;
-/// Sectors of half a turn.
+/// Sectors in half a turn.
 const SECTORS: usize = 6;
 
 /// One statistic.
@@ -33,13 +33,13 @@ const SECTORS: usize = 6;
 pub struct Statistic {
     /// Name.
     pub name: &'static str,
-    /// Its values; NaN where there is no data for one.
+    /// Values; NaN where there is no data.
     pub values: Vec<f64>,
-    /// True where values have a unit, so that differences are taken in shares of their size.
+    /// Whether the values have a unit, in which case differences are taken relative to their size.
     pub has_unit: bool,
 }
 
-/// Every statistic of a residual, with increments over up to `lag_max` cells.
+/// All statistics of a residual, with increments over lags of up to `lag_max` cells.
 pub fn unfitted_statistics(residual: &Grid, lag_max: usize) -> Vec<Statistic> {
     let lags: Vec<usize> =
         std::iter::successors(Some(1), |l| Some(2 * l)).take_while(|l| *l <= lag_max.max(1)).collect();
@@ -61,7 +61,7 @@ fn quantiles(mut values: Vec<f64>) -> Vec<f64> {
     (0..QUANTILES).map(|k| sums::quantile_sorted(&values, (k as f64 + 0.5) / QUANTILES as f64)).collect()
 }
 
-/// Magnitudes of the slope and Laplacians, of the cells whose four neighbours have data.
+/// Slope magnitudes and Laplacians of the cells whose four neighbours have data.
 fn derivatives(z: &Grid) -> (Vec<f64>, Vec<f64>) {
     let [x, y] = z.geometry.cell;
     let (mut slopes, mut laplacians) = (Vec::new(), Vec::new());
@@ -80,7 +80,7 @@ fn derivatives(z: &Grid) -> (Vec<f64>, Vec<f64>) {
     (slopes, laplacians)
 }
 
-/// Mean powers of the increments over one lag, eastwards and northwards.
+/// Moments of the increments over one lag, eastwards and northwards.
 struct Moments {
     /// `[<d^2>, <d^3>, <d^4>]` of each axis.
     axes: [[f64; 3]; 2],
@@ -122,20 +122,20 @@ fn extrema(z: &Grid) -> [f64; 2] {
         for c in 1..z.cols().saturating_sub(1) {
             let own = z.at(r, c);
             let around = (r - 1..=r + 1).flat_map(|i| (c - 1..=c + 1).map(move |j| (i, j))).filter(|p| *p != (r, c));
-            let (low, high, whole) =
+            let (low, high, complete) =
                 around.fold((f64::INFINITY, f64::NEG_INFINITY, own.is_finite()), |(l, h, w), (i, j)| {
                     let v = z.at(i, j);
                     (l.min(v), h.max(v), w && v.is_finite())
                 });
-            counts[0] += u64::from(whole && own > high);
-            counts[1] += u64::from(whole && own < low);
-            counts[2] += u64::from(whole);
+            counts[0] += u64::from(complete && own > high);
+            counts[1] += u64::from(complete && own < low);
+            counts[2] += u64::from(complete);
         }
     }
     [0, 1].map(|k| counts[k] as f64 / counts[2] as f64)
 }
 
-/// `ln` of mean power by sector over the mean of all; sectors are centred at 0, 30 ... degrees clockwise from north.
+/// `ln` of the mean power in each sector over the mean of all; sectors are centred at 0, 30 ... degrees clockwise from north.
 fn directional_power(z: &Grid, lag_max: usize) -> Vec<f64> {
     let (rows, cols) = (z.rows(), z.cols());
     let [height, width] = [rows, cols].map(smooth_length);
@@ -155,13 +155,13 @@ fn directional_power(z: &Grid, lag_max: usize) -> Vec<f64> {
     for (k, value) in spectrum.values.iter().enumerate() {
         let (kx, ky) = (k / height, k % height);
         let ky = if 2 * ky > height { ky as f64 - height as f64 } else { ky as f64 };
-        // Rows count southwards, so that a positive frequency along them points south.
+        // Rows count southwards, so a positive frequency across rows points south.
         let [east, north] = [kx as f64 / (width as f64 * cell[0]), -ky / (height as f64 * cell[1])];
         let frequency = (east * east + north * north).sqrt();
         if frequency < band[0] || frequency > band[1] {
             continue;
         }
-        // The other half of the spectrum holds each of these again, except the first and the middle column.
+        // The other half of the spectrum repeats these modes, except for the first and the middle column.
         let weight = if kx == 0 || 2 * kx == width { 1.0 } else { 2.0 };
         let turn = libm::atan2(east, north) / PI;
         let sector = ((turn - turn.floor()) * SECTORS as f64 + 0.5) as usize % SECTORS;
@@ -186,7 +186,7 @@ mod tests {
         all.iter().find(|s| s.name == name).unwrap().values.clone()
     }
 
-    /// A paraboloid: its slope is known, its Laplacian is 2 (a + b) everywhere, it has one maximum.
+    /// A paraboloid: its Laplacian is 2 (a + b) everywhere, and it has one maximum.
     #[test]
     fn val_a_paraboloid() {
         let z = grid(41, 61, [0.5, 0.25], |x, y| -0.3 * (x - 15.1) * (x - 15.1) - 0.2 * (y - 5.1) * (y - 5.1));
@@ -196,10 +196,10 @@ mod tests {
         assert!((density[0] - libm::log(1.0 / (39.0 * 59.0))).abs() < 1e-12 && density[1] == f64::NEG_INFINITY);
     }
 
-    /// A saw that rises eastwards in 7 cells and falls in 1: d over one cell is 1 (7 of 8) or -7 (1 of 8), so that
-    /// <d^2> = 7, <d^3> = -42, <d^4> = 301; northwards there is nothing.
+    /// A sawtooth that rises eastwards over 7 cells and falls over 1: d over one cell is 1 (7 of 8) or -7 (1 of 8), so that
+    /// <d^2> = 7, <d^3> = -42, <d^4> = 301; northwards the increments are zero.
     #[test]
-    fn val_a_saw_by_hand() {
+    fn val_a_sawtooth_by_hand() {
         let z = grid(16, 81, [1.0; 2], |x, _| (x - 0.5) % 8.0);
         let all = unfitted_statistics(&z, 1);
         let skewness = values(&all, "third_order_structure");
@@ -208,9 +208,35 @@ mod tests {
         assert!((flatness - libm::log(2.0 * 301.0 / 49.0)).abs() < 1e-12);
     }
 
-    /// Waves that run towards azimuth 60 degrees have their power in that sector, turned or not, with holes too.
+    /// The same sawtooth, rising northwards.
     #[test]
-    fn val_power_lies_where_waves_run() {
+    fn val_a_sawtooth_northwards() {
+        let z = grid(81, 16, [1.0; 2], |_, y| (y - 0.5) % 8.0);
+        let skewness = values(&unfitted_statistics(&z, 1), "third_order_structure");
+        assert!(skewness[0].is_nan() && (skewness[1] + 42.0 / (7.0 * 7f64.sqrt())).abs() < 1e-12, "{skewness:?}");
+    }
+
+    /// `z = x^2 / 2` on cells of 1 m has slopes 1.5, 2.5 ... 19.5 in its inner row: quantile q is 1.5 + 18 q.
+    #[test]
+    fn val_quantiles_of_slopes() {
+        let z = grid(3, 21, [1.0; 2], |x, _| 0.5 * x * x);
+        let found = values(&unfitted_statistics(&z, 1), "slope_distribution");
+        assert_eq!(found.len(), 19);
+        for (k, slope) in found.iter().enumerate() {
+            assert!((slope - (1.5 + 18.0 * (k as f64 + 0.5) / 19.0)).abs() < 1e-12, "{k}: {slope}");
+        }
+    }
+
+    /// A slope of 0.3 east and 0.4 north on oblong cells: 0.5 everywhere.
+    #[test]
+    fn val_slopes_of_a_plane() {
+        let z = grid(7, 9, [0.5, 0.25], |x, y| 0.3 * x + 0.4 * y);
+        assert!(values(&unfitted_statistics(&z, 2), "slope_distribution").iter().all(|s| (s - 0.5).abs() < 1e-12));
+    }
+
+    /// Waves that travel towards azimuth 60 degrees have their power in that sector, also with holes.
+    #[test]
+    fn val_power_lies_in_the_sector_of_the_waves() {
         let (sin, cos) = libm::sincos(60f64.to_radians());
         let mut z = grid(120, 150, [0.5, 0.4], |x, y| libm::sin(TAU * (x * sin + y * cos) / 4.0));
         z.values[3000..3400].fill(f64::NAN);
@@ -220,8 +246,8 @@ mod tests {
         assert!(power[5] < power[2] - 4.0, "{power:?}");
     }
 
-    /// Null: white noise. Its flatness is 3 and third order 0 at all lags; n = 40 000 cells, increments share cells, so that
-    /// standard errors are below 3 / 200; thresholds at 0.1 are beyond 6 of them (1e-9).
+    /// Null: white noise. Flatness is 3 and third-order structure 0 at all lags; n = 40 000 cells, increments share cells, so
+    /// standard errors are below 3 / 200; thresholds of 0.1 are beyond 6 standard errors (1e-9).
     #[test]
     fn stat_white_noise() {
         let mut s = Streams::for_seed(1, "agreement-test").stream("noise");
@@ -229,7 +255,7 @@ mod tests {
         let all = unfitted_statistics(&z, 8);
         assert!(values(&all, "increment_flatness").iter().all(|v| (v - libm::log(3.0)).abs() < 0.1));
         assert!(values(&all, "third_order_structure").iter().all(|v| v.abs() < 0.1));
-        // One of nine cells is the highest of its neighbourhood.
+        // One in nine cells is the highest of its neighbourhood.
         assert!(values(&all, "extrema_density").iter().all(|v| (v - libm::log(1.0 / 9.0)).abs() < 0.1));
     }
 }

@@ -1,21 +1,22 @@
-//! Areal figures of a surface, after ISO 25178-2:2021.
+//! Areal parameters of a surface, after ISO 25178-2:2021.
 //!
-//! The surface is the heightfield above its least-squares plane (the F-operator; no S-filter but the cell), over the cells
-//! with data; z is the height above that plane, A the number of such cells.
+//! Heights z are taken above the least-squares plane (the F-operator; the cell is the only S-filter), over the A cells with
+//! data.
 //!
-//! | figure | formula |
+//! | parameter | formula |
 //! |---|---|
 //! | Sq, Sa | `sqrt(sum z^2 / A)`, `sum abs(z) / A` |
 //! | Ssk, Sku | `sum z^3 / (A Sq^3)`, `sum z^4 / (A Sq^4)` (3 for a normal distribution) |
-//! | Sp, Sv, Sz | `max z`, `-min z`, `Sp + Sv`: they grow with the number of cells |
-//! | Sdq | `sqrt(<z_x^2 + z_y^2>)`, central differences: it grows as cells get smaller |
-//! | Sal, Str | length and aspect ratio of the autocorrelation's centre: [`crate::autocorrelation`] |
-//! | Std | direction of the texture: [`crate::SpectralMap::direction_deg`], over the band in which the slope of the spectrum is fitted |
+//! | Sp, Sv, Sz | `max z`, `-min z`, `Sp + Sv`: grow with the number of cells |
+//! | Sdq | `sqrt(<z_x^2 + z_y^2>)`, central differences: grows as cells get smaller |
+//! | Sal, Str | autocorrelation length and texture aspect ratio: [`crate::autocorrelation`] |
+//! | Std | texture direction: [`crate::SpectralMap::direction_deg`], over the band in which the slope of the spectrum is fitted |
 //!
-//! Beside them: the Hurst exponent ([`crate::hurst`]), the structure exponents ([`crate::multifractality`]), the structure function and the profile spectra.
+//! Also computed: the Hurst exponent ([`crate::hurst`]), the structure exponents ([`crate::multifractality`]), the structure
+//! function and the profile spectra.
 //!
-//! Figures of two surfaces can be compared only where cell and band agree: a residual of a moving average has no structure
-//! beyond its window. Cost: three to seven transforms of the padded grid; about 100 bytes a cell.
+//! Parameters of two surfaces are comparable only if cell and band agree: the residual of a moving average has no structure
+//! beyond its window. Cost: three to seven transforms of the padded grid; about 100 bytes per cell.
 
 use crate::gradient::rms_slopes;
 use crate::hurst::{Hurst, hurst};
@@ -28,7 +29,7 @@ use crate::structure::{StructureBin, autocorrelation, lags_of, structure_functio
 use sastrugi_numeric::{Grid, sums};
 use serde::Serialize;
 
-/// Areal figures; NaN stands for one that the surface does not have.
+/// Areal parameters; NaN where undefined.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct ArealFigures {
     /// Root mean square height, m.
@@ -43,7 +44,7 @@ pub struct ArealFigures {
     pub sp_m: f64,
     /// Deepest pit, m.
     pub sv_m: f64,
-    /// Highest peak above deepest pit, m.
+    /// Height of the highest peak above the deepest pit, m.
     pub sz_m: f64,
     /// Root mean square slope.
     pub sdq: f64,
@@ -55,9 +56,9 @@ pub struct ArealFigures {
     pub aspect_ratio: f64,
     /// Texture direction Std, degrees clockwise from north in [0, 180).
     pub direction_deg: f64,
-    /// Hurst exponent; absent where the surface has no pairs enough.
+    /// Hurst exponent; `None` if the surface has too few pairs.
     pub hurst: Option<Hurst>,
-    /// Structure exponents zeta(1) to zeta(4); absent where the surface is too small for them.
+    /// Structure exponents zeta(1) to zeta(4); `None` if the surface is too small.
     pub exponents: Option<[ScalingExponent; 4]>,
     /// Structure function.
     #[serde(skip)]
@@ -67,7 +68,7 @@ pub struct ArealFigures {
     pub profiles: Vec<ProfileBin>,
 }
 
-/// Figures of a heightfield: `map` is its spectrum, `band_cycles_m` the frequencies in which its direction is looked for,
+/// Areal parameters of a surface: `map` is its spectrum, `band_cycles_m` the frequencies used for the texture direction,
 /// `hurst_lags_m` the lags of the Hurst exponent (see [`hurst`]).
 pub fn areal_figures(
     dem: &Grid,
@@ -110,12 +111,12 @@ mod tests {
     use sastrugi_numeric::{Geometry, Streams};
     use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
-    fn figures(dem: &Grid) -> ArealFigures {
+    fn parameters(dem: &Grid) -> ArealFigures {
         areal_figures(dem, SpectralMap::of(dem).as_ref(), [0.1, 3.0], None)
     }
 
-    /// A wave of amplitude 1 on a plane: Sq = 1 / sqrt(2), Sa = 2 / pi, Sku = 3/2, Ssk = 0, Sz = 2, and its slope by
-    /// central differences, sin(k d) / (d sqrt(2)). The plane that fits the wave best is not quite level: 1 %.
+    /// A wave of amplitude 1 on a plane: Sq = 1 / sqrt(2), Sa = 2 / pi, Sku = 3/2, Ssk = 0, Sz = 2, and a slope of
+    /// sin(k d) / (d sqrt(2)) by central differences. The plane fitted to the wave is not exactly level: tolerance 1 %.
     #[test]
     fn val_a_wave_on_a_plane() {
         let g = Geometry { rows: 400, cols: 401, cell: [0.05, 0.08], origin: [0.0; 2] };
@@ -124,7 +125,7 @@ mod tests {
             g,
             (0..g.len()).map(|i| libm::sin(k * g.x(i % 401)) + 0.3 * g.x(i % 401) - g.y(i / 401)).collect(),
         );
-        let f = figures(&dem);
+        let f = parameters(&dem);
         let near = |value: f64, expected: f64| (value / expected - 1.0).abs() < 0.01;
         assert!(near(f.sq_m, FRAC_1_SQRT_2) && near(f.sa_m, 2.0 / PI) && near(f.sku, 1.5), "{f:?}");
         assert!(f.ssk.abs() < 0.02 && (f.sz_m - 2.0).abs() < 0.15, "{f:?}");
@@ -135,6 +136,20 @@ mod tests {
         assert!(near(f.sal_m, libm::acos(0.2) / k), "{f:?}");
     }
 
+    /// One cell of 8 m amid eight of -1 m, 100 m up: moments 8, 56 and 456 m to their powers.
+    #[test]
+    fn val_a_peak_by_hand() {
+        let mut dem = Grid::filled(Geometry::square(3, 3, 1.0), 99.0);
+        dem.values[4] = 108.0;
+        let f = areal_figures(&dem, None, [0.1, 0.4], None);
+        let near = |value: f64, expected: f64| (value - expected).abs() < 1e-12;
+        assert!(near(f.sq_m, 8.0f64.sqrt()) && near(f.sa_m, 16.0 / 9.0), "{f:?}");
+        assert!(near(f.ssk, 56.0 / 512.0f64.sqrt()) && near(f.sku, 456.0 / 64.0), "{f:?}");
+        assert!(near(f.sp_m, 8.0) && near(f.sv_m, 1.0) && near(f.sz_m, 9.0), "{f:?}");
+        // The peak itself is level, and only it has four neighbours.
+        assert!(f.sdq == 0.0 && f.rms_slopes == [0.0; 2] && f.direction_deg.is_nan(), "{f:?}");
+    }
+
     /// White noise with and without holes: moments within 7 standard errors (sqrt(1/2n), sqrt(6/n), sqrt(24/n); 1e-10).
     #[test]
     fn stat_moments_of_noise_with_holes() {
@@ -143,7 +158,7 @@ mod tests {
             let mut value = || if s.uniform() < hole_share { f64::NAN } else { 0.01 * s.normal() };
             let dem = Grid::new(Geometry::square(200, 300, 0.1), (0..60_000).map(|_| value()).collect());
             let n = dem.finite_count() as f64;
-            let f = figures(&dem);
+            let f = parameters(&dem);
             assert!((f.sq_m / 0.01 - 1.0).abs() < 7.0 * (0.5 / n).sqrt(), "{f:?}");
             assert!(f.ssk.abs() < 7.0 * (6.0 / n).sqrt() && (f.sku - 3.0).abs() < 7.0 * (24.0 / n).sqrt(), "{f:?}");
             assert!((f.sa_m / 0.01 - (2.0 / PI).sqrt()).abs() < 7.0 * (0.37 / n).sqrt(), "{f:?}");
@@ -151,9 +166,9 @@ mod tests {
     }
 
     #[test]
-    fn val_nothing_to_describe() {
+    fn val_empty_and_flat_surfaces() {
         for value in [f64::NAN, 3.0] {
-            let f = figures(&Grid::filled(Geometry::square(40, 40, 1.0), value));
+            let f = parameters(&Grid::filled(Geometry::square(40, 40, 1.0), value));
             assert!(f.ssk.is_nan() && f.sal_m.is_nan() && f.hurst.is_none() && f.direction_deg.is_nan(), "{f:?}");
         }
     }

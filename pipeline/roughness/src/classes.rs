@@ -1,8 +1,8 @@
 //! Roughness classes by gradient.
 //!
 //! `low <= t1 < semi <= t2 < high` on the Moore-neighbourhood gradient. The published thresholds, 50 and 140 levels per
-//! cm at 0.75 / 128 cm a level, are 0.293 and 0.820 m/m (16.3 and 39.4 degrees), so that they apply to any DEM (Majhor
-//! and Bos, section 2.3).
+//! cm at 0.75 / 128 cm per level (Majhor and Bos, section 2.3), are converted to 0.293 and 0.820 m/m (16.3 and 39.4
+//! degrees), so that they apply to any DEM.
 
 use sastrugi_numeric::Grid;
 use serde::{Deserialize, Serialize};
@@ -19,7 +19,17 @@ pub const NO_CLASS: u8 = 255;
 /// Height of a published 16-bit level, cm.
 const LEVEL_CM: f64 = 0.75 / 128.0;
 
-/// Gradients that part the classes, m/m.
+/// Gradient thresholds between the classes, m/m.
+///
+/// # Examples
+/// ```
+/// use sastrugi_roughness::{ClassThresholds, HIGH, LOW, NO_CLASS, SEMI};
+///
+/// let thresholds = ClassThresholds::new(0.25, 0.75)?;
+/// assert_eq!([0.25, 0.5, 0.76, f64::NAN].map(|gradient| thresholds.class(gradient)), [LOW, SEMI, HIGH, NO_CLASS]);
+/// assert!(ClassThresholds::new(0.75, 0.25).is_err());
+/// # Ok::<(), sastrugi_roughness::ThresholdError>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "RawThresholds")]
 pub struct ClassThresholds {
@@ -34,9 +44,9 @@ struct RawThresholds {
     semi_max: f64,
 }
 
-/// Thresholds that do not part three classes.
+/// Thresholds that do not separate three classes.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error("thresholds are {low_max} and {semi_max} m/m; they must be finite and increasing from above 0")]
+#[error("thresholds must be finite, positive and increasing, got {low_max} and {semi_max} m/m")]
 pub struct ThresholdError {
     low_max: f64,
     semi_max: f64,
@@ -99,7 +109,7 @@ pub fn classify(gradient: &Grid, thresholds: &ClassThresholds) -> Grid<u8> {
     gradient.map(|g| thresholds.class(g))
 }
 
-/// Shares of the classes among the cells with a class; NaN when there is none.
+/// Shares of the classes among the cells with a class; NaN if there are none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Shares {
     /// Share of low roughness.
@@ -148,8 +158,37 @@ mod tests {
         }
     }
 
+    /// Thresholds are checked when they are read.
     #[test]
-    fn val_shares_leave_the_border_out() {
+    fn val_thresholds_of_a_file_are_checked() {
+        use serde::de::value::{Error, MapDeserializer};
+        let read = |pairs: [(&'static str, f64); 2]| -> Result<ClassThresholds, Error> {
+            ClassThresholds::deserialize(MapDeserializer::new(pairs.into_iter()))
+        };
+        assert_eq!(read([("low_max", 0.25), ("semi_max", 0.75)]), Ok(ClassThresholds::new(0.25, 0.75).unwrap()));
+        let swapped = read([("low_max", 0.75), ("semi_max", 0.25)]).unwrap_err();
+        assert_eq!(swapped.to_string(), "thresholds must be finite, positive and increasing, got 0.75 and 0.25 m/m");
+        assert!(read([("low_max", 0.25), ("high_max", 0.75)]).unwrap_err().to_string().contains("high_max"));
+    }
+
+    /// Cells of 0.5 x 2 m within a border of 1 m: the two outer columns on either side are out; the centres of the outer rows are 1 m from
+    /// the edge, which is just enough.
+    #[test]
+    fn val_borders_of_oblong_cells() {
+        let g = Geometry { rows: 4, cols: 12, cell: [0.5, 2.0], origin: [0.0; 2] };
+        let class = |k: usize| match (k / 12, k % 12) {
+            (_, 0 | 1 | 10 | 11) => HIGH,
+            (0, _) => SEMI,
+            _ => LOW,
+        };
+        let classes = Grid::new(g, (0..48).map(class).collect());
+        assert_eq!(shares(&classes, 1.0), Shares { low: 0.75, semi: 0.25, high: 0.0 });
+        // 8 columns of rows 1 and 2.
+        assert_eq!(shares(&classes, 1.0 + 1e-9), Shares { low: 1.0, semi: 0.0, high: 0.0 });
+    }
+
+    #[test]
+    fn val_shares_exclude_the_border() {
         let mut classes = Grid::filled(Geometry::square(8, 10, 0.5), HIGH);
         for r in 2..6 {
             for c in 2..8 {
@@ -160,6 +199,6 @@ mod tests {
         let inner = shares(&classes, 1.0);
         assert_eq!(inner, Shares { low: 19.0 / 23.0, semi: 4.0 / 23.0, high: 0.0 });
         assert!(shares(&classes, 3.0).low.is_nan());
-        assert!(shares(&classes, 0.0).high > 0.0);
+        assert_eq!(shares(&classes, 0.0), Shares { low: 19.0 / 79.0, semi: 4.0 / 79.0, high: 56.0 / 79.0 });
     }
 }

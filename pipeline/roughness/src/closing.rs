@@ -1,25 +1,35 @@
-//! Grey morphological closing of a class map.
+//! Grey-scale morphological closing of a class map.
 //!
 //! Closing is a dilation (largest class within a disk) followed by an erosion (smallest class of the result within the
-//! same disk): gaps between rough places that the disk does not fit into become rough (Serra, Image Analysis and
+//! same disk): gaps between rough places that are too narrow for the disk become rough (Serra, Image Analysis and
 //! Mathematical Morphology, 1982, chapter II). The disk holds the cells whose centres are within the radius.
 //!
-//! Cells without a class, and everything beyond the edge, take no part: maxima and minima run over the cells with a
-//! class, and a cell without one stays without. On that set the operation is a closing in the strict sense: it never
-//! lowers a class, and doing it twice changes nothing more.
+//! Cells without a class, and everything beyond the edge, are ignored: maxima and minima run over the cells with a class,
+//! and a cell without a class keeps none. On that set the operation is a closing in the strict sense: it never lowers a
+//! class, and it is idempotent.
 //!
-//! The map is closed one threshold at a time, as sets. A cell is within the dilated set when some row of its disk has a
-//! cell of the set nearer, along that row, than the disk is wide there. Cost: two distances and `2 radius / cell` integer
-//! comparisons a cell, for each of two thresholds and two steps.
+//! The map is closed as sets, one threshold at a time. A cell belongs to the dilated set if, in some row of its disk, a
+//! member of the set is no farther along that row than the half width of the disk there. Cost: two distances and
+//! `2 radius / cell` integer comparisons per cell, for each of two thresholds and two steps.
 
 use crate::classes::{HIGH, NO_CLASS, SEMI};
 use rayon::prelude::*;
 use sastrugi_numeric::Grid;
 
-/// Slack on the squared radius, so that a radius of whole cells holds the cells at that distance.
+/// Tolerance on the squared radius, so that a radius of a whole number of cells includes the cells at that distance.
 const RADIUS_SLACK: f64 = 1e-9;
 
-/// The class map closed with a disk of `radius_m`; a radius that is not above 0 leaves it as it is.
+/// The class map closed with a disk of `radius_m`; unchanged unless the radius is above 0.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::{HIGH, LOW, close_disk};
+///
+/// // A gap of one cell between rough cells is closed; open ground beside them stays as it is.
+/// let classes = Grid::new(Geometry::square(1, 6, 1.0), vec![HIGH, LOW, HIGH, LOW, LOW, LOW]);
+/// assert_eq!(close_disk(&classes, 1.0).values, [HIGH, HIGH, HIGH, LOW, LOW, LOW]);
+/// ```
 pub fn close_disk(classes: &Grid<u8>, radius_m: f64) -> Grid<u8> {
     let half_widths = disk(classes, radius_m);
     let closed = [SEMI, HIGH].map(|threshold| close_set(classes, threshold, &half_widths));
@@ -35,7 +45,7 @@ fn disk(classes: &Grid<u8>, radius_m: f64) -> Vec<u32> {
     let [cell_x, cell_y] = classes.geometry.cell;
     let squared = if radius_m > 0.0 { radius_m * radius_m * (1.0 + RADIUS_SLACK) } else { 0.0 };
     let rest = |row: usize| squared - (row as f64 * cell_y) * (row as f64 * cell_y);
-    // Wider than the grid is as wide as the grid, and less than the distance that stands for "none".
+    // Capped at the width of the grid, which keeps it below the distance `u32::MAX` that marks an empty row.
     let half_width = |rest: f64| ((rest.sqrt() / cell_x) as u32).min(classes.cols() as u32);
     (0..classes.rows()).map(rest).take_while(|&rest| rest >= 0.0).map(half_width).collect()
 }
@@ -98,7 +108,7 @@ mod tests {
         ((u - 0.7) * 10.0) as usize % 3
     }
 
-    /// Largest (`pick` = max) or smallest class within the disk, cell by cell.
+    /// Reference: largest (`pick` = max) or smallest class within the disk, cell by cell.
     fn over_disk(map: &Grid<u8>, radius: f64, pick: fn(u8, u8) -> u8) -> Grid<u8> {
         let g = map.geometry;
         let near = |a: usize, b: usize| {

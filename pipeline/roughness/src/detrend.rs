@@ -1,29 +1,29 @@
-//! What a vehicle feels of a surface: heights in a band of wavelengths.
+//! Detrending: RMS height in the band of wavelengths that excite a vehicle.
 //!
 //! # What
-//! The roughness of Army practice is the RMS deviation of the heights from their local mean. What "local" means is the
-//! detrender's, and figures of different detrenders are not comparable:
-//! * [`Detrender::Band`]: wavelengths `lambda_min` to `lambda_max` of every profile along x and along y, by Fourier
-//!   transform. The reference: it keeps what it says and nothing else.
-//! * [`Detrender::MovingAverage`]: heights less their mean over `lambda_max` x `lambda_max` (the odd number of cells nearest
-//!   to it), where more than half of it holds data. The plain mean, as published, also at borders and holes: on a slope it
-//!   is off by slope times the distance of a partial window's centroid. [`crate::band_rms`] takes a plane there.
-//! * [`Detrender::Exponential`]: profiles less their mean with weights `exp(-|d| / lambda_max)`.
+//! In Army practice, roughness is the RMS deviation of the heights from their local mean. The detrender defines "local",
+//! and results of different detrenders are not comparable:
+//! * [`Detrender::Band`]: keeps wavelengths `lambda_min` to `lambda_max` of every profile along x and along y, by Fourier
+//!   transform. The reference: a sharp band with no leakage from longer or shorter waves.
+//! * [`Detrender::MovingAverage`]: heights minus their mean over `lambda_max` x `lambda_max` (the nearest odd number of
+//!   cells), where more than half of that window holds data. This is the plain mean, as published, also at borders and holes:
+//!   on a slope it is off by slope times the offset of a partial window's centroid. [`crate::band_rms`] fits a plane there.
+//! * [`Detrender::Exponential`]: profiles minus their mean with weights `exp(-|d| / lambda_max)`.
 //!
-//! The latter two keep part of the longer waves. Of a profile with density `c f^-2` the moving average leaves `pi^2 / 6`
-//! times the variance of all wavelengths below its window.
+//! The latter two keep part of the longer waves. For a profile with density `c f^-2`, the residual of the moving average has
+//! `pi^2 / 6` times the variance of all wavelengths below its window.
 //!
-//! # Profiles, not the plane
-//! A band of the two-dimensional spectrum is another band: of an isotropic surface with profiles `c f^-2`, the waves of
-//! length `lambda_min` to `lambda_max` in their own direction have `pi / 2` times the variance that profiles show in that
-//! band. Wheels roll along profiles, and all formulas of profile densities (`sigma^2 = c (lambda_max - lambda_min)`, ISO 8608)
-//! are of profiles, so the band is theirs here.
+//! # Why profiles, not the two-dimensional spectrum
+//! A band of the two-dimensional spectrum is a different band: on an isotropic surface with profile density `c f^-2`, waves
+//! of length `lambda_min` to `lambda_max` in their own direction have `pi / 2` times the variance that profiles have in that
+//! band. Wheels roll along profiles, and the formulas for profile densities (`sigma^2 = c (lambda_max - lambda_min)`, ISO
+//! 8608) hold for profiles, so the band applies to profiles here.
 //!
 //! # Edges
-//! For `Band` a profile loses the parabola that has its end slopes (least squares over a quarter of `lambda_max`), and is
-//! continued at either end by its mirror image; the two continuations fade into one another over at least 8 `lambda_max`,
-//! to a length that transforms well. `lambda_max` at each end is left out of what `Band` and `Exponential` leave. Gaps part a
-//! profile into several; those shorter than 3 `lambda_max` are left out.
+//! For `Band`, a parabola with the profile's end slopes (least squares over a quarter of `lambda_max`) is subtracted, and the
+//! profile is continued at either end by its mirror image; the two continuations are cross-faded over at least 8 `lambda_max`,
+//! to a length that transforms efficiently. `Band` and `Exponential` discard `lambda_max` at each end. Gaps split a profile;
+//! pieces shorter than 3 `lambda_max` are left out.
 //!
 //! # Source
 //! Vehicle band and local mean: *Terrain Roughness in MAVS* (documentation, Mississippi State University), which cites Durst et
@@ -44,50 +44,50 @@ pub struct WaveBand {
     max_m: f64,
 }
 
-/// Why a band of wavelengths is none, or not one of a surface.
+/// Invalid wavelength band, or a band that the surface cannot resolve.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum BandError {
-    /// Not positive, not finite, or not rising.
-    #[error("from {min_m} to {max_m} m is no band of wavelengths; it must rise, from above 0 to a finite length")]
+    /// Limits that are not positive, finite and increasing.
+    #[error("limits of a wavelength band must be positive, finite and increasing, got {min_m} to {max_m} m")]
     Order {
         /// Shortest wavelength, m.
         min_m: f64,
         /// Longest wavelength, m.
         max_m: f64,
     },
-    /// A length of a vehicle that is none.
-    #[error("a {name} of {value_m} m is none; it must be a finite number above 0")]
+    /// A vehicle dimension that is not positive and finite.
+    #[error("{name} must be positive and finite, got {value_m} m")]
     Vehicle {
         /// `wheelbase` or `tyre radius`.
         name: &'static str,
-        /// What was given, m.
+        /// Offending value, m.
         value_m: f64,
     },
-    /// Two cells do not hold the shortest wave.
-    #[error("waves of {min_m} m need cells of at most {limit_m} m, and these have {cell_m} m")]
+    /// Cells too large to resolve the shortest wavelength.
+    #[error("cells of {cell_m} m are too coarse for wavelengths of {min_m} m, which need at most {limit_m} m")]
     Coarse {
         /// Shortest wavelength, m.
         min_m: f64,
-        /// Half of it, m.
+        /// Largest cell, half the shortest wavelength, m.
         limit_m: f64,
         /// Larger side of a cell, m.
         cell_m: f64,
     },
-    /// No profile is long enough.
+    /// Surface too short for the longest wavelength.
     #[error(
-        "waves of up to {max_m} m need a surface of at least {needed_m} m along x or y, and this one has {side_m} m"
+        "a surface {side_m} m long is too short for wavelengths of up to {max_m} m, which need at least {needed_m} m along x or y"
     )]
     Short {
         /// Longest wavelength, m.
         max_m: f64,
-        /// 4 times that, m.
+        /// Required length, 4 times the longest wavelength, m.
         needed_m: f64,
         /// Longer side of the surface, m.
         side_m: f64,
     },
 }
 
-/// Length of a surface over the longest wave that is looked for.
+/// Smallest length of a surface over the longest wavelength.
 const LENGTHS_MIN: f64 = 4.0;
 
 impl WaveBand {
@@ -100,10 +100,10 @@ impl WaveBand {
         if rises { Ok(Self { min_m, max_m }) } else { Err(BandError::Order { min_m, max_m }) }
     }
 
-    /// What shakes a vehicle: wavelengths from its tyre radius to twice its wheelbase, m.
+    /// Wavelengths that excite a vehicle: from its tyre radius to twice its wheelbase, m.
     ///
     /// # Errors
-    /// Lengths that are not finite and above 0, or a tyre radius of twice the wheelbase and more.
+    /// Lengths that are not positive and finite, or a tyre radius of at least twice the wheelbase.
     pub fn of_vehicle(wheelbase_m: f64, tyre_radius_m: f64) -> Result<Self, BandError> {
         for (name, value_m) in [("wheelbase", wheelbase_m), ("tyre radius", tyre_radius_m)] {
             if !(value_m > 0.0 && value_m.is_finite()) {
@@ -128,21 +128,21 @@ impl WaveBand {
         [1.0 / self.max_m, 1.0 / self.min_m]
     }
 
-    /// Whether cells of `cell_m` hold the shortest wave.
+    /// Checks that cells of `cell_m` resolve the shortest wavelength.
     ///
     /// # Errors
-    /// [`BandError::Coarse`] when they are larger than half of it.
+    /// [`BandError::Coarse`] if they are larger than half of it.
     pub fn fits_cells(&self, cell_m: f64) -> Result<(), BandError> {
         let limit_m = 0.5 * self.min_m;
-        // A cell of 0.165 m is half of 0.33 m, whatever the last bit says.
+        // Tolerance for rounding: a cell of 0.165 m is half of 0.33 m.
         let fits = cell_m <= limit_m * (1.0 + 1e-9);
         if fits { Ok(()) } else { Err(BandError::Coarse { min_m: self.min_m, limit_m, cell_m }) }
     }
 
-    /// Whether a surface whose longer side is `side_m` has room for the longest wave.
+    /// Checks that a surface whose longer side is `side_m` is long enough for the longest wavelength.
     ///
     /// # Errors
-    /// [`BandError::Short`] when it is shorter than 4 of them.
+    /// [`BandError::Short`] if it is shorter than 4 times that wavelength.
     pub fn fits_length(&self, side_m: f64) -> Result<(), BandError> {
         let needed_m = LENGTHS_MIN * self.max_m;
         let fits = side_m >= needed_m * (1.0 - 1e-9);
@@ -150,20 +150,20 @@ impl WaveBand {
     }
 }
 
-/// How the local mean is taken off.
+/// How the local mean is removed.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum Detrender {
-    /// The band of wavelengths alone, profile by profile.
+    /// Keep only the band of wavelengths, profile by profile.
     Band,
-    /// Less the plain mean over a square of the longest wavelength, by definition at borders and holes as well.
+    /// Subtract the plain mean over a square of the longest wavelength; by definition also at borders and holes.
     MovingAverage,
-    /// Less a mean of the profile with exponential weights.
+    /// Subtract an exponentially weighted mean of the profile.
     Exponential,
 }
 
 impl Detrender {
-    /// Its name in files and messages.
+    /// Name in files and messages.
     pub fn name(self) -> &'static str {
         match self {
             Self::Band => "band",
@@ -173,8 +173,8 @@ impl Detrender {
     }
 }
 
-/// Squared heights about the local mean, m2: along x and along y, or of the plane alone ([`Detrender::MovingAverage`]). NaN
-/// where undefined.
+/// Squared heights about the local mean, m2: one grid for profiles along x and one along y, or a single grid for the surface
+/// ([`Detrender::MovingAverage`]). NaN where undefined.
 #[derive(Clone, Debug)]
 pub struct Detrended {
     squares: Vec<Grid>,
@@ -182,7 +182,7 @@ pub struct Detrended {
 }
 
 impl Detrended {
-    /// Takes the local mean off.
+    /// Removes the local mean.
     pub fn of(dem: &Grid, band: &WaveBand, detrender: Detrender) -> Self {
         let squares = match detrender {
             Detrender::MovingAverage => vec![above_average(dem, band.max_m)],
@@ -191,19 +191,19 @@ impl Detrended {
         Self { squares: squares.into_iter().map(|left| left.map(|v| v * v)).collect(), max_m: band.max_m }
     }
 
-    /// RMS along x and along y; NaN where no profile is long enough; one figure for both under a moving average.
+    /// RMS along x and along y, m; NaN if no profile is long enough; one value for both with the moving average.
     pub fn rms_along_m(&self) -> Vec<f64> {
         self.squares.iter().map(|s| sums::mean(&sums::finite(&s.values)).sqrt()).collect()
     }
 
-    /// RMS over the profiles of both directions, or of the one that has any, m; NaN without any.
+    /// RMS over the profiles of both directions, or of the only one defined, m; NaN if neither is.
     pub fn rms_m(&self) -> f64 {
         let squares: Vec<f64> = self.rms_along_m().into_iter().filter(|r| r.is_finite()).map(|r| r * r).collect();
         sums::mean(&squares).sqrt()
     }
 
-    /// RMS in a window of three times the longest wavelength, or of the surface's width, about every cell, m. NaN where the squares themselves are
-    /// undefined, and where less than a quarter of the window is defined.
+    /// RMS in a window about each cell, m; the window is three times the longest wavelength wide, or as wide as the surface. NaN where
+    /// the squares themselves are undefined, and where less than a quarter of the window is defined.
     pub fn rms_map(&self) -> Grid {
         let mean = match &self.squares[..] {
             [x, y] => sastrugi_numeric::ops::combine(x, y, mean_of_defined),
@@ -212,19 +212,19 @@ impl Detrended {
         let g = &mean.geometry;
         let half = [(g.cell[1], g.rows), (g.cell[0], g.cols)]
             .map(|(cell, count)| odd_cells(WINDOW_LENGTHS * self.max_m, cell).min(largest_odd(count)) / 2);
-        // A mean of squares: a plane through them may go below zero at a border.
-        // Running sums may leave a rounding error below zero.
+        // The plain mean, because a plane through squares may go below zero at a border.
+        // Rounding in the running sums may still give a value just below zero.
         background_of(&mean, BoxWindow { half }, AtPartial::Mean, WINDOW_SHARE_MIN)
             .map(|square| if square < 0.0 { 0.0 } else { square.sqrt() })
     }
 }
 
-/// Side of the windows of a map over the longest wavelength.
+/// Side of the window of an RMS map over the longest wavelength.
 const WINDOW_LENGTHS: f64 = 3.0;
-/// Share of such a window that must be defined: that of a corner, less what rounding takes.
+/// Share of the window that must be defined: a quarter, as in a corner, less a margin for rounding.
 const WINDOW_SHARE_MIN: f64 = 0.24;
 
-/// The largest odd number of at most `count` cells: a window no wider than the surface.
+/// Largest odd number not above `count`: a window no wider than the surface.
 fn largest_odd(count: usize) -> usize {
     count - usize::from(count.is_multiple_of(2) && count > 0)
 }
@@ -239,12 +239,12 @@ fn mean_of_defined(a: f64, b: f64) -> f64 {
 
 fn above_average(dem: &Grid, window_m: f64) -> Grid {
     let window = BoxWindow::nearest(window_m, dem.geometry.cell);
-    // The published measure is defined by the plain mean, also where a window is incomplete; `band_rms` has the plane.
+    // The published measure is defined by the plain mean, also where a window is incomplete; `band_rms` uses the plane.
     let average = background_of(dem, window, AtPartial::Mean, FILLED_SHARE_MIN);
     sastrugi_numeric::ops::combine(dem, &average, |z, mean| z - mean)
 }
 
-/// What the detrender leaves of all profiles along x, and of all along y.
+/// Detrended profiles, all along x and all along y.
 fn along_both(dem: &Grid, band: &WaveBand, detrender: Detrender) -> Vec<Grid> {
     let (rows, cols) = (dem.rows(), dem.cols());
     let [dx, dy] = dem.geometry.cell;
@@ -254,7 +254,7 @@ fn along_both(dem: &Grid, band: &WaveBand, detrender: Detrender) -> Vec<Grid> {
     [along_x, along_y].map(|values| Grid { geometry: dem.geometry, values }).into()
 }
 
-/// What is left of consecutive profiles of `n` cells.
+/// Detrends consecutive profiles of `n` cells.
 fn detrended(profiles: &[f64], n: usize, cell_m: f64, band: &WaveBand, detrender: Detrender) -> Vec<f64> {
     let filter = Filter { cell_m, band: *band, detrender, trim: (band.max_m / cell_m).ceil() as usize };
     let transforms = filter.transforms(profiles, n);
@@ -268,7 +268,7 @@ fn detrended(profiles: &[f64], n: usize, cell_m: f64, band: &WaveBand, detrender
     left
 }
 
-/// Runs of at least `shortest` cells with data: first cell, and the one behind the last.
+/// Runs of at least `shortest` cells with data, each as its first cell and the one after its last.
 pub(crate) fn runs(profile: &[f64], shortest: usize) -> Vec<[usize; 2]> {
     let mut runs = Vec::new();
     let mut start = 0;
@@ -283,27 +283,27 @@ pub(crate) fn runs(profile: &[f64], shortest: usize) -> Vec<[usize; 2]> {
     runs
 }
 
-/// The detrending of profiles with one cell.
+/// Detrending of profiles with a given cell size.
 struct Filter {
     cell_m: f64,
     band: WaveBand,
     detrender: Detrender,
-    /// Cells left out at each end.
+    /// Cells discarded at each end.
     trim: usize,
 }
 
 impl Filter {
-    /// Fewest cells of a run.
+    /// Fewest cells in a run.
     fn shortest(&self) -> usize {
         3 * self.trim
     }
 
-    /// Length of a run with what continues it.
+    /// Length of a run including its continuation.
     fn continued_length(&self, run: usize) -> usize {
         smooth_length(run + FADE_LENGTHS * self.trim)
     }
 
-    /// Transforms of the continued runs, by their lengths.
+    /// Transforms of the continued runs, by length.
     fn transforms(&self, profiles: &[f64], n: usize) -> BTreeMap<usize, Transform> {
         if self.detrender != Detrender::Band {
             return BTreeMap::new();
@@ -317,7 +317,7 @@ impl Filter {
         lengths.into_par_iter().map(|len| (len, Transform::new(len))).collect()
     }
 
-    /// What is left of one run; its ends stay as they are.
+    /// Writes one detrended run to `out`, except for its trimmed ends.
     fn run(&self, run: &[f64], transform: Option<&Transform>, out: &mut [f64]) {
         let left = match transform {
             Some(transform) => {
@@ -330,7 +330,7 @@ impl Filter {
         out[inner.clone()].copy_from_slice(&left[inner]);
     }
 
-    /// The band of the continued run.
+    /// Band-pass of the continued run.
     fn in_band(&self, run: &[f64], transform: &Transform) -> Vec<f64> {
         let (n, len) = (run.len(), transform.len());
         let mut scratch = transform.scratch();
@@ -349,17 +349,17 @@ impl Filter {
     }
 }
 
-/// Longest wavelengths from which the slope at an end is taken.
+/// Length over which the slope at an end is fitted, in longest wavelengths.
 const SLOPE_LENGTHS: f64 = 0.25;
-/// Longest wavelengths over which the continuations of both ends fade into one another.
+/// Length over which the continuations of both ends are cross-faded, in longest wavelengths.
 const FADE_LENGTHS: usize = 8;
 
-/// Cell `k` of `gap` cells between the end of a run and its beginning, one period on.
+/// Cell `k` of the `gap` cells between the end of a run and the start of its next period.
 fn continued(run: &[f64], k: usize, gap: usize) -> f64 {
     let n = run.len();
-    let mirrored = |place: usize| {
-        let place = place % (2 * n);
-        run[place.min(2 * n - 1 - place)]
+    let mirrored = |index: usize| {
+        let index = index % (2 * n);
+        run[index.min(2 * n - 1 - index)]
     };
     let (after, before) = (mirrored(n + k), mirrored(gap - 1 - k));
     let t = (k as f64 + 0.5) / gap as f64;
@@ -367,7 +367,8 @@ fn continued(run: &[f64], k: usize, gap: usize) -> f64 {
     after + weight * (before - after)
 }
 
-/// The profile less the parabola that has the slopes of the least-squares lines through its first and last `reach` cells.
+/// The profile minus the parabola whose end slopes are those of the least-squares lines through its first and last `reach`
+/// cells, centred on zero.
 fn without_parabola(profile: &[f64], reach: usize) -> Vec<f64> {
     let n = profile.len();
     let reach = reach.clamp(2, n);
@@ -392,7 +393,7 @@ fn slope(profile: &[f64]) -> f64 {
     along / squares
 }
 
-/// Profile less its mean with weights `ratio^|d|` over the cells of the profile.
+/// Profile minus its mean with weights `ratio^|d|` over the cells of the profile.
 fn above_exponential_mean(profile: &[f64], ratio: f64) -> Vec<f64> {
     let forward = decayed(profile.iter(), ratio);
     let mut backward = decayed(profile.iter().rev(), ratio);
@@ -401,7 +402,7 @@ fn above_exponential_mean(profile: &[f64], ratio: f64) -> Vec<f64> {
     profile.iter().zip(&forward).zip(&backward).map(mean).collect()
 }
 
-/// Sums `s_k = z_k + ratio s_(k-1)` of the values and of ones.
+/// Recursive sums `s_k = z_k + ratio s_(k-1)` of the values and of ones.
 fn decayed<'a>(values: impl Iterator<Item = &'a f64>, ratio: f64) -> Vec<[f64; 2]> {
     let step = |so_far: &mut [f64; 2], z: &f64| {
         *so_far = [z + ratio * so_far[0], 1.0 + ratio * so_far[1]];

@@ -1,14 +1,24 @@
 //! Gradients between neighbouring cells.
 //!
 //! The Moore-neighbourhood gradient of a cell is `max |z_P - z_Q| / dist(P, Q)` over its eight neighbours Q, in m/m
-//! (Majhor and Bos, Eq. 3 and 4; theirs is in 16-bit levels per cm). It is a steepness between single cells, larger than
-//! the slope of a fitted plane on rough ground. Cost: eight differences a cell.
+//! (Majhor and Bos, Eq. 3 and 4, who give it in 16-bit levels per cm). It is the steepness between two cells, and on rough
+//! ground exceeds the slope of a fitted plane. Cost: eight differences per cell.
 
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, sums};
 
-/// Largest absolute gradient to the eight neighbours, m/m. Neighbours without data, or beyond the edge, are skipped; a
-/// cell without data, or without any neighbour with data, is NaN.
+/// Largest absolute gradient to the eight neighbours, m/m. Neighbours without data or beyond the edge are skipped; a cell
+/// without data, or with no valid neighbour, is NaN.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// let row = Grid::new(Geometry::square(1, 4, 0.5), vec![0.0, 1.0, 1.0, f64::NAN]);
+/// let gradient = sastrugi_roughness::moore_gradient(&row);
+/// assert_eq!(gradient.values[..3], [2.0, 2.0, 0.0]);
+/// assert!(gradient.values[3].is_nan());
+/// ```
 pub fn moore_gradient(dem: &Grid) -> Grid {
     let (rows, cols) = (dem.rows(), dem.cols());
     let [east, north] = dem.geometry.cell;
@@ -28,16 +38,25 @@ pub fn moore_gradient(dem: &Grid) -> Grid {
     Grid { geometry: dem.geometry, values }
 }
 
-/// Raises each value of `steepest` to the gradient between the two lines, as far as the shortest of the three reaches.
-/// `f64::max` drops a NaN beside a number, which is the rule for cells without data.
+/// Raises each value of `steepest` to the gradient between `a` and `b`, up to the length of the shortest slice.
+/// `f64::max` ignores a NaN operand, which skips cells without data.
 fn steepen(steepest: &mut [f64], a: &[f64], b: &[f64], per_metre: f64) {
     for ((s, a), b) in steepest.iter_mut().zip(a).zip(b) {
         *s = s.max((a - b).abs() * per_metre);
     }
 }
 
-/// Root mean square of the gradient's magnitude by central differences, m/m, over the cells whose four neighbours have
-/// data; NaN when there is none.
+/// Root mean square gradient magnitude by central differences, m/m, over the cells whose four neighbours have data; NaN if
+/// there are none.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// let geometry = Geometry::square(5, 6, 0.5);
+/// let plane = Grid::new(geometry, (0..30).map(|k| 3.0 * geometry.x(k % 6) + 4.0 * geometry.y(k / 6)).collect());
+/// assert!((sastrugi_roughness::rms_slope(&plane) - 5.0).abs() < 1e-12);
+/// ```
 pub fn rms_slope(dem: &Grid) -> f64 {
     let (rows, cols) = (dem.rows(), dem.cols());
     if rows < 3 || cols < 3 {
@@ -88,7 +107,7 @@ mod tests {
         Grid::new(geometry, (0..rows * cols).map(|_| value(&mut s)).collect())
     }
 
-    /// Cell by cell, neighbour by neighbour.
+    /// Reference: loop over cells and neighbours.
     fn direct(dem: &Grid, row: usize, col: usize) -> f64 {
         let mut steepest = f64::NAN;
         for r in row.saturating_sub(1)..=(row + 1).min(dem.rows() - 1) {
@@ -123,11 +142,26 @@ mod tests {
     }
 
     #[test]
-    fn val_slopes_by_axis_make_up_the_slope() {
+    fn val_slopes_by_axis_add_up_to_the_slope() {
         let dem = noise_with_holes(30, 40);
         let [x, y] = rms_slopes(&dem);
         assert!(((x * x + y * y).sqrt() / rms_slope(&dem) - 1.0).abs() < 1e-12);
         assert!(rms_slopes(&dem.window(0, 0, 2, 9))[0].is_nan());
+    }
+
+    /// `z = x^2 / 2` on cells of 1 m, whose central difference is x. The four neighbours of a hole are left out; the hole itself counts,
+    /// because its own four neighbours have data.
+    #[test]
+    fn val_slopes_beside_a_hole() {
+        let g = Geometry::square(5, 6, 1.0);
+        let mut dem = Grid::new(g, (0..30).map(|k| 0.5 * g.x(k % 6) * g.x(k % 6)).collect());
+        dem.values[2 * 6 + 2] = f64::NAN;
+        // Rows 1, 2 and 3, columns 1 to 4.
+        let slopes: [f64; 8] = [1.5, 3.5, 4.5, 2.5, 4.5, 1.5, 3.5, 4.5];
+        let expected = (slopes.iter().map(|s| s * s).sum::<f64>() / 8.0).sqrt();
+        assert!((rms_slope(&dem) - expected).abs() < 1e-12, "{}", rms_slope(&dem));
+        let [x, y] = rms_slopes(&dem);
+        assert!((x - expected).abs() < 1e-12 && y == 0.0, "{x} {y}");
     }
 
     #[test]
@@ -138,7 +172,7 @@ mod tests {
         assert!((rms_slope(&dem) - 0.5).abs() < 1e-12);
         let [x, y] = rms_slopes(&dem);
         assert!((x - 0.3).abs() < 1e-12 && (y - 0.4).abs() < 1e-12);
-        // The steepest neighbour is the diagonal one: (0.3 * 0.5 + 0.4 * 0.25) / hypot(0.5, 0.25).
+        // The steepest gradient is the diagonal one: (0.3 * 0.5 + 0.4 * 0.25) / hypot(0.5, 0.25).
         let steepest = 0.25 / (0.5f64 * 0.5 + 0.25 * 0.25).sqrt();
         assert!((moore_gradient(&dem).at(3, 4) - steepest).abs() < 1e-12);
         assert!(rms_slope(&dem.window(0, 0, 2, 2)).is_nan());

@@ -3,14 +3,14 @@
 use sastrugi_numeric::{Grid, sums};
 use serde::Serialize;
 
-/// Moments and range of the heights of the cells with data; NaN where there are none.
+/// Moments and range of the heights of the cells with data; NaN if there are none.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct HeightStatistics {
     /// Lowest height, m.
     pub min_m: f64,
     /// Highest height, m.
     pub max_m: f64,
-    /// Highest less lowest height, m.
+    /// Highest minus lowest height, m.
     pub relief_m: f64,
     /// Standard deviation about the mean (divided by n), m.
     pub rms_m: f64,
@@ -51,8 +51,8 @@ pub struct HistogramBin {
     pub density_per_m: f64,
 }
 
-/// Histogram with `bins` bins of one width from the lowest to the highest height (which counts to the last bin). Empty
-/// when no cell has data or all heights are equal.
+/// Histogram with `bins` bins of equal width from the lowest to the highest height (which belongs to the last bin). Empty
+/// if no cell has data or all heights are equal.
 pub fn histogram(dem: &Grid, bins: usize) -> Vec<HistogramBin> {
     let Some((low, high)) = dem.range().filter(|(low, high)| high > low) else { return Vec::new() };
     let edge = |k: usize| low + (high - low) * (k as f64 / bins as f64);

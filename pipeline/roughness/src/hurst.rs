@@ -1,23 +1,23 @@
 //! Hurst exponent from the structure function.
 //!
 //! A self-affine surface has `D(h) = <(z(x + h) - z(x))^2> ~ |h|^(2H)`, 0 < H < 1 (Mandelbrot and Van Ness, 1968; H = 0 for
-//! white noise, 1 for a plane). H is half the slope of log D over log h: ordinary least squares over lags along x and along
-//! y, half an octave apart, with one slope and an intercept of its own for either axis, so that neither oblong cells nor
-//! anisotropy tilt it. The range of lags is part of the figure: from 1 cell to an eighth of the shorter side unless another
-//! is asked for. On a surface with an inner or an outer scale, H belongs to that range alone.
+//! white noise, 1 for a plane). H is half the slope of log D over log h, by ordinary least squares over lags along x and along
+//! y, half an octave apart, with a common slope and a separate intercept for each axis, so that neither oblong cells nor
+//! anisotropy bias it. H depends on the range of lags, by default from 1 cell to an eighth of the shorter side. On a surface
+//! with an inner or an outer scale, H holds for that range only.
 //!
 //! Standard error: delete-one jackknife over 4 x 4 blocks of the surface (a pair belongs to the block of its western or
-//! northern cell): sampling error within this surface, not misfit of the power law.
+//! northern cell). It covers sampling error within this surface, not misfit of the power law.
 //!
-//! Cost: one difference a cell and lag.
+//! Cost: one difference per cell and lag.
 
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, sums};
 use serde::Serialize;
 
-/// Blocks along each axis, left out in turn.
+/// Blocks along each axis; the jackknife leaves out one at a time.
 const BLOCKS: usize = 4;
-/// Largest lag over the shorter side, unless asked for.
+/// Default largest lag over the shorter side.
 const LAG_SHARE: f64 = 1.0 / 8.0;
 /// Lags per doubling.
 const LAGS_PER_OCTAVE: f64 = 2.0;
@@ -35,7 +35,20 @@ pub struct Hurst {
     pub lags_m: [f64; 2],
 }
 
-/// Hurst exponent over `lags_m` (to the nearest cell). `None` with fewer than three lags along an axis, or where a lag has no pair.
+/// Hurst exponent over `lags_m` (to the nearest cell). `None` with fewer than three lags along an axis, or if a lag has no pairs.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::hurst;
+///
+/// let geometry = Geometry::square(64, 64, 0.5);
+/// let plane = Grid::new(geometry, (0..64 * 64).map(|k| geometry.x(k % 64) - 2.0 * geometry.y(k / 64)).collect());
+/// let found = hurst(&plane, Some([0.5, 4.0])).unwrap();
+/// assert!((found.exponent - 1.0).abs() < 1e-9);
+/// assert_eq!(found.lags_m, [0.5, 4.0]);
+/// assert!(hurst(&Grid::filled(geometry, 1.0), None).is_none());
+/// ```
 pub fn hurst(dem: &Grid, lags_m: Option<[f64; 2]>) -> Option<Hurst> {
     let g = &dem.geometry;
     let side = g.size()[0].min(g.size()[1]);
@@ -60,8 +73,8 @@ struct Lag {
     lag_m: f64,
 }
 
-/// Whole lags from the one nearest to the lower end up to the upper, half an octave apart where that is more than a cell; at
-/// most half the side.
+/// Lags in whole cells, from the one nearest to the lower end up to the upper end, half an octave apart where that exceeds one
+/// cell; at most half the side.
 fn lags_along(axis: usize, dem: &Grid, [low, high]: [f64; 2]) -> Vec<Lag> {
     let cell = dem.geometry.cell[axis];
     let most = [dem.cols(), dem.rows()][axis] / 2;
@@ -75,7 +88,7 @@ fn lags_along(axis: usize, dem: &Grid, [low, high]: [f64; 2]) -> Vec<Lag> {
     all.into_iter().map(lag).take_while(|l| l.lag_m <= high * (1.0 + 1e-9)).collect()
 }
 
-/// Sum of squared increments, and pairs.
+/// Sum of squared increments, and number of pairs.
 #[derive(Clone, Copy, Default)]
 struct Sum {
     squares: f64,
@@ -109,10 +122,10 @@ fn sums_by_block(dem: &Grid, lag: &Lag) -> Vec<Sum> {
     blocks
 }
 
-/// Values added up side by side, in an order that no machine changes.
+/// Number of parallel accumulators; fixed, so that the order of summation is the same on every machine.
 const LANES: usize = 8;
 
-/// Sum over two runs of cells, side by side.
+/// Sum over the pairs of two equally long runs of cells.
 fn of_run(a: &[f64], b: &[f64]) -> Sum {
     let mut lanes = [Sum::default(); LANES];
     let mut add = |lane: usize, a: f64, b: f64| {
@@ -121,16 +134,16 @@ fn of_run(a: &[f64], b: &[f64]) -> Sum {
         lanes[lane].squares += square;
         lanes[lane].pairs += pair;
     };
-    let (whole_a, rest_a) = a.as_chunks::<LANES>();
-    let (whole_b, rest_b) = b.as_chunks::<LANES>();
-    for (a, b) in whole_a.iter().zip(whole_b) {
+    let (chunks_a, rest_a) = a.as_chunks::<LANES>();
+    let (chunks_b, rest_b) = b.as_chunks::<LANES>();
+    for (a, b) in chunks_a.iter().zip(chunks_b) {
         (0..LANES).for_each(|k| add(k, a[k], b[k]));
     }
     rest_a.iter().zip(rest_b).for_each(|(a, b)| add(0, *a, *b));
     lanes.into_iter().fold(Sum::default(), Sum::and)
 }
 
-/// Half the common slope of the lags' logarithms.
+/// Half the common slope of log D over log h.
 fn slope(lags: &[Lag], blocks: &[Vec<Sum>], left_out: Option<usize>) -> Option<f64> {
     let joined = |sums: &Vec<Sum>| {
         let kept = sums.iter().enumerate().filter(|(k, _)| Some(*k) != left_out);
@@ -167,7 +180,8 @@ mod tests {
         let dem = Grid::new(g, (0..g.len()).map(|k| 0.3 * g.x(k % 120) + g.y(k / 120)).collect());
         let found = hurst(&dem, None).unwrap();
         assert!((found.exponent - 1.0).abs() < 1e-10 && found.standard_error < 1e-10, "{found:?}");
-        assert!(found.lags_m[0] >= 0.8 && found.lags_m[1] <= 7.5 + 1e-9);
+        // From the coarser cell, 0.8 m, to at most an eighth of 60 m: 2, 3, 5, 6, 9 and 13 cells along x, 1, 2, 3, 4, 6 and 8 along y.
+        assert!((found.lags_m[0] - 0.8).abs() < 1e-12 && (found.lags_m[1] - 6.5).abs() < 1e-12, "{found:?}");
     }
 
     /// White noise: H = 0. Threshold 7 jackknife standard errors (of 16 blocks: t of 15 degrees of freedom, 4e-6), which
@@ -183,7 +197,7 @@ mod tests {
         }
     }
 
-    /// Sums of two Brownian lines, one along each axis: H = 1/2 exactly along both. Threshold as above.
+    /// The sum of two Brownian lines, one along each axis: H = 1/2 exactly along both. Threshold as above.
     #[test]
     fn stat_brownian_lines_have_exponent_one_half() {
         let mut s = stream("walk");
@@ -205,15 +219,15 @@ mod tests {
         assert!(found.standard_error < 0.08, "{found:?}");
     }
 
-    /// Density `f^(-2 (H + 1))` at a mode of a surface sampled every cell, f in modes: what lies beyond the Nyquist frequency
-    /// is folded back, as sampling does.
+    /// Density `f^(-2 (H + 1))` at a mode of a surface sampled every cell, f in modes, including aliases from beyond the Nyquist
+    /// frequency.
     fn sampled_density(kx: f64, ky: f64, n: f64, h: f64) -> f64 {
         let aliases = (-2..=2).flat_map(|i| (-2..=2).map(move |j| (kx + f64::from(i) * n, ky + f64::from(j) * n)));
         aliases.map(|(x, y)| libm::pow(x * x + y * y, -h - 1.0)).sum()
     }
 
-    /// Periodic surfaces of exponent H, at lags of 1 to 4 cells of 256. What is missing below one cycle a period raises H by
-    /// 0.01 to 0.03, sampling scatters by 0.01; tolerance 0.06. Catches the slope of D taken for H, and semivariances of
+    /// Periodic surfaces of exponent H, at lags of 1 to 4 cells of 256. The missing power below one cycle per period raises H by
+    /// 0.01 to 0.03, sampling scatters by 0.01; tolerance 0.06. Catches the slope of D mistaken for H, and semivariances at
     /// wrong lags.
     #[test]
     fn stat_fractional_surfaces() {
@@ -237,7 +251,7 @@ mod tests {
     }
 
     #[test]
-    fn val_nothing_to_fit() {
+    fn val_surfaces_without_a_hurst_exponent() {
         assert!(hurst(&Grid::filled(Geometry::square(300, 300, 1.0), f64::NAN), None).is_none());
         assert!(hurst(&Grid::filled(Geometry::square(300, 300, 1.0), 1.0), None).is_none());
         assert!(hurst(&Grid::filled(Geometry::square(3, 3, 1.0), 1.0), None).is_none());

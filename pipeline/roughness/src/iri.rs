@@ -1,20 +1,19 @@
 //! International Roughness Index of profiles.
 //!
 //! # What
-//! A quarter of the "golden car" is driven over the profile at 80 km/h; the index is the mean of the absolute speed of its
-//! suspension over that of the car, in m/km. With sprung height z_s, unsprung height z_u and ground h,
+//! The "golden car" quarter-car model is driven over the profile at 80 km/h. The index is the mean absolute suspension
+//! velocity divided by the speed of the car, in m/km. With sprung height z_s, unsprung height z_u and ground h,
 //! $$ \ddot z_s = -c(\dot z_s - \dot z_u) - k_2 (z_s - z_u) , \quad
 //!    \mu \ddot z_u = c(\dot z_s - \dot z_u) + k_2 (z_s - z_u) + k_1 (h - z_u) , $$
-//! c = 6 /s, k_1 = 653 /s2, k_2 = 63.3 /s2, mu = 0.15. The profile enters by its slope over 250 mm (the whole number of
-//! cells nearest to it), constant from cell to cell, for which the state has an exact step. The car starts with the slope
-//! of the first 11 m.
+//! c = 6 /s, k_1 = 653 /s2, k_2 = 63.3 /s2, mu = 0.15. The input is the slope of the profile over 250 mm (rounded to whole
+//! cells), constant between cells, for which the state is advanced exactly. The car starts with the slope of the first 11 m.
 //!
 //! # Source
 //! M. W. Sayers, On the calculation of international roughness index from longitudinal road profile, Transportation Research
 //! Record 1501 (1995) 1-12; ASTM E1926.
 //!
 //! # When not to use it
-//! It is the index of roads. Cells of more than 0.3 m, and profiles below 20 m, have none.
+//! The index is defined for roads. It is undefined for cells above 0.3 m and for profiles below 20 m.
 
 use crate::band::transposed;
 use crate::detrend::runs;
@@ -34,26 +33,26 @@ const SUSPENSION_STIFFNESS: f64 = 63.3;
 const MASS_RATIO: f64 = 0.15;
 /// Length over which the tyre envelops the profile, m.
 const BASE_M: f64 = 0.25;
-/// Start of the profile that gives the car its first slope, m.
+/// Length at the start of the profile whose slope initialises the car, m.
 const START_M: f64 = 11.0;
 /// Shortest profile, m.
 const LENGTH_MIN_M: f64 = 20.0;
 /// Largest cell, m.
 const CELL_MAX_M: f64 = 0.3;
-/// Halvings of a step before its exponential series, and terms of that series.
+/// Halvings of a step before its exponential series, and number of terms of that series.
 const HALVINGS: u32 = 10;
 const TERMS: u32 = 14;
 
-/// Index of a surface: the mean of its profiles, NaN where they are too short or too coarse.
+/// IRI of a surface: the mean over its profiles; NaN if they are too short or too coarse.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Iri {
-    /// Of the profiles along x, m/km.
+    /// Mean of the profiles along x, m/km.
     pub along_x_m_km: f64,
-    /// Of the profiles along y, m/km.
+    /// Mean of the profiles along y, m/km.
     pub along_y_m_km: f64,
 }
 
-/// Index of all profiles along x (eastwards), and of all along y (southwards). Gaps part a profile into several.
+/// IRI of all profiles along x (driven eastwards), and of all along y (southwards). Gaps split a profile.
 pub fn iri(dem: &Grid) -> Iri {
     let [dx, dy] = dem.geometry.cell;
     let by_col = transposed(&dem.values, dem.rows(), dem.cols());
@@ -68,7 +67,21 @@ fn mean_index(profiles: &[f64], n: usize, cell_m: f64) -> f64 {
     sums::mean(&indices.concat())
 }
 
-/// Index of a profile of heights in m, m/km; `None` below 20 m, with cells above 0.3 m, and with gaps.
+/// IRI of a profile of heights in m, m/km; `None` below 20 m, with cells above 0.3 m, or with gaps.
+///
+/// # Examples
+/// ```
+/// use sastrugi_roughness::iri_of_profile;
+///
+/// // 100 m of a uniform grade, and with a step of 1 cm in the middle, or of 2 cm: the index is linear in the profile.
+/// let profile = |step_m: f64| -> Vec<f64> {
+///     (0..1000).map(|k| 0.02 * f64::from(k) + if k < 500 { 0.0 } else { step_m }).collect()
+/// };
+/// let [grade, one, two] = [0.0, 0.01, 0.02].map(|step_m| iri_of_profile(&profile(step_m), 0.1).unwrap());
+/// assert!(grade < 1e-9 && one > 0.1);
+/// assert!((two / one - 2.0).abs() < 1e-9);
+/// assert_eq!(iri_of_profile(&profile(0.0)[..100], 0.1), None);
+/// ```
 pub fn iri_of_profile(heights: &[f64], cell_m: f64) -> Option<f64> {
     let base = ((BASE_M / cell_m).round() as usize).max(1);
     let fine = cell_m > 0.0 && cell_m <= CELL_MAX_M * (1.0 + 1e-9);
@@ -91,8 +104,8 @@ pub fn iri_of_profile(heights: &[f64], cell_m: f64) -> Option<f64> {
 
 type Matrix = [[f64; 5]; 5];
 
-/// What a time step makes of the slopes of sprung and unsprung mass, of their rates, and of a constant slope of the ground:
-/// the exponential of the motion's matrix.
+/// Transition matrix of a time step, for the slopes of sprung and unsprung mass, their rates, and a constant ground slope:
+/// the exponential of the system matrix.
 fn step(time_s: f64) -> Matrix {
     let (k1, k2, c, mu) = (TYRE_STIFFNESS, SUSPENSION_STIFFNESS, DAMPING, MASS_RATIO);
     let motion = [
@@ -124,8 +137,8 @@ mod tests {
     use sastrugi_numeric::fft::Complex64;
     use std::f64::consts::{PI, TAU};
 
-    /// Index of a sine of a wavelength over its mean slope: the transfer function of the car, solved by hand, times that of a
-    /// slope over the base, times pi / 2 (the mean of a rectified slope is 4 a / lambda).
+    /// IRI of a sine divided by its mean slope: the transfer function of the car, solved by hand, times that of a slope over
+    /// the base (the mean of a rectified slope is 4 a / lambda).
     fn gain(wavelength_m: f64, base_m: f64) -> f64 {
         let omega = TAU * SPEED_M_S / wavelength_m;
         let suspension = Complex64::new(SUSPENSION_STIFFNESS, DAMPING * omega);
@@ -143,7 +156,7 @@ mod tests {
         iri_of_profile(&heights, cell_m).unwrap()
     }
 
-    /// Steady motion over 2 km of sines, whose start is under 0.5 % of it.
+    /// Steady motion over 2 km of sines; the start-up transient is below 0.5 % of it.
     #[test]
     fn val_sines_have_the_index_of_the_transfer_function() {
         for wavelength in [0.8, 1.3, 2.4, 5.0, 8.0, 15.4, 30.0, 60.0] {
@@ -153,7 +166,7 @@ mod tests {
         }
     }
 
-    /// Sayers and Karamihas, The Little Book of Profiling (1998), section on the index: its gain for slope peaks at
+    /// Sayers and Karamihas, The Little Book of Profiling (1998), section on the IRI: its gain for slope peaks at
     /// wavelengths near 15 m and 2.4 m, and has fallen to one half at about 30 m and 1.25 m.
     #[test]
     fn val_the_gain_has_its_published_peaks() {
@@ -167,8 +180,59 @@ mod tests {
         assert!((gain(30.0, 0.25) - 0.5).abs() < 0.1 && (gain(1.25, 0.25) - 0.5).abs() < 0.15);
     }
 
+    /// The equations of the header, integrated by Runge-Kutta steps a fortieth of a cell long, from the mean slope of the first 11 m: over
+    /// a ramp that ends after half of them, so that the car starts out of balance.
     #[test]
-    fn prop_the_index_is_linear_and_blind_to_planes() {
+    fn val_the_index_equals_an_integration() {
+        let cell: f64 = 0.05;
+        let heights: Vec<f64> = (0..600)
+            .map(|k| f64::from(k) * cell)
+            .map(|x| 0.02 * x.min(5.5) + 0.01 * libm::sin(TAU * x / 3.1) * x / 30.0)
+            .collect();
+        let (start, base) = (220, 5);
+        let first = (heights[start] - heights[0]) / 11.0;
+        let mut state = [first, 0.0, first, 0.0];
+        let step_s = cell / (80.0 / 3.6) / 40.0;
+        let mut strokes = 0.0;
+        for k in 0..600 - base {
+            let ground = (heights[k + base] - heights[k]) / 0.25;
+            let rate = |[s, ds, u, du]: [f64; 4]| {
+                let suspension = 6.0 * (ds - du) + 63.3 * (s - u);
+                [ds, -suspension, du, (suspension + 653.0 * (ground - u)) / 0.15]
+            };
+            for _ in 0..40 {
+                let ahead =
+                    |r: [f64; 4], share: f64| -> [f64; 4] { std::array::from_fn(|i| state[i] + share * step_s * r[i]) };
+                let a = rate(state);
+                let b = rate(ahead(a, 0.5));
+                let c = rate(ahead(b, 0.5));
+                let d = rate(ahead(c, 1.0));
+                state = std::array::from_fn(|i| state[i] + step_s / 6.0 * (a[i] + 2.0 * b[i] + 2.0 * c[i] + d[i]));
+            }
+            strokes += (state[0] - state[2]).abs();
+        }
+        let expected = 1000.0 * strokes / (600 - base) as f64;
+        let found = iri_of_profile(&heights, cell).unwrap();
+        assert!(expected > 0.1 && (found / expected - 1.0).abs() < 1e-7, "{found} {expected}");
+    }
+
+    /// Ridges across y on oblong cells: profiles along x are level, and those along y have their own cell size. Pieces beside a gap that
+    /// are shorter than 20 m are left out.
+    #[test]
+    fn val_each_axis_has_its_own_profiles() {
+        let g = Geometry { rows: 150, cols: 250, cell: [0.1, 0.2], origin: [0.0; 2] };
+        let sine: Vec<f64> = (0..150).map(|r| 0.01 * libm::sin(TAU * 0.2 * f64::from(r) / 5.0)).collect();
+        let mut dem = Grid::new(g, (0..g.len()).map(|k| sine[k / 250]).collect());
+        let expected = iri_of_profile(&sine, 0.2).unwrap();
+        for _ in 0..2 {
+            let found = iri(&dem);
+            assert!(found.along_x_m_km < 1e-9 && (found.along_y_m_km / expected - 1.0).abs() < 1e-12, "{found:?}");
+            dem.values[75 * 250 + 20] = f64::NAN;
+        }
+    }
+
+    #[test]
+    fn prop_the_index_is_linear_and_unaffected_by_planes() {
         let index = index_of_sine(0.01, 5.0, 0.1);
         assert!((index_of_sine(0.03, 5.0, 0.1) / index - 3.0).abs() < 1e-9);
         let plane: Vec<f64> = (0..1000).map(|k| 3.0 + 0.02 * f64::from(k)).collect();
@@ -176,7 +240,7 @@ mod tests {
     }
 
     #[test]
-    fn val_what_has_no_index() {
+    fn val_short_coarse_or_empty_profiles_have_no_index() {
         assert_eq!(iri_of_profile(&[0.0; 100], 0.1), None);
         assert_eq!(iri_of_profile(&[0.0; 1000], 0.4), None);
         assert_eq!(iri_of_profile(&[f64::NAN; 1000], 0.1), None);
@@ -185,8 +249,8 @@ mod tests {
         assert!(strip.along_x_m_km == 0.0 && strip.along_y_m_km.is_nan());
     }
 
-    /// Coefficients of the published program for heights 0.25 m apart (Sayers, Gillespie and Paterson, World Bank Technical Paper 46, 1986;
-    /// also ASTM E1926): seven digits.
+    /// Coefficients of the published program for heights 0.25 m apart (Sayers, Gillespie and Paterson, World Bank Technical
+    /// Paper 46, 1986; also ASTM E1926), to seven digits.
     #[test]
     fn val_the_step_has_the_published_coefficients() {
         let published = [
@@ -201,14 +265,14 @@ mod tests {
         }
     }
 
-    /// The step of 0.3 m is that of 2^k parts of it, and slow motion follows the ground.
+    /// A step of 0.3 m equals two steps of 0.15 m, and slow motion follows the ground.
     #[test]
     fn val_the_step_is_an_exponential() {
-        let (whole, half) = (step(0.3 / SPEED_M_S), step(0.15 / SPEED_M_S));
+        let (full, half) = (step(0.3 / SPEED_M_S), step(0.15 / SPEED_M_S));
         let twice = multiply(&half, &half);
-        let differs = |i: usize, j: usize| (whole[i][j] - twice[i][j]).abs() / (1.0 + whole[i][j].abs());
-        assert!((0..25).all(|k| differs(k / 5, k % 5) < 1e-10), "{whole:?} {twice:?}");
-        // A state at rest on a slope stays there: rows sum to it.
-        assert!((whole[0][0] + whole[0][2] + whole[0][4] - 1.0).abs() < 1e-10);
+        let differs = |i: usize, j: usize| (full[i][j] - twice[i][j]).abs() / (1.0 + full[i][j].abs());
+        assert!((0..25).all(|k| differs(k / 5, k % 5) < 1e-10), "{full:?} {twice:?}");
+        // A state at rest on a constant slope stays at rest: the slope coefficients sum to 1.
+        assert!((full[0][0] + full[0][2] + full[0][4] - 1.0).abs() < 1e-10);
     }
 }

@@ -1,15 +1,14 @@
-//! Sums over all pairs of cells with data, at every lag up to a bound: what structure functions and autocorrelations are
-//! made of.
+//! Sums over all pairs of cells with data, at every lag up to a bound: the basis of structure function and autocorrelation.
 //!
-//! For z = 0 where there is no data, and the mask m,
+//! With z = 0 where there is no data, and the mask m,
 //! `N(h) = sum of m(i) m(i + h)`, `P(h) = sum of z(i) z(i + h)`, `Q(h) = sum of [z^2(i) m(i + h) + m(i) z^2(i + h)]`
 //! over all cells i, so that the mean squared increment is `D(h) = (Q - 2 P) / N` and the autocovariance `P / N`
-//! (Marcotte, Computers & Geosciences 22 (1996) 1175). P, N and Q are correlations, hence Fourier transforms of the padded
-//! fields. Without holes N and Q need none: N is a product, Q comes from a table of cumulative sums.
+//! (Marcotte, Computers & Geosciences 22 (1996) 1175). P, N and Q are correlations, computed by Fourier transforms of the
+//! padded fields. Without holes N and Q need no transform: N is a product, Q comes from a table of cumulative sums.
 //!
-//! Rounding: about 1e-14 of the sum of squares, so that D of a smooth surface is known to that share of its variance.
+//! Rounding error: about 1e-14 of the sum of squares, so the error in D of a smooth surface is that share of its variance.
 //!
-//! Cost: 2 transforms of the padded grid (6 with holes); about 60 bytes a cell.
+//! Cost: 2 transforms of the padded grid (6 with holes); about 60 bytes per cell.
 
 use rayon::prelude::*;
 use sastrugi_numeric::Grid;
@@ -20,7 +19,7 @@ use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 pub struct LagSums {
     /// Largest lag in cells, north-south and east-west.
     pub max_lag: [usize; 2],
-    /// For `drow` in `0..=max_lag[0]` (outer) and `dcol` in `-max_lag[1]..=max_lag[1]` (inner).
+    /// Ordered by `drow` in `0..=max_lag[0]` (outer) and `dcol` in `-max_lag[1]..=max_lag[1]` (inner).
     sums: Vec<PairSum>,
 }
 
@@ -39,7 +38,7 @@ impl PairSum {
     /// Mean squared increment; NaN without pairs.
     pub fn increment(&self) -> f64 {
         let mean = (self.squares - 2.0 * self.products) / self.pairs;
-        // Rounding on a flat surface.
+        // Rounding on a flat surface may give a negative value.
         if mean < 0.0 { 0.0 } else { mean }
     }
 
@@ -50,7 +49,7 @@ impl PairSum {
 }
 
 impl LagSums {
-    /// Pair sums of a heightfield about zero; lags are cut to the grid.
+    /// Pair sums of a surface centred on zero; `max_lag` is limited to the grid.
     pub fn of(dem: &Grid, max_lag: [usize; 2]) -> Self {
         let max_lag = [max_lag[0].min(dem.rows().saturating_sub(1)), max_lag[1].min(dem.cols().saturating_sub(1))];
         let padded = Padded::new(dem, max_lag);
@@ -58,9 +57,9 @@ impl LagSums {
         Self { max_lag, sums }
     }
 
-    /// Sums at a lag in cells; nothing beyond the largest lag.
+    /// Sums at a lag in cells; zero beyond the largest lag.
     pub fn at(&self, drow: isize, dcol: isize) -> PairSum {
-        // Pairs have no order; one of two opposite lags is kept.
+        // Pairs are unordered, so only one of two opposite lags is stored.
         let (drow, dcol) = if drow < 0 { (-drow, -dcol) } else { (drow, dcol) };
         let [max_row, max_col] = self.max_lag.map(|l| l as isize);
         if drow > max_row || dcol.abs() > max_col {
@@ -69,7 +68,7 @@ impl LagSums {
         self.sums[(drow * (2 * max_col + 1) + dcol + max_col) as usize]
     }
 
-    /// One of each two opposite lags, with its sums; lag zero is left out.
+    /// One of each two opposite lags, with its sums, without lag zero.
     pub fn half(&self) -> impl Iterator<Item = ([isize; 2], &PairSum)> {
         let width = 2 * self.max_lag[1] + 1;
         let lag = move |k: usize| [(k / width) as isize, (k % width) as isize - self.max_lag[1] as isize];
@@ -77,7 +76,7 @@ impl LagSums {
     }
 }
 
-/// A heightfield and the shape it is padded to.
+/// A surface and the shape it is padded to.
 struct Padded<'a> {
     dem: &'a Grid,
     max_lag: [usize; 2],
@@ -91,17 +90,17 @@ impl<'a> Padded<'a> {
         Self { dem, max_lag, fft: RealFft2::new(shape[0], shape[1]), shape }
     }
 
-    /// Transform of the cells with data, each turned into another figure; 0 elsewhere.
-    fn spectrum(&self, figure: impl Fn(f64) -> f64) -> Vec<Complex64> {
+    /// Transform of `value(z)` for the cells with data, 0 elsewhere.
+    fn spectrum(&self, value: impl Fn(f64) -> f64) -> Vec<Complex64> {
         let mut field = vec![0.0; self.shape[0] * self.shape[1]];
         for (r, out) in field.chunks_exact_mut(self.shape[1]).take(self.dem.rows()).enumerate() {
             let row = self.dem.row(r);
-            out.iter_mut().zip(row).for_each(|(o, &z)| *o = if z.is_finite() { figure(z) } else { 0.0 });
+            out.iter_mut().zip(row).for_each(|(o, &z)| *o = if z.is_finite() { value(z) } else { 0.0 });
         }
         self.fft.forward(&field).values
     }
 
-    /// The correlation at the stored lags from its spectrum, which is real.
+    /// Correlation at the stored lags, from its real spectrum.
     fn correlation(&self, spectrum: impl Iterator<Item = f64>) -> Vec<f64> {
         let values = spectrum.map(|v| Complex64::new(v, 0.0)).collect();
         let [rows, cols] = self.shape;
@@ -130,7 +129,7 @@ impl<'a> Padded<'a> {
         let sum = |(k, &products): (usize, &f64)| {
             let (drow, dcol) = (k / width, (k % width).abs_diff(self.max_lag[1]));
             let (height, length) = (rows - drow, cols - dcol);
-            // East and south of the lag's start, or west and south: which of the two corners is the first cell's.
+            // First columns of the rectangles covered by the first and the second cell of a pair: the lag points east or west.
             let (first, second) = if k % width >= self.max_lag[1] { (0, dcol) } else { (dcol, 0) };
             let squares = table.within([0, first], [height, length]) + table.within([drow, second], [height, length]);
             PairSum { pairs: height as f64 * length as f64, products, squares }
@@ -139,7 +138,7 @@ impl<'a> Padded<'a> {
     }
 }
 
-/// Sums of squares over rectangles.
+/// Cumulative table for sums of squares over rectangles.
 struct CumulativeSquares {
     width: usize,
     sums: Vec<f64>,
@@ -171,7 +170,7 @@ mod tests {
     use super::*;
     use sastrugi_numeric::{Geometry, Streams};
 
-    /// The definition, pair by pair.
+    /// Reference: the definition, pair by pair.
     fn direct(dem: &Grid, drow: isize, dcol: isize) -> PairSum {
         let mut sum = PairSum::default();
         for r in 0..dem.rows() as isize {
@@ -212,7 +211,7 @@ mod tests {
     }
 
     #[test]
-    fn val_beyond_the_grid_there_is_nothing() {
+    fn val_lags_beyond_the_grid_have_no_pairs() {
         let sums = LagSums::of(&Grid::filled(Geometry::square(4, 4, 1.0), 1.0), [2, 2]);
         assert_eq!(sums.at(3, 0), PairSum::default());
         assert_eq!(sums.at(0, 0).pairs, 16.0);

@@ -1,9 +1,40 @@
-//! What a surface is like: gradients and roughness classes, heights and slopes, band roughness, spectra, structure
-//! function, areal figures of ISO 25178, scaling exponents, what of it shakes a vehicle (RMS in a band of wavelengths, ISO
-//! 8608, IRI), and its aerodynamic roughness length by wind direction.
+//! Surface roughness: gradients and roughness classes, height and slope statistics, band RMS, spectra, structure
+//! function, areal parameters of ISO 25178, scaling exponents, ride-relevant roughness (RMS in a band of wavelengths, ISO
+//! 8608, IRI), and aerodynamic roughness length by wind direction.
 //!
-//! Every function takes a DEM in metres with NaN where there is no data, and says what it does with such cells.
-//! Roughness classes are the codes [`LOW`], [`SEMI`], [`HIGH`] and [`NO_CLASS`].
+//! Every function takes a DEM in metres, with NaN for no data, and documents how it treats such cells. Roughness classes
+//! are the codes [`LOW`], [`SEMI`], [`HIGH`] and [`NO_CLASS`].
+//!
+//! The ways through the room, each from a DEM:
+//!
+//! * Classes: [`moore_gradient`], then [`classify`] by [`ClassThresholds`], then [`close_disk`] and [`shares`].
+//! * Scale by scale: [`band_rms`], [`power_spectrum`] and [`psd_slope`]; after [`level`], [`LagSums`] and [`structure_function`], and
+//!   [`hurst()`].
+//! * All areal parameters: [`areal_figures`]; a row of the tables, with classes and spectrum: [`describe`].
+//! * For vehicles: [`Ride`] (a [`WaveBand`], a [`Detrender`], ISO 8608, [`iri()`]).
+//! * For wind: [`aerodynamic_roughness`].
+//!
+//! # Example
+//!
+//! Ground that is level in the west and a slope of 45 degrees in the east:
+//!
+//! ```
+//! use sastrugi_numeric::{Geometry, Grid};
+//! use sastrugi_roughness::{ClassThresholds, Shares, classify, close_disk, height_statistics, moore_gradient, shares};
+//!
+//! // 8 x 8 m in cells of half a metre; the slope begins at 4 m.
+//! let geometry = Geometry::square(16, 16, 0.5);
+//! let dem = Grid::new(geometry, (0..256).map(|k| (geometry.x(k % 16) - 4.0).max(0.0)).collect());
+//! assert_eq!(height_statistics(&dem).relief_m, 3.75);
+//!
+//! // The gradient is 0 on 7 columns, 0.5 on the one west of the edge, and 1 on 8.
+//! let classes = classify(&moore_gradient(&dem), &ClassThresholds::default());
+//! let whole = Shares { low: 7.0 / 16.0, semi: 1.0 / 16.0, high: 8.0 / 16.0 };
+//! assert_eq!(shares(&classes, 0.0), whole);
+//!
+//! // A closing fills gaps; there are none.
+//! assert_eq!(close_disk(&classes, 0.5), classes);
+//! ```
 
 mod aerodynamic;
 mod agreement;

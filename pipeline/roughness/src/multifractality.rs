@@ -1,9 +1,9 @@
-//! How roughness varies from place to place and from scale to scale.
+//! Variation of roughness with place and scale.
 //!
 //! The structure function of order q, `S_q(r) = <|z(x + r) - z(x)|^q>` over pairs of cells `r` apart along rows and along
-//! columns, grows as `r^zeta(q)`. A monofractal has `zeta(q) = q H`; a concave zeta is the mark of a multifractal
-//! (Frisch, Turbulence, 1995, chapter 8). Two plainer figures stand beside it: the flatness `S_4 / S_2^2` of increments
-//! between neighbours (3 for normal increments), and how much the roughness of tiles differs.
+//! columns, grows as `r^zeta(q)`. A monofractal has `zeta(q) = q H`; a concave zeta indicates a multifractal
+//! (Frisch, Turbulence, 1995, chapter 8). Two simpler statistics complement it: the flatness `S_4 / S_2^2` of increments
+//! between neighbours (3 for normal increments), and the variation of roughness between tiles.
 
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, sums};
@@ -11,11 +11,11 @@ use serde::Serialize;
 
 /// Orders of the structure functions.
 const ORDERS: usize = 4;
-/// The surface is cut into this many tiles along each axis, which are left out in turn.
+/// Tiles along each axis of the surface; the jackknife leaves out one at a time.
 const JACKKNIFE_SIDE: usize = 4;
 /// Smallest lag of the fit, cells.
 const LAG_MIN: usize = 1;
-/// Largest lag of the fit over the shorter side.
+/// The largest lag of the fit is the shorter side divided by this.
 const LAG_SHARE_MAX: usize = 8;
 
 /// A scaling exponent.
@@ -30,10 +30,11 @@ pub struct ScalingExponent {
     pub standard_error: f64,
 }
 
-/// Exponents zeta(1) to zeta(4) between lags of 1 cell and an eighth of the shorter side, doubling. Pairs need data in
-/// both cells and lie in one of 4 x 4 tiles of the grid. Cells are taken as square.
+/// Exponents zeta(1) to zeta(4), fitted over lags that double from 1 cell to an eighth of the shorter side. A pair needs data
+/// in both cells and lies within one of the 4 x 4 tiles of the grid. Cells are treated as square.
 ///
-/// A `None` says that the grid is below 64 cells along a side or that some tile has no pair.
+/// `None` if a side of the grid is below 64 cells, or if some lag has no pairs or only zero increments, with all tiles or
+/// with one left out.
 pub fn scaling_exponents(dem: &Grid) -> Option<[ScalingExponent; ORDERS]> {
     let side = dem.rows().min(dem.cols());
     let lag_max = side / LAG_SHARE_MAX;
@@ -59,13 +60,13 @@ pub fn scaling_exponents(dem: &Grid) -> Option<[ScalingExponent; ORDERS]> {
     }))
 }
 
-/// `S_4 / S_2^2` of the increments between neighbouring cells along rows and columns; NaN without any.
+/// `S_4 / S_2^2` of the increments between neighbouring cells along rows and columns; NaN if there are none.
 pub fn increment_flatness(dem: &Grid) -> f64 {
     let s = Sums::of(dem, 1);
     s.powers[3] * s.pairs / (s.powers[1] * s.powers[1])
 }
 
-/// Coefficient of variation, over whole tiles of `tile_m`, of the root mean square Moore-neighbourhood gradient. NaN with
+/// Coefficient of variation, over complete tiles of `tile_m`, of the root mean square Moore-neighbourhood gradient. NaN with
 /// fewer than two tiles.
 pub fn tile_variation(gradient: &Grid, tile_m: f64) -> f64 {
     let g = &gradient.geometry;
@@ -76,11 +77,11 @@ pub fn tile_variation(gradient: &Grid, tile_m: f64) -> f64 {
         sums::mean(&squares).sqrt()
     };
     let tiles = sums::finite(&corners.map(rms).collect::<Vec<_>>());
-    // Two values are the fewest that vary.
+    // A variation needs at least two values.
     if tiles.len() < 2 { f64::NAN } else { sums::variance(&tiles).sqrt() / sums::mean(&tiles) }
 }
 
-/// Sums of powers of absolute increments, and their number.
+/// Sums of powers of absolute increments, and the number of increments.
 #[derive(Clone, Copy, Default)]
 struct Sums {
     powers: [f64; ORDERS],
@@ -114,7 +115,7 @@ impl Sums {
     }
 }
 
-/// The grid cut into `side` by `side` tiles of one size (cells left over at the south and east are dropped).
+/// The grid cut into `side` by `side` tiles of equal size (remaining cells at the south and east are dropped).
 fn tiles(dem: &Grid, side: usize) -> Vec<Grid> {
     let (rows, cols) = (dem.rows() / side, dem.cols() / side);
     (0..side * side).map(|k| dem.window(k / side * rows, k % side * cols, rows, cols)).collect()
@@ -152,7 +153,7 @@ mod tests {
         Grid::new(Geometry::square(side, side, 0.1), (0..side * side).map(|_| s.normal()).collect())
     }
 
-    /// A plane scales with exponent q; a sum of two Brownian lines (one along each axis) with q / 2. Tolerance for the
+    /// A plane has zeta(q) = q; a sum of two Brownian lines (one along each axis) has zeta(q) = q / 2. Tolerance for the
     /// lines: 6 jackknife standard errors.
     #[test]
     fn stat_exponents_of_a_plane_and_of_brownian_lines() {
@@ -180,8 +181,8 @@ mod tests {
         }
     }
 
-    /// Differences of normal noise are normal: flatness 3. Two increments share a cell, so that n = 260 000 pairs count
-    /// about a third; standard error sqrt(96 / n) is 0.033 then; threshold 6 of them (1e-9). Catches 3.2.
+    /// Differences of normal noise are normal: flatness 3. Increments share cells, so n = 260 000 pairs count for about a
+    /// third; the standard error sqrt(96 / n) is then 0.033. Threshold: 6 standard errors (1e-9). Catches 3.2.
     #[test]
     fn stat_flatness_of_noise() {
         let flatness = increment_flatness(&noise(512));
@@ -198,6 +199,28 @@ mod tests {
         // Half 1, half 3: mean 2, deviation 1.
         assert!((tile_variation(&gradient, 1.0) - 0.5).abs() < 1e-12);
         assert!(tile_variation(&gradient, 9.0).is_nan());
+    }
+
+    /// The root mean square of 1 and 3 in equal parts is the root of 5; tiles of 1 m are 10 columns wide and 5 rows high on cells of
+    /// 0.1 x 0.2 m.
+    #[test]
+    fn val_tiles_hold_root_mean_squares_of_oblong_cells() {
+        let root = 5.0f64.sqrt();
+        let mixed = |k: usize| if k % 20 >= 5 && k % 20 < 10 { 3.0 } else { 1.0 };
+        let gradient = Grid::new(Geometry::square(10, 20, 0.1), (0..200).map(mixed).collect());
+        assert!((tile_variation(&gradient, 1.0) - (root - 1.0) / (root + 1.0)).abs() < 1e-12);
+        let g = Geometry { rows: 20, cols: 40, cell: [0.1, 0.2], origin: [0.0; 2] };
+        let gradient = Grid::new(g, (0..800).map(|k| if k / 40 / 5 % 2 == 0 { 1.0 } else { 3.0 }).collect());
+        assert!((tile_variation(&gradient, 1.0) - 0.5).abs() < 1e-12);
+    }
+
+    /// Increments of 1 and 2 along a row or a column: `<d^4> / <d^2>^2 = (17 / 2) / (5 / 2)^2`.
+    #[test]
+    fn val_flatness_of_two_increments() {
+        for (rows, cols) in [(1, 3), (3, 1)] {
+            let dem = Grid::new(Geometry::square(rows, cols, 1.0), vec![0.0, 1.0, 3.0]);
+            assert!((increment_flatness(&dem) - 1.36).abs() < 1e-12, "{rows} x {cols}");
+        }
     }
 
     #[test]

@@ -1,12 +1,12 @@
-//! The least-squares plane of a heightfield: the form that is taken off before figures of roughness.
+//! Least-squares plane of a surface: the form removed before roughness is computed.
 //!
 //! `z = a + s_x (c - c_0) + s_y (r - r_0)` over the cells with data, centred on their mean row and column, solved from the
-//! 2 x 2 normal equations. Level where the cells lie on one line. Cost: two passes.
+//! 2 x 2 normal equations. The plane is level if the cells lie on one line. Cost: two passes.
 
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, sums};
 
-/// Residuals below this share of the largest height are rounding: the surface is a plane.
+/// Residuals below this share of the largest height are rounding errors: the surface is a plane.
 const ROUNDING: f64 = 1e-12;
 
 /// `height + east (col - col_0) + north (row - row_0)`.
@@ -17,7 +17,7 @@ pub(crate) struct Plane {
 }
 
 impl Plane {
-    /// The plane nearest to the cells with data; level where they lie on one line.
+    /// Least-squares plane of the cells with data; level if they lie on one line.
     pub fn of(dem: &Grid) -> Self {
         let [n, col, row, height] = totals(dem, |col, row, z| [1.0, col, row, z]);
         let (centre, height) = ([col / n, row / n], height / n);
@@ -39,12 +39,12 @@ impl Plane {
     }
 }
 
-/// Sums of `figures(col, row, z)` over the cells with data: along each row, then of the rows.
-fn totals<const N: usize>(dem: &Grid, figures: impl Fn(f64, f64, f64) -> [f64; N] + Sync) -> [f64; N] {
+/// Sums of `terms(col, row, z)` over the cells with data: along each row, then over the rows.
+fn totals<const N: usize>(dem: &Grid, terms: impl Fn(f64, f64, f64) -> [f64; N] + Sync) -> [f64; N] {
     let of_row = |r: usize| {
         let mut total = [0.0; N];
         for (c, &z) in dem.row(r).iter().enumerate().filter(|(_, z)| z.is_finite()) {
-            let own = figures(c as f64, r as f64, z);
+            let own = terms(c as f64, r as f64, z);
             total.iter_mut().zip(own).for_each(|(t, v)| *t += v);
         }
         total
@@ -53,7 +53,7 @@ fn totals<const N: usize>(dem: &Grid, figures: impl Fn(f64, f64, f64) -> [f64; N
     std::array::from_fn(|k| sums::sum(&rows.iter().map(|row| row[k]).collect::<Vec<_>>()))
 }
 
-/// Heights above the least-squares plane; cells without data are NaN. A plane gives exact zeros.
+/// Heights above the least-squares plane; cells without data are NaN. A planar surface gives exact zeros.
 pub fn level(dem: &Grid) -> Grid {
     let plane = Plane::of(dem);
     let cols = dem.cols();
@@ -85,9 +85,9 @@ mod tests {
         assert!(flat.values.iter().all(|v| v.is_nan() || *v == 0.0));
     }
 
-    /// What is left has no mean, and no moment along either axis.
+    /// The residual has zero mean and zero first moment along either axis.
     #[test]
-    fn prop_what_is_left_is_orthogonal_to_planes() {
+    fn prop_residuals_are_orthogonal_to_planes() {
         let g = Geometry::square(40, 30, 1.0);
         let mut s = sastrugi_numeric::Streams::for_seed(1, "plane-test").stream("noise");
         let dem = Grid::new(g, (0..1200).map(|k| if k % 5 == 0 { f64::NAN } else { s.normal() + k as f64 }).collect());

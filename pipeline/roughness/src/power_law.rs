@@ -1,16 +1,15 @@
-//! A power law through the density of profiles, and the road class that it stands for.
+//! Power-law fit to the PSD of profiles, and the ISO 8608 road class.
 //!
 //! $$ P(f) = c f^{-n} , \qquad \sigma^2 = \int_{1/\lambda_{max}}^{1/\lambda_{min}} P\,df
 //!    = \frac{c}{n - 1} \left( \lambda_{max}^{n-1} - \lambda_{min}^{n-1} \right) $$
-//! with the one-sided density P in m3 (twice that of [`crate::profile_spectra`]), f in cycles/m, and so c in m^(3 - n). For
-//! n = 2 (Van Deusen 1967, natural ground) c is a length and `sigma^2 = c (lambda_max - lambda_min)`; a c in feet is 0.3048 m
-//! for each foot.
+//! with the one-sided density P in m3 (twice that of [`crate::profile_spectra`]), f in cycles/m, and therefore c in m^(3 - n).
+//! For n = 2 (Van Deusen 1967, natural ground) c is a length and `sigma^2 = c (lambda_max - lambda_min)`; a c in feet is
+//! converted at 0.3048 m per foot.
 //!
-//! Fit: least squares of ln P on ln f over bands of an eighth of an octave, each with the same weight, along x and along y
-//! together.
+//! Fit: least squares of ln P on ln f over bands of an eighth of an octave, equally weighted, along x and along y together.
 //!
-//! Class: ISO 8608:2016, Annex C, by P at 0.1 cycles/m. The standard fits from 0.011 to 2.83 cycles/m; the band of a vehicle starts
-//! at its longest wave (0.185 for one of 5.4 m), and the class is then that of the law carried on to 0.1.
+//! Class: ISO 8608:2016, Annex C, by P at 0.1 cycles/m. The standard fits from 0.011 to 2.83 cycles/m. A vehicle's band starts
+//! at its longest wavelength (0.185 cycles/m for 5.4 m); the law is then extrapolated to 0.1 cycles/m for the class.
 
 use crate::profiles::ProfileBin;
 use crate::spectrum::RINGS_PER_OCTAVE;
@@ -20,19 +19,19 @@ use serde::Serialize;
 
 /// Fewest bands of a fit.
 const BINS_MIN: usize = 4;
-/// Spatial frequency by which ISO 8608 sorts roads, cycles/m.
+/// Spatial frequency at which ISO 8608 classifies roads, cycles/m.
 const ISO_FREQUENCY_CYCLES_M: f64 = 0.1;
-/// Largest density of ISO class A at 0.1 cycles/m, m3; each further class ends at four times that of the one before.
+/// Upper bound of ISO class A at 0.1 cycles/m, m3; each further class has four times the bound of the one before.
 const ISO_CLASS_A_MAX_M3: f64 = 32e-6;
 
-/// `P(f) = c f^-n`, fitted.
+/// Fitted power law `P(f) = c f^-n`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct PowerLaw {
     /// Density at 1 cycle/m, one-sided, m^(3 - n).
     pub c: f64,
     /// Exponent.
     pub n: f64,
-    /// Share of the variance of ln P that the line explains.
+    /// Share of the variance of ln P explained by the line.
     pub r2: f64,
     /// Standard error of `n` from the scatter of the bands about the line.
     pub n_standard_error: f64,
@@ -41,7 +40,7 @@ pub struct PowerLaw {
 }
 
 impl PowerLaw {
-    /// The law through the densities of `direction` between two frequencies; `None` with fewer than 4 bands of power there.
+    /// Fits the densities of `direction` between two frequencies; `None` with fewer than 4 bands of non-zero power there.
     pub fn fit(bins: &[ProfileBin], direction: Direction, [low, high]: [f64; 2]) -> Option<Self> {
         let inside = |b: &&ProfileBin| {
             let taken = direction == Direction::All || b.direction == direction;
@@ -77,12 +76,12 @@ impl PowerLaw {
         self.c * libm::pow(frequency_cycles_m, -self.n)
     }
 
-    /// Density by which roads are classed: at 0.1 cycles/m, m3. An extrapolation where [`Self::reaches_iso_8608`] is false.
+    /// Density at 0.1 cycles/m, by which roads are classified, m3. An extrapolation if [`Self::reaches_iso_8608`] is false.
     pub fn iso_8608_psd_m3(&self) -> f64 {
         self.psd_m3(ISO_FREQUENCY_CYCLES_M)
     }
 
-    /// Whether 0.1 cycles/m lies among the fitted frequencies, or within a band of them.
+    /// Whether 0.1 cycles/m lies within the fitted frequencies, or at most one band outside them.
     pub fn reaches_iso_8608(&self) -> bool {
         let [low, high] = self.frequencies_cycles_m;
         let band = libm::exp2(1.0 / RINGS_PER_OCTAVE);
@@ -93,13 +92,23 @@ impl PowerLaw {
     pub fn variance_m2(&self, [min_m, max_m]: [f64; 2]) -> f64 {
         let power = self.n - 1.0;
         let ratio = libm::log(max_m / min_m);
-        // The difference of two powers, without cancellation where they are nearly equal.
+        // The difference of two powers, without cancellation when they are nearly equal.
         let grown = if power == 0.0 { ratio } else { libm::expm1(power * ratio) / power };
         self.c * libm::pow(min_m, power) * grown
     }
 }
 
-/// Class of a road by its density at 0.1 cycles/m (m3): A, the smoothest, to H; `None` for what is no density.
+/// Class of a road by its density at 0.1 cycles/m (m3), from A, the smoothest, to H; `None` unless the density is positive and
+/// finite.
+///
+/// # Examples
+/// ```
+/// use sastrugi_roughness::iso_8608_class;
+///
+/// // The geometric means of the classes are 16e-6, 64e-6 ... m3.
+/// assert_eq!([16e-6, 64e-6, 256e-6, 1.0].map(iso_8608_class), [Some('A'), Some('B'), Some('C'), Some('H')]);
+/// assert_eq!(iso_8608_class(0.0), None);
+/// ```
 pub fn iso_8608_class(psd_m3: f64) -> Option<char> {
     let bounds = std::iter::successors(Some(ISO_CLASS_A_MAX_M3), |bound| Some(4.0 * bound));
     let known = psd_m3 > 0.0 && psd_m3.is_finite();
@@ -119,7 +128,7 @@ mod tests {
     }
 
     #[test]
-    fn val_a_law_is_found_again() {
+    fn val_a_known_law_is_recovered() {
         let law = PowerLaw::fit(&bins(|f| 3e-4 * libm::pow(f, -2.3)), Direction::All, [0.1, 1.0]).unwrap();
         assert!((law.n - 2.3).abs() < 1e-12 && (law.c / 3e-4 - 1.0).abs() < 1e-12, "{law:?}");
         assert!(law.r2 > 1.0 - 1e-12 && law.n_standard_error < 1e-6);
@@ -131,7 +140,30 @@ mod tests {
         assert!(PowerLaw::fit(&bins(|f| f), Direction::X, [0.1, 0.11]).is_none());
     }
 
-    /// The integral by a fine trapezoid rule in ln f; and `c (lambda_max - lambda_min)` for n = 2.
+    /// Four bands, at ln f = 0, 1, 2 and 3, scattered about `f^-2` by e = 0.1 in ln P, alternately so that the line stays as it is: the
+    /// residual sum of squares is 4 e^2, that of ln f is 5, that of ln P is 20 + 4 e^2.
+    #[test]
+    fn val_scatter_about_the_line() {
+        let bin = |(k, scatter): (usize, f64)| ProfileBin {
+            direction: Direction::X,
+            frequency_cycles_m: libm::exp(k as f64),
+            psd_m3: 0.5 * libm::exp(-2.0 * k as f64 + scatter),
+            modes: 5,
+        };
+        let mut bins: Vec<ProfileBin> = [0.1, -0.1, -0.1, 0.1].into_iter().enumerate().map(bin).collect();
+        // Bands along y, without scatter and up to higher frequencies, take part only where they are asked for.
+        bins.extend((0..4).map(|k| ProfileBin { direction: Direction::Y, ..bin((2 * k, 0.0)) }));
+        let law = PowerLaw::fit(&bins, Direction::X, [0.5, 50.0]).unwrap();
+        assert!((law.n - 2.0).abs() < 1e-12 && (law.c - 1.0).abs() < 1e-12, "{law:?}");
+        assert!((law.n_standard_error - 0.004f64.sqrt()).abs() < 1e-12, "{law:?}");
+        assert!((law.r2 - 20.0 / 20.04).abs() < 1e-12, "{law:?}");
+        assert!((law.frequencies_cycles_m[1] - libm::exp(3.0)).abs() < 1e-12, "{law:?}");
+        let along_y = PowerLaw::fit(&bins, Direction::Y, [0.5, 500.0]).unwrap();
+        assert!((along_y.n - 2.0).abs() < 1e-12 && along_y.n_standard_error < 1e-6, "{along_y:?}");
+        assert!((along_y.frequencies_cycles_m[1] / libm::exp(6.0) - 1.0).abs() < 1e-12, "{along_y:?}");
+    }
+
+    /// Against a fine trapezoid rule in ln f, and against `c (lambda_max - lambda_min)` for n = 2.
     #[test]
     fn val_variance_is_the_integral_of_the_density() {
         for n in [0.6, 1.0, 1.0 + 1e-14, 2.0, 3.0] {
@@ -147,7 +179,7 @@ mod tests {
         assert!((law.variance_m2([0.33, 5.4]) - 2e-4 * (5.4 - 0.33)).abs() < 1e-18);
     }
 
-    /// ISO 8608, Annex C: geometric means 16, 64, 256 ... 262 144 of the classes, in 1e-6 m3, and the bounds between them.
+    /// ISO 8608, Annex C: class geometric means 16, 64, 256 ... 262 144, in 1e-6 m3, and the bounds between them.
     #[test]
     fn val_iso_classes() {
         let mut mean = 16e-6;
@@ -156,7 +188,8 @@ mod tests {
             assert_eq!(iso_8608_class(1.99 * mean), Some(class));
             mean *= 4.0;
         }
-        assert_eq!(iso_8608_class(33e-6), Some('B'));
+        // A bound belongs to the rougher class.
+        assert_eq!([31.9e-6, 32e-6, 128e-6].map(iso_8608_class), [Some('A'), Some('B'), Some('C')]);
         assert_eq!([0.0, -1.0, f64::NAN, f64::INFINITY].map(iso_8608_class), [None; 4]);
     }
 }

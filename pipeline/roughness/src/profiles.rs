@@ -1,16 +1,17 @@
 //! Power spectral density of profiles.
 //!
-//! The two-sided one-dimensional density in m3 over spatial frequency in cycles/m, averaged over all rows (along x) or all
-//! columns (along y),
+//! The two-sided one-dimensional density, in m3 over spatial frequency in cycles/m, averaged over all rows (along x) or all
+//! columns (along y), is
 //! $$ S(f) = \frac{\Delta \sum_p \left| \sum_j w_{pj} z_{pj}\, e^{-2\pi i f x_j} \right|^2}{\sum_p \sum_j w_{pj}^2} , $$
-//! p the profile, w a Hann window along it that is 0 in cells without data. White noise of variance s^2 and cell `D` has
-//! `S = s^2 D`; the integral over all frequencies, negative ones included, is the variance. It is C^1D of Jacobs, Junge and
-//! Pastewka, Surf. Topogr. 5 (2017) 013001 (of a self-affine surface `f^(-1 - 2H)`, one power above that of the
+//! with p the profile and w a Hann window along it, 0 in cells without data. White noise of variance s^2 and cell `D` has
+//! `S = s^2 D`; the integral over all frequencies, negative ones included, is the variance. This is C^1D of Jacobs, Junge and
+//! Pastewka, Surf. Topogr. 5 (2017) 013001 (`f^(-1 - 2H)` for a self-affine surface, one power above that of the
 //! two-dimensional density); window and normalisation as in [`crate::spectrum`].
 //!
-//! Profiles are padded to lengths 2^a 3^b 5^c and transformed two at a time, one as real and one as imaginary part: the
-//! powers of both are the mean over opposite frequencies. Densities are averaged over eighths of an octave, from one cycle
-//! per profile to the Nyquist frequency. Heights are about zero: a caller takes mean and plane off first ([`crate::level`]).
+//! Profiles are padded to lengths 2^a 3^b 5^c and transformed two at a time, one as the real and one as the imaginary part:
+//! the mean over opposite frequencies gives the sum of both powers. Densities are averaged over eighths of an octave, from one
+//! cycle per profile to the Nyquist frequency. Heights must be centred on zero: the caller removes mean and plane first
+//! ([`crate::level`]).
 //!
 //! Cost: one transform of the grid's rows and one of its columns; a copy of the grid.
 
@@ -21,7 +22,7 @@ use sastrugi_numeric::Grid;
 use sastrugi_numeric::fft::{Complex64, Transform, smooth_length};
 use serde::Serialize;
 
-/// Pairs of profiles that one task adds up.
+/// Pairs of profiles summed by one task.
 const PAIRS_AT_ONCE: usize = 32;
 
 /// One frequency band of a profile spectrum.
@@ -33,11 +34,11 @@ pub struct ProfileBin {
     pub frequency_cycles_m: f64,
     /// Mean power spectral density, m3.
     pub psd_m3: f64,
-    /// Frequencies of the padded transform in the band.
+    /// Number of frequencies of the padded transform in the band.
     pub modes: u64,
 }
 
-/// Densities along x, then along y, frequencies rising. An axis of fewer than 4 cells, and a grid without data, has none.
+/// Densities along x, then along y, by increasing frequency. None for an axis of fewer than 4 cells, or a grid without data.
 pub fn profile_spectra(dem: &Grid) -> Vec<ProfileBin> {
     let (rows, cols) = (dem.rows(), dem.cols());
     let [cell_x, cell_y] = dem.geometry.cell;
@@ -69,7 +70,7 @@ fn spectrum(profiles: &[f64], n: usize, cell_m: f64, direction: Direction) -> Ve
     bands(&total, step, 1.0 / (n as f64 * cell_m), cell_m / weight, direction)
 }
 
-/// Sum of the profiles' squared moduli by frequency, and of their squared windows.
+/// Sum over the profiles of the squared modulus at each frequency, and sum of the squared windows.
 fn powers(profiles: &[f64], window: &[f64], transform: &Transform) -> (Vec<f64>, f64) {
     let (n, len) = (window.len(), transform.len());
     let mut scratch = transform.scratch();
@@ -130,7 +131,7 @@ mod tests {
         Grid::new(g, (0..g.len()).map(|_| value()).collect())
     }
 
-    /// Powers by the definition, profile by profile; holes, an odd number of profiles, a padded length.
+    /// Powers by the definition, profile by profile: with holes, an odd number of profiles, and padding.
     #[test]
     fn val_equals_the_definition() {
         let g = Geometry { rows: 7, cols: 11, cell: [0.5, 0.8], origin: [0.0; 2] };
@@ -157,8 +158,8 @@ mod tests {
     }
 
     /// White noise of variance 4 on cells of 0.5 x 0.25 m: 2 m3 along x, 1 m3 along y, in every band, also with a third of
-    /// the cells missing. A band of n modes of p profiles scatters by sqrt(3 / (n p)); threshold 8 of them: false alarm
-    /// below 1e-9 in 100 bands.
+    /// the cells missing. A band of n modes of p profiles has a relative standard error of sqrt(3 / (n p)); threshold 8
+    /// standard errors: false-alarm rate below 1e-9 in 100 bands.
     #[test]
     fn stat_white_noise_is_flat() {
         let g = Geometry { rows: 300, cols: 243, cell: [0.5, 0.25], origin: [0.0; 2] };

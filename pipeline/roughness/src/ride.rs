@@ -1,4 +1,4 @@
-//! What of a surface shakes a vehicle, in one place.
+//! Ride-relevant roughness: band RMS, PSD slope, ISO 8608 class and IRI.
 
 use crate::detrend::{BandError, Detrended, Detrender, WaveBand};
 use crate::iri::{Iri, iri};
@@ -9,35 +9,35 @@ use crate::structure::Direction;
 use sastrugi_numeric::Grid;
 use serde::Serialize;
 
-/// Figures of the profiles of a surface in a band of wavelengths. NaN stands for a figure that the surface does not have.
+/// Ride-relevant roughness of the profiles of a surface in a band of wavelengths. Undefined values are NaN.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Ride {
     /// Shortest and longest wavelength, m.
     pub band_m: [f64; 2],
-    /// How the local mean was taken off: figures of different detrenders are not comparable.
+    /// How the local mean was removed; results of different detrenders are not comparable.
     pub detrender: Detrender,
     /// RMS about the local mean, m.
     pub rms_m: f64,
-    /// The same of the profiles along x and along y, m; one figure for both under a moving average.
+    /// RMS of the profiles along x and along y, m; one value for both with the moving average.
     pub rms_along_m: Vec<f64>,
-    /// The power law through the density of the profiles in the band.
+    /// Power law fitted to the PSD of the profiles in the band.
     pub power_law: Option<PowerLaw>,
-    /// Density that the law has at 0.1 cycles/m, m3; carried on beyond its frequencies where these do not reach there.
+    /// Density of the power law at 0.1 cycles/m, m3; extrapolated if the fitted frequencies do not reach there.
     pub iso_8608_psd_m3: f64,
-    /// Class of ISO 8608 by that density.
+    /// ISO 8608 class of that density.
     pub iso_8608_class: Option<char>,
     /// International Roughness Index.
     pub iri: Iri,
-    /// RMS in windows of three times the longest wavelength about every cell, m.
+    /// RMS in a window of three times the longest wavelength about each cell, m.
     #[serde(skip)]
     pub map: Grid,
 }
 
 impl Ride {
-    /// The figures of a DEM; `allow_coarse` lets cells pass that are too large for the shortest wave.
+    /// Ride-relevant roughness of a DEM; `allow_coarse` accepts cells that are too large for the shortest wavelength.
     ///
     /// # Errors
-    /// Cells that are too large, a surface that is shorter than four of the longest wave.
+    /// Cells that are too large; a surface shorter than four times the longest wavelength.
     pub fn of(dem: &Grid, band: &WaveBand, detrender: Detrender, allow_coarse: bool) -> Result<Self, BandError> {
         let [dx, dy] = dem.geometry.cell;
         if !allow_coarse {
@@ -67,7 +67,7 @@ mod tests {
     use super::*;
     use sastrugi_numeric::{Geometry, Streams};
 
-    /// White noise on cells of 0.1 m: flat density, the variance of the band's share of frequencies. n = 400 x 400 and a
+    /// White noise on cells of 0.1 m: the density is flat, and the band holds its share of the variance. n = 400 x 400;
     /// threshold above 10 standard errors.
     #[test]
     fn stat_white_noise() {
@@ -79,10 +79,16 @@ mod tests {
         assert!((ride.rms_m / wanted - 1.0).abs() < 0.03, "{}", ride.rms_m);
         let law = ride.power_law.unwrap();
         assert!(law.n.abs() < 0.1 && (law.c / (2.0 * 1e-4 * 0.1) - 1.0).abs() < 0.1, "{law:?}");
-        assert!(ride.iso_8608_class == Some('A') && ride.iri.along_x_m_km > 1.0);
+        assert_eq!((ride.iso_8608_psd_m3, ride.iso_8608_class), (law.psd_m3(0.1), Some('A')));
+        assert_eq!(ride.iri, iri(&dem));
+        // Both directions have the same roughness, and so has a window of 15 m: 22 801 cells, known to 1 %.
+        assert!(ride.rms_along_m.len() == 2 && ride.rms_along_m.iter().all(|r| (r / wanted - 1.0).abs() < 0.03));
+        let (row, col) = (200, 200);
+        assert!((ride.map.at(row, col) / wanted - 1.0).abs() < 0.1, "{}", ride.map.at(row, col));
     }
 
-    /// A surface given in feet: RMS in feet, a density in cubic feet; in metres both are those of the surface in metres.
+    /// A surface given in feet has its RMS in feet and its density in cubic feet; converted to metres, both match the surface
+    /// given in metres.
     #[test]
     fn val_feet() {
         const FOOT_M: f64 = 0.3048;
@@ -102,7 +108,7 @@ mod tests {
     }
 
     #[test]
-    fn val_what_does_not_fit_is_refused() {
+    fn val_cells_and_surfaces_that_do_not_fit_the_band_are_refused() {
         let dem = Grid::filled(Geometry::square(100, 100, 0.2), 1.0);
         let ride = |min, max, coarse| Ride::of(&dem, &WaveBand::new(min, max).unwrap(), Detrender::Band, coarse);
         assert!(matches!(ride(0.33, 5.0, false), Err(BandError::Coarse { .. })));

@@ -1,7 +1,7 @@
 //! Power spectral density of a surface.
 //!
 //! # What
-//! The two-sided two-dimensional density in m4 over spatial frequency in cycles/m,
+//! The two-sided two-dimensional density, in m4 over spatial frequency in cycles/m,
 //! $$ S(f_x, f_y) = \frac{\Delta x\,\Delta y}{\sum_j w_j^2}
 //!    \left| \sum_j w_j z_j \, e^{-2\pi i (f_x x_j + f_y y_j)} \right|^2 , $$
 //! averaged over rings of |f|. White noise of variance s^2 has `S = s^2 dx dy` at every frequency, and the integral of S
@@ -9,17 +9,17 @@
 //!
 //! # How
 //! The least-squares plane of the cells with data is removed; w is a Hann window along both axes, and 0 in cells without
-//! data, which are thereby filled with that plane. The field is padded with zeros to lengths 2^a 3^b 5^c. Rings are an
+//! data, which is equivalent to filling them with that plane. The field is zero-padded to lengths 2^a 3^b 5^c. Rings are an
 //! eighth of an octave wide, from one cycle per longest side to the lower of the two Nyquist frequencies; rings without a
-//! mode are left out. The lowest two or three cycles per side are lowered by plane and window, so slopes start above
-//! them.
+//! mode are omitted. Plane and window lower the density of the lowest two or three cycles per side, so slopes are fitted
+//! above them.
 //!
 //! # Source
 //! Window and normalisation: Harris, Proc. IEEE 66 (1978) 51; radial average as in Jacobs, Junge and Pastewka, Surf.
 //! Topogr. 5 (2017) 013001, their C^2D.
 //!
 //! # Cost
-//! One real transform of the grid, and about 24 bytes a cell.
+//! One real transform of the grid, and about 24 bytes per cell.
 
 use crate::plane::Plane;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
@@ -29,19 +29,19 @@ use std::f64::consts::TAU;
 
 /// Rings per doubling of the frequency.
 pub(crate) const RINGS_PER_OCTAVE: f64 = 8.0;
-/// First frequency of the slope's default band, cycles per shortest side.
+/// Lower end of the default slope band, cycles per shortest side.
 const SLOPE_CYCLES_MIN: f64 = 4.0;
-/// Last frequency of the slope's default band over the Nyquist frequency.
+/// Upper end of the default slope band over the Nyquist frequency.
 const SLOPE_NYQUIST_SHARE: f64 = 0.5;
-/// Density over the largest of the band below which a ring holds rounding alone: squares of amplitudes near 1e-16 of the largest, and
-/// well above them.
+/// Share of the largest density in the band below which a ring holds only rounding errors: well above the square of amplitudes
+/// near 1e-16 of the largest.
 const SLOPE_NOISE_SHARE: f64 = 1e-12;
-/// Density over that of rings on either side below which a ring is a gap.
+/// Share of the density of rings on either side below which a ring is a gap.
 const SLOPE_GAP_SHARE: f64 = 0.01;
-/// Rings on either side that are looked at.
+/// Rings on either side that are compared.
 const SLOPE_GAP_RINGS: usize = 3;
-/// Cycles per shortest side above which rings are wider than the distance of modes along an axis, and none is a gap for that reason: what
-/// lies between the lines of a sum of waves is its own.
+/// Cycles per shortest side above which rings are wider than the spacing of modes along an axis, so that none is a gap for lack of
+/// a mode: low density between the lines of a sum of waves is real there.
 const SLOPE_GAP_CYCLES_MAX: f64 = 11.5;
 
 /// One ring of the radially averaged spectrum.
@@ -51,27 +51,40 @@ pub struct SpectrumBin {
     pub frequency_cycles_m: f64,
     /// Mean power spectral density, m4.
     pub psd_m4: f64,
-    /// Modes of the padded transform in the ring, both signs of each frequency counted.
+    /// Number of modes of the padded transform in the ring, counting both signs of each frequency.
     pub modes: u64,
 }
 
-/// Radially averaged power spectral density, frequencies rising. Empty when fewer than three cells have data, or a side
+/// Radially averaged power spectral density, by increasing frequency. Empty if fewer than three cells have data, or a side
 /// is below 3 cells.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::power_spectrum;
+///
+/// // Waves of 4 m, on 32 m of cells of half a metre.
+/// let wave = [0.0, 0.5f64.sqrt(), 1.0, 0.5f64.sqrt(), 0.0, -0.5f64.sqrt(), -1.0, -0.5f64.sqrt()];
+/// let dem = Grid::new(Geometry::square(64, 64, 0.5), (0..64 * 64).map(|k| wave[k % 8]).collect());
+/// let spectrum = power_spectrum(&dem);
+/// let peak = spectrum.iter().max_by(|a, b| a.psd_m4.total_cmp(&b.psd_m4)).unwrap();
+/// assert!((peak.frequency_cycles_m / 0.25 - 1.0).abs() < 0.1);
+/// ```
 pub fn power_spectrum(dem: &Grid) -> Vec<SpectrumBin> {
     SpectralMap::of(dem).map_or_else(Vec::new, |map| map.rings())
 }
 
-/// The two-dimensional density on the frequencies of the padded transform, before any averaging.
+/// The two-dimensional density at the frequencies of the padded transform, before any averaging.
 #[derive(Clone, Debug)]
 pub struct SpectralMap {
     geometry: Geometry,
     spectrum: HalfSpectrum,
-    /// Density over squared modulus, m2.
+    /// Factor from squared modulus to density, m2.
     density: f64,
 }
 
 impl SpectralMap {
-    /// Density of a heightfield; `None` when fewer than three cells have data, or a side is below 3 cells.
+    /// Density of a surface; `None` if fewer than three cells have data, or a side is below 3 cells.
     pub fn of(dem: &Grid) -> Option<Self> {
         let g = dem.geometry;
         if g.rows < 3 || g.cols < 3 || dem.finite_count() < 3 {
@@ -83,8 +96,8 @@ impl SpectralMap {
         Some(Self { geometry: g, spectrum, density: g.cell[0] * g.cell[1] / window_power })
     }
 
-    /// Frequencies `[east, north]` in cycles/m with `f_east >= 0`, density in m4, and the number of modes that one stands
-    /// for (2 where the opposite frequency is not in the list).
+    /// Frequencies `[east, north]` in cycles/m with `f_east >= 0`, density in m4, and multiplicity (2 if the opposite frequency
+    /// is not listed).
     pub fn modes(&self) -> impl Iterator<Item = ([f64; 2], f64, f64)> + '_ {
         let (s, g) = (&self.spectrum, &self.geometry);
         let step = [1.0 / (s.cols as f64 * g.cell[0]), 1.0 / (s.rows as f64 * g.cell[1])];
@@ -104,10 +117,10 @@ impl SpectralMap {
         ring_means(&self.spectrum, &self.geometry, self.density)
     }
 
-    /// Direction of the texture (Std of ISO 25178-2), degrees clockwise from north in [0, 180): across the direction in
-    /// which the angular spectrum, the density integrated over the frequencies of the band, is largest (so along ridges
-    /// and furrows; the standard's own angle is that of the maximum). The angular spectrum is smoothed over 9 degrees.
-    /// NaN when the band holds no power.
+    /// Texture direction (Std of ISO 25178-2), degrees clockwise from north in [0, 180): perpendicular to the maximum of the
+    /// angular spectrum, which is the density integrated over the frequencies of the band. It therefore runs along ridges
+    /// and furrows; the standard gives the angle of the maximum itself. The angular spectrum is smoothed over 9 degrees.
+    /// NaN if the band holds no power.
     pub fn direction_deg(&self, band_cycles_m: [f64; 2]) -> f64 {
         let mut angular = [0.0; ANGLES];
         for ([east, north], psd, multiplicity) in self.modes() {
@@ -124,12 +137,12 @@ impl SpectralMap {
     }
 }
 
-/// Directions of half a turn in the angular spectrum.
+/// Directions in half a turn of the angular spectrum.
 const ANGLES: usize = 180;
-/// Directions on either side over which it is smoothed.
+/// Directions on either side that smooth the angular spectrum.
 const SMOOTH: usize = 4;
 
-/// The field times its window, padded to `(rows, cols)`, and the sum of the squared window.
+/// The windowed field, padded to `(rows, cols)`, and the sum of the squared window.
 fn tapered(dem: &Grid, rows: usize, cols: usize) -> (Vec<f64>, f64) {
     let g = dem.geometry;
     let plane = Plane::of(dem);
@@ -150,7 +163,7 @@ fn tapered(dem: &Grid, rows: usize, cols: usize) -> (Vec<f64>, f64) {
     (field, sums::sum(&powers))
 }
 
-/// Hann window without its zeros: `sin^2(pi (k + 1/2) / n)`.
+/// Hann window without its zero ends: `sin^2(pi (k + 1/2) / n)`.
 pub(crate) fn hann(n: usize) -> Vec<f64> {
     (0..n).map(|k| 0.5 - 0.5 * libm::cos(TAU * (k as f64 + 0.5) / n as f64)).collect()
 }
@@ -189,26 +202,26 @@ fn ring_means(spectrum: &HalfSpectrum, g: &Geometry, density: f64) -> Vec<Spectr
     totals.into_iter().filter(|t| t.2 > 0).map(bin).collect()
 }
 
-/// The band in which slopes are fitted unless another is asked for: from 4 cycles per shortest side, beyond the reach of
-/// plane and window, to half the Nyquist frequency, short of aliasing; cycles/m.
+/// Default band of the slope fit, cycles/m: from 4 cycles per shortest side, above the frequencies that plane and window
+/// affect, to half the Nyquist frequency, below aliasing.
 pub fn default_slope_band(g: &Geometry) -> [f64; 2] {
     let [size_x, size_y] = g.size();
     [SLOPE_CYCLES_MIN / size_x.min(size_y), SLOPE_NYQUIST_SHARE * nyquist(g)]
 }
 
-/// Slope of log density over log frequency, by least squares over the rings of the band (inclusive, cycles/m), each with
-/// the same weight. Left out are rings of rounding noise, and gaps: a surface that varies along one axis only has no power, or what
-/// padding leaks, in rings without a mode on that axis, which occur below 11.5 cycles per `side_m`, the shortest side. NaN with fewer
-/// than two rings, or fewer than half of those of the band. A surface with Hurst exponent H has `-2 (H + 1)`.
+/// Slope of log density over log frequency, by equally weighted least squares over the rings of the band (inclusive, cycles/m).
+/// Rings of rounding noise and gaps are left out. Gaps: a surface that varies along one axis only has no power, or only leakage
+/// from padding, in rings without a mode on that axis, which occur below 11.5 cycles per `side_m`, the shortest side. NaN with
+/// fewer than two rings, or fewer than half of the rings in the band. A surface with Hurst exponent H has `-2 (H + 1)`.
 pub fn psd_slope(spectrum: &[SpectrumBin], band_cycles_m: [f64; 2], side_m: f64) -> f64 {
     let [low, high] = band_cycles_m;
     let inside = |b: &SpectrumBin| b.frequency_cycles_m >= low && b.frequency_cycles_m <= high;
     let band: Vec<usize> = (0..spectrum.len()).filter(|&k| inside(&spectrum[k])).collect();
     let noise = SLOPE_NOISE_SHARE * largest(band.iter().map(|&k| &spectrum[k]));
     let narrow = |k: usize| spectrum[k].frequency_cycles_m * side_m < SLOPE_GAP_CYCLES_MAX;
-    let told = |&&k: &&usize| spectrum[k].psd_m4 > noise && !(narrow(k) && is_gap(spectrum, k));
-    let told = band.iter().filter(told).map(|&k| &spectrum[k]);
-    let points: Vec<[f64; 2]> = told.map(|b| [libm::log(b.frequency_cycles_m), libm::log(b.psd_m4)]).collect();
+    let usable = |&&k: &&usize| spectrum[k].psd_m4 > noise && !(narrow(k) && is_gap(spectrum, k));
+    let usable = band.iter().filter(usable).map(|&k| &spectrum[k]);
+    let points: Vec<[f64; 2]> = usable.map(|b| [libm::log(b.frequency_cycles_m), libm::log(b.psd_m4)]).collect();
     if 2 * points.len() < band.len() { f64::NAN } else { crate::multifractality::line_slope(&points) }
 }
 
@@ -216,7 +229,7 @@ fn largest<'a>(rings: impl IntoIterator<Item = &'a SpectrumBin>) -> f64 {
     rings.into_iter().map(|b| b.psd_m4).fold(0.0, f64::max)
 }
 
-/// True for a ring far below those on both sides of it.
+/// Whether a ring is far below the rings on both sides.
 fn is_gap(spectrum: &[SpectrumBin], k: usize) -> bool {
     let below = largest(&spectrum[k.saturating_sub(SLOPE_GAP_RINGS)..k]);
     let above = largest(spectrum[k + 1..].iter().take(SLOPE_GAP_RINGS));
@@ -234,10 +247,10 @@ mod tests {
     }
 
     /// White noise of variance 4 on cells of 0.5 x 0.25 m: density 0.5 m4 in every ring, also with a third of the cells
-    /// missing and a plane added. Rings of n modes scatter by `sqrt(c / n)`, c = 4.5 for window and padding (1.5^2 from
-    /// Hann, 2 from conjugate pairs); threshold 7 times that over about 60 rings: false alarm below 1e-6 (the tail of a
-    /// mean of exponentials is heavier than normal in small rings, hence only rings above 200 modes). Catches a
-    /// normalisation off by 2 %.
+    /// missing and a plane added. Rings of n modes have a relative standard error of `sqrt(c / n)`, c = 4.5 for window and
+    /// padding (1.5^2 from Hann, 2 from conjugate pairs); threshold 7 standard errors over about 60 rings: false-alarm rate
+    /// below 1e-6 (in small rings the tail of a mean of exponentials is heavier than normal, hence only rings above 200
+    /// modes). Catches a normalisation off by 2 %.
     #[test]
     fn stat_white_noise_is_flat() {
         let geometry = Geometry { rows: 400, cols: 343, cell: [0.5, 0.25], origin: [0.0; 2] };
@@ -255,6 +268,59 @@ mod tests {
                 assert!((b.psd_m4 / 0.5 - 1.0).abs() < allowed, "{b:?}");
             }
         }
+    }
+
+    /// Rings by the definition: a direct transform, at every frequency of either sign, of the levelled field under a window of squared
+    /// sines; with holes, oblong cells, and padding from 11 to 12 columns.
+    #[test]
+    fn val_rings_equal_the_definition() {
+        let g = Geometry { rows: 10, cols: 11, cell: [0.5, 0.8], origin: [0.0; 2] };
+        let mut s = Streams::for_seed(3, "spectrum-test").stream("noise");
+        let mut dem = field(g, |x, y| 0.3 * x - y);
+        dem.values.iter_mut().for_each(|z| {
+            let noise = s.normal();
+            *z = if s.uniform() < 0.2 { f64::NAN } else { *z + noise };
+        });
+        let sine = |k: usize, n: usize| libm::sin(0.5 * TAU * (k as f64 + 0.5) / n as f64);
+        let weight = |k: usize| libm::pow(sine(k / 11, 10) * sine(k % 11, 11), 2.0);
+        let level = crate::plane::level(&dem);
+        let cells: Vec<(usize, f64)> =
+            level.values.iter().copied().enumerate().filter(|(_, z)| z.is_finite()).collect();
+        let window_power: f64 = cells.iter().map(|(k, _)| weight(*k) * weight(*k)).sum();
+        // Frequencies, densities and modes by ring: 8 rings an octave from 1 / 8 to 0.625 cycles/m.
+        let mut rings = [(0.0, 0.0, 0u64); 19];
+        for (kx, ky) in (0..12usize).flat_map(|kx| (0..10usize).map(move |ky| (kx, ky))) {
+            let [fx, fy] = [kx.min(12 - kx) as f64 * (1.0 / 6.0), ky.min(10 - ky) as f64 * 0.125];
+            let frequency = (fx * fx + fy * fy).sqrt();
+            if !(0.125..=0.625).contains(&frequency) {
+                continue;
+            }
+            let mode: Complex64 = cells
+                .iter()
+                .map(|(k, z)| {
+                    let turns = (kx * (k % 11)) as f64 / 12.0 + (ky * (k / 11)) as f64 / 10.0;
+                    let (sin, cos) = libm::sincos(-TAU * turns);
+                    Complex64::new(cos, sin) * (weight(*k) * z)
+                })
+                .sum();
+            let ring = &mut rings[((libm::log2(frequency / 0.125) * 8.0) as usize).min(18)];
+            *ring = (ring.0 + frequency, ring.1 + mode.norm_sqr() * 0.4 / window_power, ring.2 + 1);
+        }
+        let expected: Vec<_> = rings.into_iter().filter(|ring| ring.2 > 0).collect();
+        let found = power_spectrum(&dem);
+        assert_eq!(found.iter().map(|b| b.modes).collect::<Vec<_>>(), expected.iter().map(|r| r.2).collect::<Vec<_>>());
+        for (b, (frequencies, powers, modes)) in found.iter().zip(expected) {
+            assert!((b.frequency_cycles_m - frequencies / modes as f64).abs() < 1e-12, "{b:?}");
+            assert!((b.psd_m4 - powers / modes as f64).abs() < 1e-10, "{b:?}");
+        }
+    }
+
+    /// From 4 cycles per shorter side (40 m) to half the Nyquist frequency of the larger cell side (0.8 m).
+    #[test]
+    fn val_the_default_slope_band() {
+        let g = Geometry { rows: 50, cols: 100, cell: [0.5, 0.8], origin: [0.0; 2] };
+        let [low, high] = default_slope_band(&g);
+        assert!((low - 0.1).abs() < 1e-15 && (high - 0.3125).abs() < 1e-15, "{low} {high}");
     }
 
     /// The sum of the density over all modes times the area of a mode is the variance of the windowed field.
@@ -281,7 +347,7 @@ mod tests {
         assert!((peak.frequency_cycles_m / 2.0 - 1.0).abs() < 0.09, "{peak:?}");
     }
 
-    /// A wave that travels east has ridges that run north-south; the map's density is where the wave is.
+    /// A wave that travels east has ridges that run north-south; the density peaks at the frequency of the wave.
     #[test]
     fn val_direction_of_waves() {
         for azimuth_deg in [0.0f64, 20.0, 45.0, 90.0, 120.0, 179.0] {
@@ -307,17 +373,17 @@ mod tests {
         assert!(psd_slope(&spectrum, [9.0, 10.0], 10.0).is_nan());
     }
 
-    /// A wall across the ground: low rings without a mode on the axis of its profile hold rounding alone, or what leaks into them where
-    /// sides are padded (all but 400 and 720). Steps fall off as f^-2, and the share of modes on the axis in a ring as 1/f: -3, give or
-    /// take lobes.
+    /// A trench across the ground: low rings without a mode on the axis of its profile hold only rounding errors, or leakage where
+    /// sides are padded (all but 400 and 720). Steps fall off as f^-2, and the share of modes on the axis in a ring as 1/f: -3, give
+    /// or take lobes.
     #[test]
-    fn val_gaps_are_no_slope() {
+    fn val_gaps_do_not_affect_the_slope() {
         for side in [400, 660, 666, 667, 700, 720] {
             let g = Geometry::square(side, side, 0.15);
             let side_m = 0.15 * side as f64;
             let middle_m = 0.5 * side_m;
-            let wall = field(g, |_, y| if (y - middle_m).abs() < 1.5 { -1.0 } else { 0.0 });
-            let (spectrum, band) = (power_spectrum(&wall), default_slope_band(&g));
+            let trench = field(g, |_, y| if (y - middle_m).abs() < 1.5 { -1.0 } else { 0.0 });
+            let (spectrum, band) = (power_spectrum(&trench), default_slope_band(&g));
             let empty =
                 (0..spectrum.len()).filter(|&k| spectrum[k].frequency_cycles_m >= band[0] && is_gap(&spectrum, k));
             assert!((3..9).contains(&empty.count()), "{side}");
@@ -329,7 +395,7 @@ mod tests {
         }
     }
 
-    /// Lines of a sum of waves, half an octave apart: what lies between those above 11.5 cycles a side stays.
+    /// Lines of a sum of waves, half an octave apart: the rings between them are kept above 11.5 cycles per side.
     #[test]
     fn val_lines_far_above_the_side_leave_no_gaps() {
         let bin = |k: u32| {
@@ -349,7 +415,7 @@ mod tests {
         assert_ne!(all, without);
     }
 
-    /// Falling, rising and bent spectra have no gaps, nor has a broad valley.
+    /// Falling, rising and bent spectra have no gaps; neither does a broad valley.
     #[test]
     fn val_no_gaps_in_smooth_spectra() {
         let of = |psd: &dyn Fn(f64) -> f64| -> Vec<SpectrumBin> {
@@ -365,9 +431,9 @@ mod tests {
         }
     }
 
-    /// Half of the rings is enough, less is not.
+    /// Half of the rings is enough; fewer is not.
     #[test]
-    fn val_a_slope_of_few_rings_is_none() {
+    fn val_a_slope_of_too_few_rings_is_nan() {
         let of = |noisy: usize| {
             let psd = |k: usize| if k <= noisy { 1e-16 } else { libm::pow(k as f64, -3.0) };
             let bin = |k| SpectrumBin { frequency_cycles_m: k as f64, psd_m4: psd(k), modes: 1 };
@@ -378,7 +444,7 @@ mod tests {
     }
 
     #[test]
-    fn val_nothing_to_see() {
+    fn val_empty_small_and_flat_surfaces() {
         assert!(power_spectrum(&Grid::filled(Geometry::square(9, 9, 1.0), f64::NAN)).is_empty());
         assert!(power_spectrum(&Grid::filled(Geometry::square(2, 9, 1.0), 1.0)).is_empty());
         let flat = power_spectrum(&Grid::filled(Geometry::square(9, 9, 1.0), 1.0));

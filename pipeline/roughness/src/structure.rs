@@ -1,16 +1,17 @@
-//! Structure function, and the length and aspect ratio of the texture.
+//! Structure function, autocorrelation length and texture aspect ratio.
 //!
 //! * Structure function `D(h) = <(z(x + h) - z(x))^2>` in m2 over all pairs of cells with data (twice the semivariance):
-//!   over rings of |h| in every direction, and along x and y. Rings are a quarter of an octave wide; the lags along an axis
-//!   are whole cells, spaced alike. White noise of variance s^2 has `D = 2 s^2`, a self-affine surface `D ~ |h|^(2H)`.
+//!   over rings of |h| in all directions, and along x and y. Rings are a quarter of an octave wide; lags along an axis have
+//!   the same spacing, rounded to whole cells. White noise of variance s^2 has `D = 2 s^2`, a self-affine surface
+//!   `D ~ |h|^(2H)`.
 //! * Autocorrelation `f(h) = C(h) / C(0)`, `C(h) = <z(x) z(x + h)>` over the same pairs.
-//! * Sal: the shortest distance at which f falls to 0.2, over all directions; Str: that distance over the longest one, in
-//!   (0, 1], 1 for a texture without direction (ISO 25178-2:2021, 4.5.1 and 4.5.2). Directions are one degree apart, f is
-//!   bilinear between whole lags, and the first fall counts. Str is NaN when f does not fall to 0.2 within the lags that
-//!   are looked at in every direction, Sal when it does in none.
+//! * Sal: the shortest distance, over all directions, at which f falls to 0.2. Str: that distance over the longest one, in
+//!   (0, 1], 1 for an isotropic texture (ISO 25178-2:2021, 4.5.1 and 4.5.2). Directions are one degree apart, f is
+//!   bilinear between whole lags, and the first crossing counts. Str is NaN if f stays above 0.2 in some direction within
+//!   the lags searched, Sal if it does so in all of them.
 //!
-//! Lags reach half of each side, and no further than [`LAG_CELLS_MAX`] cells. Heights are about zero: a caller takes mean and
-//! plane off first ([`crate::level`]). Cost: that of [`LagSums`].
+//! Lags reach half of each side, and at most [`LAG_CELLS_MAX`] cells. Heights must be centred on zero: the caller removes mean
+//! and plane first ([`crate::level`]). Cost: that of [`LagSums`].
 
 use crate::lags::{LagSums, PairSum};
 use sastrugi_numeric::Grid;
@@ -18,14 +19,14 @@ use serde::Serialize;
 
 /// Longest lag, cells.
 pub const LAG_CELLS_MAX: usize = 1024;
-/// Rings, and lags along an axis, per doubling of the lag.
+/// Rings, and lags along an axis, per octave of lag.
 const LAGS_PER_OCTAVE: f64 = 4.0;
-/// Autocorrelation at which the texture's length is read.
+/// Autocorrelation at which Sal and Str are read.
 const DECAYED: f64 = 0.2;
-/// Directions of half a turn.
+/// Directions in half a turn.
 const DIRECTIONS: u32 = 180;
 
-/// Which pairs a structure function is taken over.
+/// Direction of the pairs in a structure function.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord, Serialize)]
 #[serde(rename_all = "lowercase")]
 pub enum Direction {
@@ -38,7 +39,7 @@ pub enum Direction {
 }
 
 impl Direction {
-    /// Word in tables.
+    /// Name in tables.
     pub fn name(self) -> &'static str {
         match self {
             Self::All => "all",
@@ -66,7 +67,22 @@ pub fn lags_of(dem: &Grid) -> [usize; 2] {
     [dem.rows(), dem.cols()].map(|n| (n / 2).min(LAG_CELLS_MAX))
 }
 
-/// Structure function in all directions, then along x, then along y; lags rising. Lags without pairs are left out.
+/// Structure function over all directions, then along x, then along y, each by increasing lag. Lags without pairs are omitted.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::{Direction, LagSums, lags_of, structure_function};
+///
+/// // A slope eastwards, centred on zero: increments are the lag along x, and zero along y.
+/// let geometry = Geometry::square(20, 30, 0.5);
+/// let dem = Grid::new(geometry, (0..600).map(|k| geometry.x(k % 30) - 7.5).collect());
+/// let bins = structure_function(&LagSums::of(&dem, lags_of(&dem)), geometry.cell);
+/// let along = |direction| bins.iter().filter(move |b| b.direction == direction);
+/// assert!(along(Direction::X).count() > 5 && along(Direction::Y).count() > 5);
+/// assert!(along(Direction::X).all(|b| (b.value_m2 - b.lag_m * b.lag_m).abs() < 1e-9));
+/// assert!(along(Direction::Y).all(|b| b.value_m2 < 1e-9));
+/// ```
 pub fn structure_function(sums: &LagSums, cell_m: [f64; 2]) -> Vec<StructureBin> {
     let [max_row, max_col] = sums.max_lag;
     let along_x = along(max_col).map(|lag| bin(Direction::X, lag as f64 * cell_m[0], sums.at(0, lag as isize)));
@@ -78,18 +94,18 @@ fn bin(direction: Direction, lag_m: f64, sum: PairSum) -> StructureBin {
     StructureBin { direction, lag_m, value_m2: sum.increment(), pairs: sum.pairs as u64 }
 }
 
-/// Whole lags up to `most`, a quarter of an octave apart where that is more than a cell.
-pub(crate) fn along(most: usize) -> impl Iterator<Item = usize> {
+/// Lags in whole cells up to `max`, a quarter of an octave apart where that exceeds one cell.
+pub(crate) fn along(max: usize) -> impl Iterator<Item = usize> {
     let rounded = |k: u32| libm::exp2(f64::from(k) / LAGS_PER_OCTAVE).round() as usize;
     let mut last = 0;
-    (0..).map(rounded).filter(move |&lag| std::mem::replace(&mut last, lag) != lag).take_while(move |&lag| lag <= most)
+    (0..).map(rounded).filter(move |&lag| std::mem::replace(&mut last, lag) != lag).take_while(move |&lag| lag <= max)
 }
 
-/// Rings of lags that reach as far in every direction.
+/// Rings of lags, up to the largest lag available in every direction.
 fn rings(sums: &LagSums, cell_m: [f64; 2]) -> Vec<StructureBin> {
     let base = cell_m[0].min(cell_m[1]);
     let reach = (sums.max_lag[0] as f64 * cell_m[1]).min(sums.max_lag[1] as f64 * cell_m[0]) * (1.0 + 1e-9);
-    // Sum of lag times pairs, and the pairs' sums, by ring.
+    // For each ring: sum of lag times pairs, and the sums over the pairs.
     let mut totals: Vec<(f64, PairSum)> = Vec::new();
     for ([drow, dcol], sum) in sums.half() {
         let (x, y) = (dcol as f64 * cell_m[0], drow as f64 * cell_m[1]);
@@ -110,7 +126,7 @@ fn rings(sums: &LagSums, cell_m: [f64; 2]) -> Vec<StructureBin> {
     totals.into_iter().map(|(lag, sum)| bin(Direction::All, lag / sum.pairs, sum)).collect()
 }
 
-/// Length and aspect ratio of the texture.
+/// Autocorrelation length and texture aspect ratio.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct Autocorrelation {
     /// Sal, m.
@@ -133,7 +149,8 @@ pub fn autocorrelation(sums: &LagSums, cell_m: [f64; 2]) -> Autocorrelation {
     Autocorrelation { sal_m: shortest, aspect_ratio: shortest / longest }
 }
 
-/// Distance in m at which the covariance first falls to `level` along `[columns, rows]` per metre; NaN within no lag.
+/// Distance in m at which the covariance first falls to `level`, in the direction given as `[columns, rows]` per metre; NaN if
+/// it does not within the lags available.
 fn fall(sums: &LagSums, [east, south]: [f64; 2], step_m: f64, level: f64) -> f64 {
     let (mut from, mut at_from) = (0.0, sums.at(0, 0).covariance());
     if at_from <= 0.0 || !at_from.is_finite() {
@@ -156,7 +173,7 @@ fn bilinear(sums: &LagSums, col: f64, row: f64) -> Option<f64> {
     let (v, u) = (row - r0, col - c0);
     let at = |dr: isize, dc: isize, weight: f64| {
         let value = sums.at(r0 as isize + dr, c0 as isize + dc).covariance();
-        // What has no weight need not be known.
+        // A lag with zero weight may be undefined.
         if weight == 0.0 { 0.0 } else { weight * value }
     };
     let value = at(0, 0, (1.0 - u) * (1.0 - v)) + at(0, 1, u * (1.0 - v)) + at(1, 0, (1.0 - u) * v) + at(1, 1, u * v);
@@ -187,7 +204,7 @@ mod tests {
         assert_eq!(along(0).count(), 0);
     }
 
-    /// Rings and axes equal loops over all pairs, with holes and oblong cells.
+    /// Rings and axes agree with loops over all pairs, with holes and oblong cells.
     #[test]
     fn val_equals_loops_over_pairs() {
         let g = Geometry { rows: 14, cols: 18, cell: [0.5, 0.8], origin: [0.0; 2] };
@@ -222,21 +239,22 @@ mod tests {
         assert!([Direction::All, Direction::X, Direction::Y].iter().all(|d| bins.iter().any(|b| b.direction == *d)));
     }
 
-    /// White noise of variance 4: D = 8 at every lag. A bin of n pairs scatters by about sqrt(3 / n) relative (pairs share
-    /// cells); 8 of them, in about 80 bins: false alarm below 1e-9. Catches a factor 2 of semivariances at once.
+    /// White noise of variance 4: D = 8 at every lag. A bin of n pairs has a relative standard error of about sqrt(3 / n) (pairs
+    /// share cells); threshold 8 standard errors, about 80 bins: false-alarm rate below 1e-9. A semivariance (a factor of 2)
+    /// fails at once.
     #[test]
     fn stat_white_noise_has_no_structure() {
         let g = Geometry { rows: 256, cols: 200, cell: [0.5, 0.25], origin: [0.0; 2] };
         let mut s = Streams::for_seed(1, "structure-test").stream("white");
         let (sums, bins) = described(&field(g, |_, _| 2.0 * s.normal()));
         for b in bins {
-            // Long lags share the same few cells: no fewer than 1 in 4 cells are independent of one another.
+            // Pairs at long lags share the same few cells: count at most 1 in 4 cells as independent.
             let allowed = 8.0 * (3.0 / (b.pairs as f64).min(12_800.0)).sqrt();
             assert!((b.value_m2 / 8.0 - 1.0).abs() < allowed, "{b:?}");
         }
         let found = autocorrelation(&sums, g.cell);
-        // Linear from 1 to 0 within a cell: 0.8 of the smaller one.
-        assert!((found.sal_m - 0.2).abs() < 0.02 && found.aspect_ratio > 0.3, "{found:?}");
+        // f falls linearly from 1 to 0 within a cell, so Sal is 0.8 of the smaller cell side, and Str the ratio of the sides.
+        assert!((found.sal_m - 0.2).abs() < 0.02 && (found.aspect_ratio - 0.5).abs() < 0.05, "{found:?}");
     }
 
     /// `z = sin(k x)`: D = 1 - cos(k h) over whole periods, f = cos(k h) falls to 0.2 at acos(0.2) / k, and never along the
@@ -257,8 +275,8 @@ mod tests {
         assert!(found.aspect_ratio.is_nan());
     }
 
-    /// Two waves of unequal length across each other: `C = cos(k x) / 2 + cos(k y / 2) / 2`, whose fall to 0.2 is known in
-    /// every direction from the closed form.
+    /// Two crossed waves of different wavelength: `C = cos(k x) / 2 + cos(k y / 2) / 2`, whose fall to 0.2 is known in closed
+    /// form in every direction.
     #[test]
     fn val_aspect_ratio_of_crossed_waves() {
         let g = Geometry::square(400, 400, 0.05);

@@ -1,4 +1,4 @@
-//! Everything the tables say about one heightfield.
+//! Summary of one surface, as the tables record it.
 
 use crate::areal::{ArealFigures, areal_figures};
 use crate::band::band_rms;
@@ -9,23 +9,23 @@ use crate::spectrum::{SpectralMap, SpectrumBin, default_slope_band, psd_slope};
 use sastrugi_numeric::Grid;
 use serde::{Deserialize, Serialize};
 
-/// Window of the band roughness in cells, when no length is given.
+/// Default window of the band RMS, cells.
 const BAND_CELLS: f64 = 41.0;
 
-/// How a heightfield is described.
+/// Settings of [`describe`].
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct DescribeSettings {
-    /// Gradients that part the roughness classes.
+    /// Gradient thresholds between the roughness classes.
     pub thresholds: ClassThresholds,
-    /// Border left out of the class shares, m (Majhor and Bos, section 2.3: 5 m).
+    /// Border excluded from the class shares, m (Majhor and Bos, section 2.3: 5 m).
     pub border_m: f64,
-    /// Window of the moving average below which the band roughness is taken, m; 41 cells when not given.
+    /// Window of the moving average subtracted for the band RMS, m; default 41 cells.
     pub band_window_m: Option<f64>,
-    /// Frequencies between which the slope of the spectrum is fitted, cycles/m; from 4 cycles per shorter side to half
-    /// the Nyquist frequency when not given.
+    /// Frequencies between which the slope of the spectrum is fitted, cycles/m; default: from 4 cycles per shorter side to
+    /// half the Nyquist frequency.
     pub slope_band_cycles_m: Option<[f64; 2]>,
-    /// Lags between which the Hurst exponent is fitted, m; from 1 cell to an eighth of the shorter side when not given.
+    /// Lags between which the Hurst exponent is fitted, m; default: from 1 cell to an eighth of the shorter side.
     pub hurst_lags_m: Option<[f64; 2]>,
     /// Bins of the height distribution.
     pub histogram_bins: usize,
@@ -44,36 +44,50 @@ impl Default for DescribeSettings {
     }
 }
 
-/// Description of a heightfield. NaN stands for a figure that the heightfield does not have.
+/// Description of a surface. A statistic that is undefined for the surface is NaN.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Summary {
     /// Share of cells with data.
     pub valid_share: f64,
     /// Range and moments of the heights.
     pub heights: HeightStatistics,
-    /// Root mean square of the gradient's magnitude (central differences), m/m.
+    /// Root mean square gradient magnitude (central differences), m/m.
     pub rms_slope: f64,
     /// Standard deviation of the heights after the moving average is removed, m.
     pub band_rms_m: f64,
-    /// True window of that average (mean of east-west and north-south), m.
+    /// Actual window of that average (mean of east-west and north-south), m.
     pub band_window_m: f64,
-    /// Shares of the roughness classes without the border, from the map that is not closed.
+    /// Shares of the roughness classes without the border, before closing.
     pub shares: Shares,
-    /// That border, m.
+    /// Width of that border, m.
     pub share_border_m: f64,
-    /// Areal figures above the least-squares plane.
+    /// Areal parameters, with heights above the least-squares plane.
     pub areal: ArealFigures,
     /// Radially averaged power spectral density.
     pub spectrum: Vec<SpectrumBin>,
     /// Slope of the spectrum in log-log axes.
     pub psd_slope: f64,
-    /// Frequencies between which it was fitted, cycles/m.
+    /// Frequencies between which the slope was fitted, cycles/m.
     pub slope_band_cycles_m: [f64; 2],
     /// Distribution of the heights.
     pub histogram: Vec<HistogramBin>,
 }
 
-/// Describes a heightfield.
+/// Describes a surface.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::{DescribeSettings, describe};
+///
+/// let geometry = Geometry::square(40, 50, 1.0);
+/// let mut dem = Grid::new(geometry, (0..2000).map(|k| 0.1 * geometry.x(k % 50)).collect());
+/// dem.values[..500].fill(f64::NAN);
+/// let summary = describe(&dem, &DescribeSettings { histogram_bins: 10, ..DescribeSettings::default() });
+/// assert_eq!((summary.valid_share, summary.shares.low, summary.histogram.len()), (0.75, 1.0, 10));
+/// assert!((summary.rms_slope - 0.1).abs() < 1e-12);
+/// assert!((summary.heights.relief_m - 4.9).abs() < 1e-12);
+/// ```
 pub fn describe(dem: &Grid, settings: &DescribeSettings) -> Summary {
     let classes = classify(&moore_gradient(dem), &settings.thresholds);
     let window_m = settings.band_window_m.unwrap_or(BAND_CELLS * dem.geometry.mean_cell());
@@ -104,7 +118,7 @@ mod tests {
     use sastrugi_numeric::{Geometry, Streams};
 
     #[test]
-    fn val_a_heightfield_is_described_in_full() {
+    fn val_summary_of_noise() {
         let mut s = Streams::for_seed(1, "summary-test").stream("noise");
         let g = Geometry::square(240, 220, 0.05);
         let dem = Grid::new(g, (0..g.len()).map(|_| 0.01 * s.normal()).collect());
@@ -113,9 +127,45 @@ mod tests {
         let all = summary.shares.low + summary.shares.semi + summary.shares.high;
         assert!((all - 1.0).abs() < 1e-12);
         assert!((summary.band_window_m - 2.05).abs() < 1e-9);
-        assert!((summary.heights.rms_m - 0.01).abs() < 1e-3 && (summary.band_rms_m - 0.01).abs() < 1e-3);
-        assert!(summary.psd_slope.abs() < 0.3 && summary.rms_slope > 0.1);
+        // 52 800 cells: 7 standard errors of a standard deviation are 2.2 %, and fewer than 3 % of a slope, whose cells share heights. Slopes
+        // have a variance of `2 sigma^2 / (2 cell)^2` along each axis.
+        assert!((summary.heights.rms_m / 0.01 - 1.0).abs() < 0.022, "{summary:?}");
+        assert!((summary.band_rms_m / 0.01 - 1.0).abs() < 0.022, "{}", summary.band_rms_m);
+        assert!((summary.rms_slope / 0.2 - 1.0).abs() < 0.03, "{}", summary.rms_slope);
+        assert!(summary.psd_slope.abs() < 0.3, "{}", summary.psd_slope);
         assert_eq!(summary.histogram.len(), 64);
+    }
+
+    /// Every setting reaches its statistic.
+    #[test]
+    fn val_settings_are_used() {
+        let mut s = Streams::for_seed(2, "summary-test").stream("noise");
+        let g = Geometry::square(80, 90, 0.5);
+        let mut dem = Grid::new(g, (0..g.len()).map(|_| 1e-3 * s.normal()).collect());
+        // Steps of 10 m within the outer two cells.
+        for (k, z) in dem.values.iter_mut().enumerate() {
+            let (r, c) = (k / 90, k % 90);
+            if r.min(79 - r).min(c).min(89 - c) < 2 && (r + c) % 2 == 0 {
+                *z += 10.0;
+            }
+        }
+        let settings = DescribeSettings {
+            thresholds: ClassThresholds::new(0.1, 0.2).unwrap(),
+            border_m: 2.0,
+            band_window_m: Some(2.6),
+            slope_band_cycles_m: Some([0.1, 0.4]),
+            hurst_lags_m: Some([1.0, 5.0]),
+            histogram_bins: 8,
+        };
+        let found = describe(&dem, &settings);
+        assert_eq!((found.shares, found.share_border_m), (Shares { low: 1.0, semi: 0.0, high: 0.0 }, 2.0));
+        assert_eq!((found.band_window_m, found.slope_band_cycles_m, found.histogram.len()), (2.5, [0.1, 0.4], 8));
+        // Half an octave apart: 2, 3, 4, 6 and 8 cells; 11 are above 5 m.
+        assert_eq!(found.areal.hurst.unwrap().lags_m, [1.0, 4.0]);
+        let whole = describe(&dem, &DescribeSettings { border_m: 0.0, ..settings.clone() });
+        assert!(whole.shares.low < 1.0 && whole.shares.high > 0.0, "{:?}", whole.shares);
+        let all_high = DescribeSettings { thresholds: ClassThresholds::new(1e-12, 2e-12).unwrap(), ..settings };
+        assert_eq!(describe(&dem, &all_high).shares.high, 1.0);
     }
 
     #[test]

@@ -1,17 +1,17 @@
-//! Moments of a positive field averaged over boxes of rising size: the scaling of a multiplicative cascade.
+//! Trace moments: the scaling of a multiplicative cascade, from a positive field averaged over boxes of increasing size.
 //!
 //! For a conserved cascade the moments of the field averaged over boxes of side l,
 //! $$ \langle \varepsilon_l^q \rangle / \langle \varepsilon \rangle^q \propto l^{-K(q)} , $$
-//! grow by the moment scaling function K(q); for a log-normal one `K(q) = C1 (q^2 - q)`, C1 the codimension of the mean
+//! define the moment scaling function K(q); for a log-normal cascade `K(q) = C1 (q^2 - q)`, with C1 the codimension of the mean
 //! (Schertzer and Lovejoy, J. Geophys. Res. 92, 1987, 9693). A field without intermittency has K = 0.
 //!
-//! One field tells little of its K: the standard error comes from an ensemble, leaving out one field at a time.
+//! A single field constrains K poorly: the standard error comes from an ensemble, by leaving out one field at a time.
 
 use crate::multifractality::line_slope;
 use sastrugi_numeric::{Grid, sums};
 use serde::Serialize;
 
-/// Smallest box, cells: below, the cutoff of a generated field bends the moments.
+/// Smallest box, cells: in smaller ones the cutoff of a generated field bends the moments.
 const BOX_MIN: usize = 4;
 /// Boxes along the shorter side at the largest box size.
 const BOXES_MIN: usize = 4;
@@ -21,7 +21,7 @@ const BOXES_MIN: usize = 4;
 pub struct BoxMoments {
     /// Side of the boxes, cells.
     pub box_px: usize,
-    /// Mean of the q-th power of the box averages, for each order asked for.
+    /// Mean of the q-th power of the box averages, for each requested order.
     pub moments: Vec<f64>,
 }
 
@@ -36,10 +36,10 @@ pub struct MomentExponent {
     pub standard_error: f64,
 }
 
-/// Moments over boxes of 4, 8, 16 ... cells, to a quarter of the shorter side; empty below 32 cells. Boxes are whole and lie side by
-/// side from the north-west corner.
+/// Moments over boxes of 4, 8, 16 ... cells, up to a quarter of the shorter side; empty if that side is below 32 cells. Only
+/// complete boxes count, laid out side by side from the north-west corner.
 ///
-/// `flux`: values of 0 or above, all finite.
+/// `flux`: finite values of at least 0.
 pub fn trace_moments(flux: &Grid, orders: &[f64]) -> Vec<BoxMoments> {
     let side = flux.rows().min(flux.cols());
     let sizes = std::iter::successors(Some(BOX_MIN), |b| Some(2 * b)).take_while(|b| b * BOXES_MIN <= side);
@@ -60,8 +60,8 @@ fn moments_of(flux: &Grid, box_px: usize, orders: &[f64]) -> BoxMoments {
     BoxMoments { box_px, moments: orders.iter().map(moment).collect() }
 }
 
-/// K(q) of fields of one shape, each with its [`trace_moments`] for the same orders. `None` for fewer than two fields, or fields too
-/// small.
+/// K(q) of fields of equal shape, from the [`trace_moments`] of each for the same orders. `None` for fewer than two fields, or for
+/// fields that are too small.
 pub fn moment_exponents(fields: &[Vec<BoxMoments>], orders: &[f64]) -> Option<Vec<MomentExponent>> {
     if fields.len() < 2 || fields.iter().any(|f| f.len() < 2 || f.len() != fields[0].len()) {
         return None;
@@ -88,8 +88,8 @@ mod tests {
     use super::*;
     use sastrugi_numeric::{Geometry, Streams};
 
-    /// A cascade of squares into four, of which the two on the diagonal survive with weight 2: after n halvings a share `2^-n` of the
-    /// boxes holds `2^n`, so that `<e^q> = 2^(n (q - 1))` and `K(q) = q - 1` exactly.
+    /// A cascade that splits each square into four, of which the two on the diagonal survive with weight 2: after n halvings a
+    /// share `2^-n` of the boxes holds `2^n`, so `<e^q> = 2^(n (q - 1))` and `K(q) = q - 1` exactly.
     #[test]
     fn val_moments_of_a_balanced_cascade_are_exact() {
         let side = 64;
@@ -112,10 +112,26 @@ mod tests {
         }
     }
 
+    /// Three fields, one of them with four times the moment at 4 cells: the mean moments are 2 and 1, so K = 1. Without the odd one K is 0,
+    /// without either of the others log2 (5 / 2) = a; the jackknife gives `sqrt((n - 1) var) = sqrt(2 * 2 a^2 / 9) = 2 a / 3`.
+    #[test]
+    fn val_the_jackknife_of_three_fields() {
+        let field = |moment: f64| {
+            [(4, moment), (8, 1.0)].map(|(box_px, moment)| BoxMoments { box_px, moments: vec![moment] }).to_vec()
+        };
+        let found = moment_exponents(&[field(1.0), field(4.0), field(1.0)], &[2.0]).unwrap()[0];
+        let a = libm::log2(2.5);
+        assert!(
+            (found.exponent - 1.0).abs() < 1e-12 && (found.standard_error - 2.0 * a / 3.0).abs() < 1e-12,
+            "{found:?}"
+        );
+        assert_eq!(found.order, 2.0);
+    }
+
     /// Independent exponential values do not scale: over boxes of b cells `<a^2> = 1 + 1 / b^2`, whose slope between boxes of 4 and 64
-    /// cells is 0.0195. The mean of all values is common to all sizes, so that only the scatter of `<a^2>` about the squared mean is
-    /// left: 2 / b^2 over the root of the number of boxes, 0.0006 at 4 cells (12 288 boxes) and less beyond; threshold 0.01, over 10
-    /// standard errors of the slope.
+    /// cells is 0.0195. The mean of all values is the same for all box sizes, which leaves only the scatter of `<a^2>` about the
+    /// squared mean: 2 / b^2 over the root of the number of boxes, 0.0006 at 4 cells (12 288 boxes) and less for larger boxes.
+    /// Threshold: 0.01, over 10 standard errors of the slope.
     #[test]
     fn stat_noise_has_the_moments_of_its_averages() {
         let mut s = Streams::for_seed(1, "trace-moments-test").stream("noise");

@@ -1,4 +1,4 @@
-// Builds the page into the folder named on the command line. The same lock file gives the same bytes.
+// Builds the page into the folder named on the command line. The same lock file produces the same bytes.
 
 import { build } from 'esbuild';
 import { copyFile, mkdir, readFile, readdir, rm, writeFile } from 'node:fs/promises';
@@ -9,7 +9,7 @@ const room = dirname(fileURLToPath(import.meta.url));
 const out = resolve(process.argv[2] ?? join(room, 'dist'));
 const common = { absWorkingDir: room, bundle: true, minify: true, format: 'esm', target: ['es2022', 'safari16'], charset: 'utf8', legalComments: 'none', metafile: true, logLevel: 'warning' };
 
-/** Shader texts of three.js that the view's materials (basic, with its lines) do not include are left out: a fifth of the bundle. */
+/** Leaves out the shader texts of three.js that the view's materials (basic, with its lines) do not include: a fifth of the bundle. */
 const shaders = {
   name: 'shaders',
   setup({ onLoad }) {
@@ -20,7 +20,7 @@ const shaders = {
       const kept = new Set();
       const keep = (chunk) => {
         const name = chunks.get(chunk);
-        if (!name) throw new Error(`three.js has no shader chunk ${chunk}: look at build.mjs`);
+        if (!name) throw new Error(`three.js has no shader chunk ${chunk}; update build.mjs`);
         if (kept.has(name)) return;
         kept.add(name);
         for (const [, inner] of texts.get(name).matchAll(/#include <(\w+)>/g)) keep(inner);
@@ -34,13 +34,13 @@ const shaders = {
 
 await rm(out, { recursive: true, force: true });
 await mkdir(out, { recursive: true });
-// Two bundles: the map comes first, the 3-D view is imported the first time it is wanted.
+// Two bundles: the map comes first, the 3-D view is imported when it is first opened.
 const page = await build({ ...common, entryPoints: ['src/main.js'], outfile: join(out, 'page.js'), external: ['./three.js'] });
 const space = await build({ ...common, entryPoints: ['src/three.js'], outfile: join(out, 'three.js'), plugins: [shaders] });
 await copyFile(join(room, 'src/index.html'), join(out, 'index.html'));
 await writeFile(join(out, 'licences.txt'), await licences([page, space]));
 
-/** Licence texts of the packages that ended up in the bundles, and of no others. */
+/** Licence texts of exactly the packages that are in the bundles. */
 async function licences(results) {
   const used = new Set();
   for (const { metafile } of results) for (const output of Object.values(metafile.outputs)) for (const [path, { bytesInOutput }] of Object.entries(output.inputs)) {

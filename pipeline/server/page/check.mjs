@@ -15,9 +15,9 @@ try {
   const read = (folder, name) => { try { return readFileSync(join(folder, name)); } catch { return Buffer.from('absent'); } };
   const different = names.filter((name) => !read(fresh, name).equals(read(kept, name)));
   if (different.length) {
-    console.error(`dist is not what the sources build: ${different.join(', ')}. Run \`npm run build\` and commit dist.`);
+    console.error(`dist is out of date: ${different.join(', ')}. Run \`npm run build\` and commit dist.`);
     process.exitCode = 1;
-  } else console.log(`dist is what the sources build: ${names.join(', ')}`);
+  } else console.log(`dist is up to date: ${names.join(', ')}`);
 } finally {
   rmSync(fresh, { recursive: true, force: true });
 }

@@ -1,4 +1,4 @@
-//! A client of the server: patches as grids.
+//! HTTP client of the server; returns patches as grids.
 //!
 //! ```no_run
 //! use sastrugi_server::client::{Client, Patch};
@@ -16,35 +16,35 @@ use std::time::Duration;
 use ureq::Agent;
 use ureq::http::{HeaderMap, Response};
 
-/// How often a request that the server has no room for is sent again.
+/// Attempts at a request while the server is busy.
 const TRIES: u32 = 10;
-/// Longest wait between two of them, s.
+/// Longest wait between two attempts, s.
 const WAIT_MAX_S: u64 = 30;
-/// Longest time of a request, s.
+/// Time limit of a request, s.
 const REQUEST_S: u64 = 600;
-/// From this share of rock on a sample is rock.
+/// A sample is rock if rocks cover at least this share of it.
 const ROCK: f32 = 0.5;
 
-/// Why there is no answer.
+/// Why a request failed.
 #[derive(Debug, thiserror::Error)]
 pub enum ClientError {
-    /// The server refused.
+    /// The server refused the request.
     #[error("{status}: {detail}")]
     Refused {
         /// HTTP status.
         status: u16,
-        /// The server's sentence.
+        /// Detail of the server's error.
         detail: String,
     },
-    /// There was no answer.
+    /// No response arrived.
     #[error("{0}")]
     Transport(#[from] ureq::Error),
-    /// The answer is not one of this server.
+    /// The response is not in the format of this server.
     #[error("{0}")]
     Answer(String),
 }
 
-/// A field of a ground.
+/// A field of a collection.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Field {
     /// Heights, m.
@@ -54,7 +54,7 @@ pub enum Field {
     Albedo,
     /// Share of the cell that rocks cover, 0 to 1.
     Class,
-    /// Share of the ground that all rocks may cover, 0 to 1.
+    /// Potential rock cover: share of the ground that rocks of all sizes may cover, 0 to 1.
     RockPotential,
 }
 
@@ -69,27 +69,27 @@ impl Field {
     }
 }
 
-/// What is asked for.
+/// A request for a patch.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Patch {
     /// Id of the collection.
     pub collection: String,
-    /// Place of the south-west sample, m.
+    /// Position of the south-west sample, m.
     pub origin_m: [f64; 2],
     /// Columns and rows.
     pub size: [usize; 2],
-    /// Distance of the samples, m; that of the collection when absent.
+    /// Sample spacing, m; the collection's own if absent.
     pub resolution_m: Option<f64>,
-    /// What the samples are.
+    /// Field to return.
     pub field: Field,
-    /// Numbers of the processes that act, from 1; all when absent.
+    /// Numbers of the processes to apply, from 1; all if absent.
     pub phenomena: Option<Vec<usize>>,
-    /// Craters and rocks that are not wider are left out, m.
+    /// Craters and rocks up to this width are left out, m.
     pub feature_min_m: f64,
 }
 
 impl Patch {
-    /// Heights of columns and rows of samples from a place on.
+    /// Requests heights on `size` (columns, rows) with the south-west sample at `origin_m`.
     pub fn new(collection: &str, origin_m: [f64; 2], size: [usize; 2]) -> Self {
         Self {
             collection: collection.to_owned(),
@@ -104,7 +104,7 @@ impl Patch {
 
     /// Path and query of the request.
     fn address(&self) -> String {
-        // The shortest digits that are the number: the server reads the same.
+        // `{:?}` prints the shortest digits that identify the number, so the server reads the same value.
         let Self { collection, origin_m: [x, y], size: [cols, rows], field, .. } = self;
         let mut text = format!(
             "/v1/collections/{collection}/patch?origin={x:?},{y:?}&size={cols},{rows}&field={}&format=raw",
@@ -124,24 +124,24 @@ impl Patch {
     }
 }
 
-/// A collection, as the server describes it.
+/// A collection as described by the server.
 #[derive(Clone, Debug, Deserialize)]
 pub struct CollectionSummary {
-    /// Id in addresses.
+    /// Id in URLs.
     pub id: String,
-    /// Name for people.
+    /// Display name.
     pub title: String,
     /// West, south, east and north, m.
     pub bounds_m: [f64; 4],
-    /// Distance of samples unasked, m.
+    /// Default sample spacing, m.
     pub cell_m: f64,
-    /// Finest distance of samples, m.
+    /// Finest sample spacing, m.
     pub spacing_m: f64,
-    /// Its fields.
+    /// Available fields.
     pub fields: Vec<String>,
 }
 
-/// A server.
+/// Connection to a server.
 #[derive(Clone, Debug)]
 pub struct Client {
     agent: Agent,
@@ -150,7 +150,7 @@ pub struct Client {
 }
 
 impl Client {
-    /// The server at an address, as `http://127.0.0.1:8080`.
+    /// Client of the server at an address such as `http://127.0.0.1:8080`.
     pub fn new(base: &str) -> Self {
         let config = Agent::config_builder()
             .http_status_as_error(false)
@@ -159,13 +159,13 @@ impl Client {
         Self { agent: config.into(), base: base.trim_end_matches('/').to_owned(), token: None }
     }
 
-    /// With a token to show.
+    /// Sends this bearer token with each request.
     #[must_use]
     pub fn with_token(self, token: &str) -> Self {
         Self { token: Some(token.to_owned()), ..self }
     }
 
-    /// What is served.
+    /// Lists the collections.
     ///
     /// # Errors
     /// See [`ClientError`].
@@ -179,33 +179,33 @@ impl Client {
         Ok(all.collections)
     }
 
-    /// A patch, row 0 in the north, each sample in the middle of its cell; NaN where there are no data.
+    /// Fetches a patch: row 0 in the north, each sample at the centre of its cell, NaN where there is no data.
     ///
     /// # Errors
     /// See [`ClientError`].
     pub fn patch(&self, patch: &Patch) -> Result<Grid<f32>, ClientError> {
         let (head, body) = self.get(&patch.address())?;
-        let figures = |name: &str| -> Option<Vec<f64>> {
-            head.get(name)?.to_str().ok()?.split(',').map(|figure| figure.parse().ok()).collect()
+        let numbers = |name: &str| -> Option<Vec<f64>> {
+            head.get(name)?.to_str().ok()?.split(',').map(|text| text.parse().ok()).collect()
         };
-        let figure = |name: &str| figures(name).filter(|all| all.len() == 1).map(|all| all[0]);
+        let number = |name: &str| numbers(name).filter(|all| all.len() == 1).map(|all| all[0]);
         let read = || -> Option<(usize, usize, f64, [f64; 2])> {
-            let (rows, cols) = (figure("grid-rows")? as usize, figure("grid-columns")? as usize);
-            let origin = figures("grid-origin-m").filter(|all| all.len() == 2)?;
-            Some((rows, cols, figure("grid-resolution-m")?, [origin[0], origin[1]]))
+            let (rows, cols) = (number("grid-rows")? as usize, number("grid-columns")? as usize);
+            let origin = numbers("grid-origin-m").filter(|all| all.len() == 2)?;
+            Some((rows, cols, number("grid-resolution-m")?, [origin[0], origin[1]]))
         };
-        let whole = |(rows, cols, ..): &(usize, usize, f64, [f64; 2])| {
+        let fits = |(rows, cols, ..): &(usize, usize, f64, [f64; 2])| {
             rows.checked_mul(*cols).and_then(|count| count.checked_mul(4)) == Some(body.len())
         };
         let (rows, cols, cell, south_west) = read()
-            .filter(whole)
+            .filter(fits)
             .ok_or_else(|| ClientError::Answer("the response is not a patch; is this a terrain server?".to_owned()))?;
         let origin = south_west.map(|at| at - 0.5 * cell);
         let values = body.chunks_exact(4).map(|v| f32::from_le_bytes([v[0], v[1], v[2], v[3]])).collect();
         Ok(Grid::new(Geometry { rows, cols, cell: [cell; 2], origin }, values))
     }
 
-    /// Heights, and rock and albedo where the collection has them, as ground to drive on; `patch.field` does not matter.
+    /// Fetches heights, with rock and albedo if the collection has them, as ground to drive on; `patch.field` is ignored.
     ///
     /// # Errors
     /// See [`ClientError`].
@@ -220,7 +220,7 @@ impl Client {
         Ok(GroundGrid { heights: of(Field::Elevation)?, class, albedo })
     }
 
-    /// An answer with its head; asks again where the server has no room.
+    /// Fetches headers and body; retries while the server is busy.
     fn get(&self, path: &str) -> Result<(HeaderMap, Vec<u8>), ClientError> {
         let mut tries = 1;
         loop {
@@ -246,9 +246,49 @@ impl Client {
     }
 }
 
-/// How long the server asks to wait, s; `None` where it did not turn the request away for want of room.
+/// Seconds to wait before a retry; `None` if the server is not busy.
 fn wait_s<B>(answer: &Response<B>) -> Option<u64> {
     let busy = matches!(answer.status().as_u16(), 429 | 503);
     let asked = answer.headers().get("retry-after").and_then(|value| value.to_str().ok());
     busy.then(|| asked.and_then(|text| text.parse().ok()).unwrap_or(1).min(WAIT_MAX_S))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_requests_state_what_is_wanted() {
+        let plain = Patch::new("planet", [-1.5, 2.0], [512, 256]);
+        assert_eq!(
+            plain.address(),
+            "/v1/collections/planet/patch?origin=-1.5,2.0&size=512,256&field=elevation&format=raw"
+        );
+        let all = Patch {
+            resolution_m: Some(0.02),
+            field: Field::RockPotential,
+            phenomena: Some(vec![1, 3]),
+            feature_min_m: 0.5,
+            ..plain.clone()
+        };
+        let more = "&field=rock_potential&format=raw&resolution_m=0.02&phenomena=1,3&feature_min_m=0.5";
+        assert!(all.address().ends_with(more), "{}", all.address());
+        // No processes at all is not the same as all of them.
+        assert!(Patch { phenomena: Some(Vec::new()), ..plain }.address().ends_with("&format=raw&phenomena="));
+    }
+
+    /// A busy server is asked again after the time that it states, at most 30 s; other answers are final.
+    #[test]
+    fn val_the_client_waits_while_the_server_is_busy() {
+        let wait = |status: u16, seconds: Option<&str>| {
+            let mut answer = Response::builder().status(status);
+            if let Some(seconds) = seconds {
+                answer = answer.header("retry-after", seconds);
+            }
+            wait_s(&answer.body(()).unwrap())
+        };
+        assert_eq!([wait(503, Some("7")), wait(429, Some("600"))], [Some(7), Some(30)]);
+        assert_eq!([wait(503, None), wait(503, Some("soon"))], [Some(1), Some(1)]);
+        assert_eq!([wait(200, Some("7")), wait(404, None), wait(500, Some("7"))], [None; 3]);
+    }
 }

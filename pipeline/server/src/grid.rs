@@ -1,7 +1,7 @@
-//! Tile grids: a square of the plane, cut into tiles of 256 x 256 pixels, whose side halves from level to level.
+//! Tile grids: a square of the plane, divided into tiles of 256 x 256 pixels whose side halves from level to level.
 //!
-//! Pixels are cells: pixel `(r, c)` of the tile in `(row, col)` is the sample in the middle of its cell, half a pixel from the corner of the tile.
-//! Rows are counted from the north, levels from the coarsest.
+//! Pixels are cells: pixel `(r, c)` of tile `(row, col)` is the sample at the centre of its cell, so the first lies half a pixel from the tile's
+//! corner. Rows are counted from the north, levels from the coarsest.
 
 use serde_json::{Value, json};
 
@@ -9,13 +9,27 @@ use serde_json::{Value, json};
 pub const TILE: usize = 256;
 
 /// A tile grid.
+///
+/// # Examples
+/// ```
+/// use sastrugi_server::grid::{TileGrid, TileIndex};
+///
+/// // 1000 m x 300 m with pixels of 4, 2 and 1 m.
+/// let grid = TileGrid { origin_m: [0.0, 300.0], size_m: [1000.0, 300.0], finest_m: 1.0, levels: 3 };
+/// assert_eq!([0, 1, 2].map(|level| grid.resolution_m(level)), [4.0, 2.0, 1.0]);
+/// // Columns and rows of tiles of 256 pixels.
+/// assert_eq!([0, 1, 2].map(|level| grid.matrix(level)), [[1, 1], [2, 1], [4, 2]]);
+/// // North-west corner of a tile: rows count from the north.
+/// assert_eq!(grid.corner_m(TileIndex { level: 2, row: 1, col: 3 }), [768.0, 44.0]);
+/// assert_eq!(grid.level_of(2.5), 1);
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TileGrid {
     /// North-west corner, m.
     pub origin_m: [f64; 2],
-    /// Size of what is covered east-west and north-south, m.
+    /// East-west and north-south extent, m.
     pub size_m: [f64; 2],
-    /// Side of a pixel of the finest level, m.
+    /// Pixel size at the finest level, m.
     pub finest_m: f64,
     /// Number of levels.
     pub levels: u32,
@@ -24,7 +38,7 @@ pub struct TileGrid {
 /// A tile of a grid.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Hash)]
 pub struct TileIndex {
-    /// Level, 0 the coarsest.
+    /// Level; 0 is the coarsest.
     pub level: u32,
     /// Row, from the north.
     pub row: u32,
@@ -33,18 +47,18 @@ pub struct TileIndex {
 }
 
 impl TileGrid {
-    /// Side of a pixel, m.
+    /// Pixel size, m.
     pub fn resolution_m(&self, level: u32) -> f64 {
         self.finest_m * (1u64 << (self.levels - 1 - level)) as f64
     }
 
-    /// Columns and rows of tiles.
+    /// Columns and rows of tiles at a level.
     pub fn matrix(&self, level: u32) -> [u32; 2] {
         let side = self.resolution_m(level) * TILE as f64;
         self.size_m.map(|size| ((size / side - 1e-9).ceil() as u32).max(1))
     }
 
-    /// Whether the grid has that tile.
+    /// Whether the grid contains this tile.
     pub fn has(&self, tile: TileIndex) -> bool {
         tile.level < self.levels && {
             let [cols, rows] = self.matrix(tile.level);
@@ -58,19 +72,19 @@ impl TileGrid {
         [self.origin_m[0] + f64::from(tile.col) * side, self.origin_m[1] - f64::from(tile.row) * side]
     }
 
-    /// The coarsest level whose pixels are at most that wide; the finest where none is.
+    /// The coarsest level with pixels of at most `resolution_m`; the finest level if there is none.
     pub fn level_of(&self, resolution_m: f64) -> u32 {
         let fits = |level: &u32| self.resolution_m(*level) <= resolution_m * (1.0 + 1e-9);
         (0..self.levels).find(fits).unwrap_or(self.levels - 1)
     }
 
-    /// West, south, east and north edge, m.
+    /// West, south, east and north edges, m.
     pub fn bounds_m(&self) -> [f64; 4] {
         let ([west, north], [across, up]) = (self.origin_m, self.size_m);
         [west, north - up, west + across, north]
     }
 
-    /// For clients.
+    /// Description for clients.
     pub fn describe(&self, id: &str) -> Value {
         let levels = 0..self.levels;
         json!({
@@ -84,16 +98,26 @@ impl TileGrid {
     }
 }
 
-/// The level and tile of the synthetic window of web-Mercator clients: the tile of zoom 8 north-east of (0, 0) is the tile of level 0.
+/// Level and tile for web-Mercator clients. They see the grid in a synthetic window: the zoom-8 tile north-east of (0, 0) is the tile of level 0.
+///
+/// # Examples
+/// ```
+/// use sastrugi_server::grid::{TileIndex, of_web_mercator};
+///
+/// assert_eq!(of_web_mercator(8, 128, 127), Some(TileIndex { level: 0, row: 0, col: 0 }));
+/// // The south-east quarter of that tile.
+/// assert_eq!(of_web_mercator(9, 257, 255), Some(TileIndex { level: 1, row: 1, col: 1 }));
+/// assert_eq!(of_web_mercator(8, 127, 127), None);
+/// ```
 pub fn of_web_mercator(z: u32, x: u32, y: u32) -> Option<TileIndex> {
     let level = z.checked_sub(WINDOW_ZOOM)?;
     let first = |at: u32| at.checked_shl(level).filter(|v| v >> level == at);
     Some(TileIndex { level, row: y.checked_sub(first(WINDOW_TILE[1])?)?, col: x.checked_sub(first(WINDOW_TILE[0])?)? })
 }
 
-/// Zoom of the window's one tile.
+/// Zoom of the window tile.
 pub const WINDOW_ZOOM: u32 = 8;
-/// Column and row of that tile.
+/// Column and row of the window tile.
 pub const WINDOW_TILE: [u32; 2] = [128, 127];
 
 #[cfg(test)]
@@ -120,7 +144,7 @@ mod tests {
         );
     }
 
-    /// Zoom 8 is level 0, zoom 24 the finest; beyond the window there is nothing.
+    /// Zoom 8 is level 0, zoom 24 the finest; there are no tiles outside the window.
     #[test]
     fn val_web_mercator_clients_see_the_square_in_one_tile() {
         assert_eq!(of_web_mercator(8, 128, 127), Some(TileIndex { level: 0, row: 0, col: 0 }));
@@ -128,5 +152,30 @@ mod tests {
         assert_eq!(of_web_mercator(7, 64, 63), None);
         assert_eq!(of_web_mercator(9, 255, 255), None);
         assert_eq!(of_web_mercator(40, u32::MAX, u32::MAX), None);
+    }
+
+    /// 1000 m x 300 m with pixels of 4, 2 and 1 m, whose tiles are 1024, 512 and 256 m wide.
+    #[test]
+    fn val_tiles_of_an_oblong_grid() {
+        let grid = TileGrid { origin_m: [100.0, 900.0], size_m: [1000.0, 300.0], finest_m: 1.0, levels: 3 };
+        assert_eq!([0, 1, 2].map(|level| grid.matrix(level)), [[1, 1], [2, 1], [4, 2]]);
+        assert_eq!(grid.corner_m(TileIndex { level: 2, row: 1, col: 3 }), [868.0, 644.0]);
+        assert_eq!(grid.bounds_m(), [100.0, 600.0, 1100.0, 900.0]);
+        assert_eq!([5.0, 4.0, 3.0, 2.0, 1.0, 0.5].map(|resolution_m| grid.level_of(resolution_m)), [0, 0, 1, 1, 2, 2]);
+        assert!(grid.has(TileIndex { level: 2, row: 1, col: 3 }));
+        assert!(!grid.has(TileIndex { level: 2, row: 2, col: 3 }) && !grid.has(TileIndex { level: 2, row: 1, col: 4 }));
+        // A grid of whole tiles has no empty ones beyond its edge.
+        assert_eq!(TileGrid { size_m: [512.0, 256.0], ..grid }.matrix(2), [2, 1]);
+    }
+
+    #[test]
+    fn prop_web_mercator_tiles_are_those_of_the_grid() {
+        for level in 0..=16u32 {
+            let last = (1 << level) - 1;
+            for (row, col) in [(0, 0), (last, 0), (0, last), (last / 3, last / 2)] {
+                let (x, y) = ((WINDOW_TILE[0] << level) + col, (WINDOW_TILE[1] << level) + row);
+                assert_eq!(of_web_mercator(WINDOW_ZOOM + level, x, y), Some(TileIndex { level, row, col }));
+            }
+        }
     }
 }

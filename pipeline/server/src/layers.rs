@@ -1,4 +1,4 @@
-//! Layers of map tiles: samples as colours.
+//! Layers of map tiles: how samples become colours.
 
 use crate::grid::TILE;
 use crate::samples::Samples;
@@ -6,26 +6,26 @@ use sastrugi_imaging::Sun;
 use sastrugi_imaging::hillshade::shade_inner;
 use sastrugi_store::picture::rgba_png;
 
-/// A layer.
+/// A layer of map tiles.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Layer {
     /// Hillshade tinted by height and albedo.
     Relief,
-    /// Brightness under one light, grey.
+    /// Hillshade from one light source, grey.
     Hillshade,
-    /// Share of rock, as a veil.
+    /// Share of rock, as a translucent overlay.
     Class,
     /// Albedo, grey.
     Albedo,
-    /// Heights as Terrarium packs them: steps of 3.9 mm.
+    /// Heights in the Terrarium encoding, in steps of 3.9 mm.
     Terrarium,
-    /// Heights as Terrain-RGB packs them: steps of 0.1 m.
+    /// Heights in the Terrain-RGB encoding, in steps of 0.1 m.
     TerrainRgb,
-    /// Heights in steps of [`STEP_M`] from an offset of the collection.
+    /// Heights in steps of [`STEP_M`] above an offset of the collection.
     Elevation,
 }
 
-/// Every layer.
+/// All layers.
 pub const ALL: [Layer; 7] = [
     Layer::Relief,
     Layer::Hillshade,
@@ -36,34 +36,34 @@ pub const ALL: [Layer; 7] = [
     Layer::Elevation,
 ];
 
-/// Step of the heights of [`Layer::Elevation`], m: below the roughness of the ground between two samples 1 cm apart.
+/// Step of the heights of [`Layer::Elevation`], m. It is below the roughness of the ground between two samples 1 cm apart.
 pub const STEP_M: f64 = 5e-5;
-/// Heights that it spans, m: 2^24 steps.
+/// Range of heights that the layer can encode, m: 2^24 steps.
 pub const ELEVATION_SPAN_M: f64 = 16_777_216.0 * STEP_M;
 
-/// What a layer is drawn with.
+/// Drawing parameters of a layer.
 #[derive(Clone, Copy, Debug)]
 pub struct Style {
-    /// Where the light stands.
+    /// Direction of the light.
     pub sun: Sun,
-    /// Factor on slopes.
+    /// Vertical exaggeration: factor on slopes.
     pub exaggeration: f64,
-    /// Lowest and highest height of the tints, m.
+    /// Heights of the lowest and the highest tint, m.
     pub range_m: [f64; 2],
-    /// Height of level 0 of [`Layer::Elevation`], m.
+    /// Height of step 0 of [`Layer::Elevation`], m.
     pub offset_m: f64,
-    /// Distance of the samples, m.
+    /// Sample spacing, m.
     pub cell_m: f64,
 }
 
-/// Tints from low to high ground.
+/// Tints from the lowest to the highest ground.
 const TINTS: [[f64; 3]; 5] =
     [[96.0, 82.0, 76.0], [139.0, 112.0, 92.0], [184.0, 148.0, 116.0], [213.0, 186.0, 152.0], [236.0, 224.0, 203.0]];
-/// Albedo of the ground that is shown as it is tinted.
+/// Albedo at which the ground has exactly its tint.
 const PLAIN_ALBEDO: f64 = 0.25;
 
 impl Layer {
-    /// Name in addresses.
+    /// Name in URLs.
     pub fn name(self) -> &'static str {
         match self {
             Self::Relief => "relief",
@@ -76,12 +76,12 @@ impl Layer {
         }
     }
 
-    /// The layer of a name.
+    /// Layer with this name.
     pub fn of_name(name: &str) -> Option<Self> {
         ALL.into_iter().find(|layer| layer.name() == name)
     }
 
-    /// What it shows, for people.
+    /// One-line description.
     pub fn summary(self) -> &'static str {
         match self {
             Self::Relief => "hillshade, tinted by height and albedo",
@@ -94,7 +94,7 @@ impl Layer {
         }
     }
 
-    /// The field that a collection must have for it.
+    /// Field that the collection must have for this layer.
     pub fn field(self) -> Option<&'static str> {
         match self {
             Self::Class => Some("class"),
@@ -103,7 +103,7 @@ impl Layer {
         }
     }
 
-    /// The finest pixels that its steps are fit for, m.
+    /// Finest pixel, m, for which the height steps of the encoding are small enough.
     pub fn finest_m(self) -> f64 {
         match self {
             Self::Terrarium | Self::TerrainRgb => 0.16 * (1.0 - 1e-9),
@@ -111,17 +111,33 @@ impl Layer {
         }
     }
 
-    /// Whether it depends on light.
+    /// Whether the layer depends on the light.
     pub fn is_lit(self) -> bool {
         matches!(self, Self::Relief | Self::Hillshade)
     }
 
-    /// Whether no pixel of a tile has data; its samples have one more on every side.
+    /// Whether no pixel of the tile has data; `samples` include a margin of one sample on every side.
     pub fn is_void(samples: &Samples) -> bool {
         (0..TILE * TILE).all(|k| samples.heights[at(k)].is_nan())
     }
 
-    /// PNG of a tile from its samples, which have one more on every side; `None` where a height is beyond what the packing can hold.
+    /// Draws a tile as PNG from its samples, which include a margin of one on every side; `None` if a height is outside the range of the encoding.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_imaging::Sun;
+    /// use sastrugi_server::grid::TILE;
+    /// use sastrugi_server::layers::{Layer, Style};
+    /// use sastrugi_server::samples::Samples;
+    ///
+    /// let style = Style { sun: Sun::default(), exaggeration: 1.0, range_m: [0.0, 1.0], offset_m: 0.0, cell_m: 1.0 };
+    /// let side = TILE + 2;
+    /// let level = |height_m: f32| Samples { heights: vec![height_m; side * side], ..Samples::empty(side, side) };
+    /// let png = Layer::Hillshade.draw(&level(0.0), &style);
+    /// assert!(png.is_some_and(|bytes| bytes.starts_with(b"\x89PNG")));
+    /// // Terrain-RGB ends at 1667 km.
+    /// assert_eq!(Layer::TerrainRgb.draw(&level(2e6), &style), None);
+    /// ```
     pub fn draw(self, samples: &Samples, style: &Style) -> Option<Vec<u8>> {
         let shade = if self.is_lit() { self.shade(samples, style) } else { Vec::new() };
         let mut pixels = Vec::with_capacity(TILE * TILE);
@@ -137,8 +153,8 @@ impl Layer {
                 Self::Relief => {
                     let albedo = value(&samples.albedo).filter(|a| a.is_finite()).unwrap_or(PLAIN_ALBEDO);
                     let brightness = f64::from(shade[k]) / std::f64::consts::FRAC_1_SQRT_2;
-                    // A quarter of the light comes from everywhere, so that shades keep their detail; level ground leaves room for slopes that face
-                    // the light.
+                    // A quarter of the light is ambient, so that shadows keep their detail; level ground leaves headroom for slopes that face the
+                    // light.
                     let light = 0.82 * (0.25 + 0.75 * brightness) * (0.4 + 0.6 * albedo / PLAIN_ALBEDO);
                     let [r, g, b] = tint(height, style.range_m).map(|c| level(c / 255.0 * light));
                     [r, g, b, 255]
@@ -162,12 +178,12 @@ impl Layer {
     }
 }
 
-/// The sample of a pixel.
+/// Index of the sample under a pixel.
 fn at(pixel: usize) -> usize {
     (pixel / TILE + 1) * (TILE + 2) + pixel % TILE + 1
 }
 
-/// Level of a brightness.
+/// Brightness 0 to 1 as a byte.
 fn level(value: f64) -> u8 {
     (255.0 * value.clamp(0.0, 1.0)).round() as u8
 }
@@ -177,7 +193,7 @@ fn grey(value: f64) -> [u8; 4] {
     [v, v, v, 255]
 }
 
-/// A whole number in three bytes; `None` beyond them.
+/// An integer in three bytes; `None` if it is out of range.
 fn packed(value: f64) -> Option<[u8; 4]> {
     let n = value.round();
     if !(0.0..16_777_216.0).contains(&n) {
@@ -199,9 +215,9 @@ fn tint(height: f64, [low, high]: [f64; 2]) -> [f64; 3] {
 mod tests {
     use super::*;
 
-    /// Heights come back from the three bytes to half a step.
+    /// Decoded heights agree within half a step.
     #[test]
-    fn val_packed_heights_come_back() {
+    fn val_packed_heights_round_trip() {
         let unpack = |[r, g, b, _]: [u8; 4]| f64::from(r) * 65536.0 + f64::from(g) * 256.0 + f64::from(b);
         for height in [-1234.567, -0.001, 0.0, 3.25, 812.3456] {
             let terrarium = unpack(packed((height + 32768.0) * 256.0).unwrap()) / 256.0 - 32768.0;
@@ -215,9 +231,9 @@ mod tests {
         assert_eq!(packed(16_777_216.0), None);
     }
 
-    /// A tile of which only the ground around it has data is void; ground without an albedo is left open.
+    /// A tile is void if only the ground around it has data; pixels without an albedo are transparent.
     #[test]
-    fn val_pixels_without_data_are_open() {
+    fn val_pixels_without_data_are_transparent() {
         let side = TILE + 2;
         let mut samples = Samples { heights: vec![f32::NAN; side * side], ..Samples::empty(side, side) };
         samples.heights[..side].fill(1.0);
@@ -230,5 +246,82 @@ mod tests {
         let drawn = Layer::Albedo.draw(&samples, &style).unwrap();
         let void = Layer::Albedo.draw(&Samples { heights: vec![f32::NAN; side * side], ..samples }, &style).unwrap();
         assert_eq!(drawn, void);
+    }
+
+    /// A tile's samples, with heights by row and column; the margin has row and column 0.
+    fn samples(height: impl Fn(usize, usize) -> f32) -> Samples {
+        let side = TILE + 2;
+        let heights = (0..side * side).map(|k| height(k / side, k % side)).collect();
+        Samples { heights, ..Samples::empty(side, side) }
+    }
+
+    fn style() -> Style {
+        Style { sun: Sun::default(), exaggeration: 1.0, range_m: [0.0, 2.0], offset_m: 0.0, cell_m: 1.0 }
+    }
+
+    fn picture(pixel: impl Fn(usize, usize) -> [u8; 4]) -> Option<Vec<u8>> {
+        let pixels: Vec<[u8; 4]> = (0..TILE * TILE).map(|k| pixel(k / TILE, k % TILE)).collect();
+        rgba_png([TILE, TILE], &pixels).ok()
+    }
+
+    /// Pixel (row, column) shows the sample one row and one column further, because of the margin.
+    #[test]
+    fn val_pixels_show_the_samples_below_them() {
+        let step = |row: usize, col: usize| row * (TILE + 2) + col;
+        let heights = samples(|row, col| (step(row, col) as f64 * STEP_M) as f32);
+        let expected = picture(|row, col| {
+            let [_, r, g, b] = (step(row + 1, col + 1) as u32).to_be_bytes();
+            [r, g, b, 255]
+        });
+        assert_eq!(Layer::Elevation.draw(&heights, &style()), expected);
+    }
+
+    /// Level ground 1 m high, half-way up the tints and under a sun 45 degrees high: brightness 0.707, which a relief shows at 0.82 of its tint.
+    #[test]
+    fn val_level_ground_has_known_colours() {
+        let level = samples(|_, _| 1.0);
+        for (layer, pixel) in [
+            (Layer::Hillshade, [180, 180, 180, 255]),
+            (Layer::Relief, [151, 121, 95, 255]),
+            // 256 x 128 + 1 - 32768 m, 0.1 x (1 x 65536 + 134 x 256 + 170) - 10000 m, and 20 000 steps.
+            (Layer::Terrarium, [128, 1, 0, 255]),
+            (Layer::TerrainRgb, [1, 134, 170, 255]),
+            (Layer::Elevation, [0, 78, 32, 255]),
+            (Layer::Class, [214, 90, 32, 0]),
+            (Layer::Albedo, [0, 0, 0, 0]),
+        ] {
+            assert_eq!(layer.draw(&level, &style()), picture(|_, _| pixel), "{}", layer.name());
+        }
+        let count = level.heights.len();
+        let rocky = Samples { rock: Some(vec![1.0; count]), albedo: Some(vec![0.25; count]), ..level };
+        assert_eq!(Layer::Class.draw(&rocky, &style()), picture(|_, _| [214, 90, 32, 217]));
+        assert_eq!(Layer::Albedo.draw(&rocky, &style()), picture(|_, _| [128, 128, 128, 255]));
+    }
+
+    #[test]
+    fn val_heights_outside_an_encoding_are_not_clipped() {
+        let high = samples(|_, _| 2e6);
+        for layer in [Layer::Terrarium, Layer::TerrainRgb, Layer::Elevation] {
+            assert_eq!(layer.draw(&high, &style()), None, "{}", layer.name());
+        }
+        assert_eq!(Layer::Elevation.draw(&samples(|_, _| -0.001), &style()), None);
+    }
+
+    #[test]
+    fn val_tints_run_from_the_lowest_to_the_highest_ground() {
+        let of = |height: f64| tint(height, [0.0, 2.0]);
+        assert_eq!([-9.0, 0.0, 2.0, 9.0].map(of), [TINTS[0], TINTS[0], TINTS[4], TINTS[4]]);
+        assert_eq!([0.5, 1.0, 1.5].map(of), [TINTS[1], TINTS[2], TINTS[3]]);
+        assert_eq!(of(0.25), [0, 1, 2].map(|c| 0.5 * (TINTS[0][c] + TINTS[1][c])));
+        // Level ground has no range.
+        assert_eq!(tint(7.0, [7.0, 7.0]), TINTS[2]);
+    }
+
+    #[test]
+    fn val_layers_are_found_by_their_names() {
+        for layer in ALL {
+            assert_eq!(Layer::of_name(layer.name()), Some(layer));
+        }
+        assert_eq!([Layer::of_name("Relief"), Layer::of_name("")], [None, None]);
     }
 }

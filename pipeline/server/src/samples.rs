@@ -1,8 +1,8 @@
-//! Samples of ground on a regular grid, and what can be done with them on their way to a client.
+//! Samples of ground on a regular grid, and the operations on them before they are sent.
 
 use crate::http::Problem;
 
-/// Samples, row 0 in the north; NaN without data.
+/// Samples on a grid; row 0 is the northernmost, NaN marks no data.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Samples {
     /// Rows.
@@ -13,18 +13,18 @@ pub struct Samples {
     pub heights: Vec<f32>,
     /// Albedo, 0 to 1.
     pub albedo: Option<Vec<f32>>,
-    /// Share of the cell that rocks cover: 0 or 1 at a point.
+    /// Share of the cell that rocks cover; 0 or 1 at a point.
     pub rock: Option<Vec<f32>>,
-    /// Share of the ground that all rocks may cover, 0 to 1.
+    /// Potential rock cover: share of the ground that rocks of all sizes may cover, 0 to 1.
     pub rock_potential: Option<Vec<f32>>,
 }
 
-/// How samples are thinned.
+/// How a block of samples is reduced to one.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Thinning {
     /// The south-west sample of each block.
     Point,
-    /// The mean of each block; NaN where a sample has no data.
+    /// The mean of each block; NaN if any sample has no data.
     Mean,
 }
 
@@ -38,7 +38,7 @@ pub enum Flip {
 }
 
 impl Samples {
-    /// Samples without data.
+    /// Samples without any data.
     pub fn empty(rows: usize, cols: usize) -> Self {
         Self { rows, cols, heights: vec![f32::NAN; rows * cols], albedo: None, rock: None, rock_potential: None }
     }
@@ -48,18 +48,18 @@ impl Samples {
         [Some(&self.heights), self.albedo.as_deref(), self.rock.as_deref(), self.rock_potential.as_deref()]
     }
 
-    /// Memory, bytes.
+    /// Memory used, bytes.
     pub fn bytes(&self) -> u64 {
         let values: usize = self.fields().into_iter().flatten().map(<[f32]>::len).sum();
         128 + 4 * values as u64
     }
 
-    /// True where no sample has data.
+    /// True if no sample has data.
     pub fn is_void(&self) -> bool {
         self.heights.iter().all(|z| z.is_nan())
     }
 
-    /// The same samples, each field by `f`.
+    /// Applies `f` to each field.
     fn each(&self, [rows, cols]: [usize; 2], f: impl Fn(&[f32]) -> Vec<f32>) -> Self {
         Self {
             rows,
@@ -71,7 +71,7 @@ impl Samples {
         }
     }
 
-    /// The samples at other rows and columns: `from(row, col)` tells which one comes there.
+    /// Rearranges the samples: `from(row, col)` is the source of each output sample.
     fn rearranged(&self, [rows, cols]: [usize; 2], from: impl Fn(usize, usize) -> [usize; 2]) -> Self {
         self.each([rows, cols], |values| {
             let at = |k: usize| {
@@ -82,7 +82,7 @@ impl Samples {
         })
     }
 
-    /// Turned counterclockwise by quarters.
+    /// Rotated counterclockwise by quarter turns.
     pub fn turned(self, quarters: u32) -> Self {
         let (rows, cols) = (self.rows, self.cols);
         match quarters % 4 {
@@ -102,10 +102,22 @@ impl Samples {
         }
     }
 
-    /// One sample for each block of `2^m` x `2^m`, counted from the south-west.
+    /// Reduces each block of `2^m` x `2^m` samples to one; blocks are counted from the south-west.
     ///
     /// # Errors
-    /// A number of rows or columns that the blocks do not fill.
+    /// The number of rows or columns is not a multiple of the block's side.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_server::samples::{Samples, Thinning};
+    ///
+    /// let heights = (0..16).map(|k| k as f32).collect();
+    /// let samples = Samples { heights, ..Samples::empty(4, 4) };
+    /// // Row 0 is the northernmost: the south-west sample of the first block of 2 x 2 is 4, its mean (0 + 1 + 4 + 5) / 4.
+    /// assert_eq!(samples.clone().thinned(1, Thinning::Point).unwrap().heights, [4.0, 6.0, 12.0, 14.0]);
+    /// assert_eq!(samples.clone().thinned(1, Thinning::Mean).unwrap().heights, [2.5, 4.5, 10.5, 12.5]);
+    /// assert!(samples.thinned(3, Thinning::Mean).is_err());
+    /// ```
     pub fn thinned(self, m: u32, by: Thinning) -> Result<Self, Problem> {
         let side = 1usize << m;
         if !self.rows.is_multiple_of(side) || !self.cols.is_multiple_of(side) {
@@ -132,8 +144,17 @@ impl Samples {
         })
     }
 
-    /// Bilinear values on a grid of places, rows `down` and columns `right` counted in samples from the north-west one; rock by the nearest
-    /// sample. Places lie inside.
+    /// Bilinear interpolation on a grid of positions, with rows `down` and columns `right` in sample spacings from the north-west sample; rock uses
+    /// the nearest sample. Positions must lie inside the samples.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_server::samples::Samples;
+    ///
+    /// let samples = Samples { heights: vec![0.0, 1.0, 2.0, 3.0], ..Samples::empty(2, 2) };
+    /// // One row, half-way between the two; three columns.
+    /// assert_eq!(samples.between(&[0.5], &[0.0, 0.25, 1.0]).heights, [1.0, 1.25, 2.0]);
+    /// ```
     pub fn between(&self, down: &[f64], right: &[f64]) -> Self {
         let (rows, cols) = (Spots::new(down, self.rows), Spots::new(right, self.cols));
         let shape = [down.len(), right.len()];
@@ -142,7 +163,7 @@ impl Samples {
         Self { rock, ..made }
     }
 
-    /// Without data at some samples.
+    /// Sets the samples selected by `at` to no data.
     pub fn without(mut self, at: impl Fn(usize) -> bool) -> Self {
         let fields = [Some(&mut self.heights), self.albedo.as_mut(), self.rock.as_mut(), self.rock_potential.as_mut()];
         for values in fields.into_iter().flatten() {
@@ -171,7 +192,7 @@ impl Samples {
     }
 }
 
-/// The sample before each place along an axis, and how far beyond it the place lies.
+/// For each position along an axis: the preceding sample, and the fraction of a spacing beyond it.
 struct Spots(Vec<(usize, f64)>);
 
 impl Spots {
@@ -181,14 +202,14 @@ impl Spots {
     }
 }
 
-/// Between the north-west, north-east, south-west and south-east sample, `down` and `right` of the first; one that has no weight need not have
-/// data.
+/// Interpolates between the north-west, north-east, south-west and south-east samples, at fractions `down` and `right` from the first. A sample of
+/// weight 0 may lack data.
 fn bilinear([nw, ne, sw, se]: [f32; 4], [down, right]: [f64; 2]) -> f32 {
     let mix = |a: f32, b: f32| {
         let a = f64::from(a);
         if right == 0.0 { a } else { a + (f64::from(b) - a) * right }
     };
-    // From the south, as [`sastrugi_numeric::GroundGrid`] does.
+    // From the south, as in [`sastrugi_numeric::GroundGrid`].
     let up = 1.0 - down;
     (if up == 0.0 {
         mix(sw, se)
@@ -213,9 +234,9 @@ mod tests {
         Samples { rock: Some(heights.iter().map(|z| z % 2.0).collect()), heights, ..Samples::empty(rows, cols) }
     }
 
-    /// Acceptance 14: four quarter turns, and two mirrors, change nothing; a turn carries the east edge to the north.
+    /// Acceptance 14: four quarter turns, and two mirrorings, are the identity; a quarter turn moves the east edge to the north.
     #[test]
-    fn prop_turns_and_mirrors_come_back() {
+    fn prop_turns_and_mirrors_cancel() {
         for (rows, cols) in [(1, 1), (3, 5), (4, 4), (1, 7)] {
             let s = numbered(rows, cols);
             assert_eq!(s.clone().turned(1).turned(1).turned(1).turned(1), s);
@@ -230,7 +251,7 @@ mod tests {
         }
     }
 
-    /// Acceptance 14: exact on planes, within a rounding of single precision.
+    /// Acceptance 14: exact on planes, within rounding to single precision.
     #[test]
     fn prop_bilinear_is_exact_on_planes() {
         let (rows, cols) = (6, 9);
@@ -245,7 +266,7 @@ mod tests {
         }
     }
 
-    /// A sample itself comes back beside a hole; anything between the two does not.
+    /// A sample next to a hole is returned exactly; anything interpolated with the hole is not.
     #[test]
     fn val_holes_stay_holes() {
         let mut s = numbered(3, 3);
@@ -261,5 +282,43 @@ mod tests {
         let s = Samples { heights: (0..16).map(|k| k as f32).collect(), ..Samples::empty(4, 4) };
         assert_eq!(s.clone().thinned(1, Thinning::Point).unwrap().heights, [4.0, 6.0, 12.0, 14.0]);
         assert_eq!(s.thinned(1, Thinning::Mean).unwrap().heights, [2.5, 4.5, 10.5, 12.5]);
+    }
+
+    /// East and west, or north and south, change places; twice the same mirror would not tell which.
+    #[test]
+    fn val_mirrors_have_their_axes() {
+        let s = Samples { heights: (0..6).map(|k| k as f32).collect(), ..Samples::empty(2, 3) };
+        assert_eq!(s.clone().flipped(Flip::Horizontal).heights, [2.0, 1.0, 0.0, 5.0, 4.0, 3.0]);
+        assert_eq!(s.clone().flipped(Flip::Vertical).heights, [3.0, 4.0, 5.0, 0.0, 1.0, 2.0]);
+        // Counterclockwise: the east column becomes the northern row.
+        let turned = s.turned(1);
+        assert_eq!((turned.rows, turned.cols, turned.heights), (3, 2, vec![2.0, 5.0, 1.0, 4.0, 0.0, 3.0]));
+    }
+
+    /// Half-way between two samples, rock is that of the northern and of the eastern one.
+    #[test]
+    fn val_rock_is_not_interpolated() {
+        let s =
+            Samples { heights: vec![0.0, 1.0, 2.0, 3.0], rock: Some(vec![0.1, 0.2, 0.3, 0.4]), ..Samples::empty(2, 2) };
+        let made = s.between(&[0.5, 0.51], &[0.49, 0.5]);
+        assert_eq!(made.rock, Some(vec![0.1, 0.2, 0.3, 0.4]));
+        assert_eq!(made.heights[1], 1.5);
+    }
+
+    #[test]
+    fn val_means_with_a_hole_are_holes() {
+        let mut s = Samples { heights: vec![1.0; 16], ..Samples::empty(4, 4) };
+        s.heights[5] = f32::NAN;
+        let made = s.thinned(1, Thinning::Mean).unwrap().heights;
+        assert!(made[0].is_nan() && made[1..] == [1.0; 3], "{made:?}");
+    }
+
+    #[test]
+    fn val_samples_can_be_taken_out() {
+        let s = numbered(2, 3).without(|k| k == 4);
+        assert!(s.heights[4].is_nan() && s.rock.as_ref().is_some_and(|rock| rock[4].is_nan()));
+        let left = |values: &[f32]| values.iter().filter(|v| !v.is_nan()).count();
+        assert_eq!((left(&s.heights), s.rock.as_deref().map(left)), (5, Some(5)));
+        assert!(!s.is_void() && s.without(|_| true).is_void());
     }
 }

@@ -1,4 +1,4 @@
-//! The server: connections, their limits, and their end.
+//! The server: accepts connections, limits them, shuts down.
 
 use crate::collections;
 use crate::http::answer::Answers;
@@ -24,42 +24,42 @@ use tokio::sync::{Notify, Semaphore};
 use tokio_io_timeout::TimeoutStream;
 use tower::ServiceExt;
 
-/// How long the head of a request may take.
+/// Time limit for receiving a request head.
 const HEAD: Duration = Duration::from_secs(15);
-/// How long a client may take nothing of its answer.
+/// How long a client may stop reading its response.
 const STALL: Duration = Duration::from_secs(30);
-/// How long requests under way may take to end when the server stops, and what is left of them then.
-const FAREWELL: Duration = Duration::from_secs(9);
-const LAST: Duration = Duration::from_secs(1);
-/// Most bytes of a head, and most headers.
+/// On shutdown: how long open requests may take to finish, then how long the runtime waits for its threads.
+const GRACE: Duration = Duration::from_secs(9);
+const SHUTDOWN: Duration = Duration::from_secs(1);
+/// Largest request head, bytes, and largest number of headers.
 const HEAD_BYTES: usize = 32 << 10;
 const HEADERS: usize = 64;
-/// Largest share of memory for answers that were given, bytes.
-const ANSWERS: u64 = 128 << 20;
+/// Memory for cached responses, bytes.
+const CACHE_BYTES: u64 = 128 << 20;
 
 /// What to serve, and how.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Worlds, studies and releases.
+    /// Files of worlds, studies and releases.
     pub paths: Vec<PathBuf>,
-    /// Address to listen at.
+    /// Address to listen on.
     pub listen: SocketAddr,
-    /// Where tiles are kept.
+    /// Tile library: folder, sizes, worker threads.
     pub library: LibrarySettings,
     /// Limits of requests.
     pub limits: Limits,
-    /// What clients must show.
+    /// Bearer token that clients must send.
     pub token: Option<String>,
-    /// Pages of other servers that may use this one.
+    /// Origins of other sites whose pages may use this server (CORS).
     pub origins: Vec<String>,
 }
 
-/// Tells a server to stop.
+/// Handle that stops a server.
 #[derive(Clone, Debug, Default)]
 pub struct Stop(Arc<Notify>);
 
 impl Stop {
-    /// Ends what is under way, and takes nothing new.
+    /// Finishes open requests and accepts no new ones.
     pub fn stop(&self) {
         self.0.notify_one();
     }
@@ -85,10 +85,10 @@ impl From<LibraryError> for Error {
     }
 }
 
-/// Serves until it is told to stop; `ready` is called with the address once it listens, with what is served.
+/// Serves until `stop` is triggered; calls `ready` with the address and the collections once the server listens.
 ///
 /// # Errors
-/// Nothing to serve, a library or an address that cannot be used.
+/// There is nothing to serve, or the library or the address cannot be used.
 pub fn serve(
     settings: &Settings,
     stop: &Stop,
@@ -103,7 +103,7 @@ pub fn serve(
         address,
         collections,
         library,
-        answers: Answers::new(ANSWERS, settings.token.is_some()),
+        answers: Answers::new(CACHE_BYTES, settings.token.is_some()),
         limits: settings.limits.clone(),
         token: settings.token.clone(),
         hosts: origins.iter().filter_map(host_of).collect(),
@@ -118,11 +118,11 @@ pub fn serve(
     runtime.block_on(accept(listener, &service, &origins, stop));
     service.jobs.stop();
     service.library.stop();
-    runtime.shutdown_timeout(LAST);
+    runtime.shutdown_timeout(SHUTDOWN);
     Ok(())
 }
 
-/// An origin whose pages may use the server.
+/// Checks an origin whose pages may use the server.
 fn origin(text: &str) -> Result<HeaderValue, Error> {
     let host = ["http://", "https://"].iter().find_map(|scheme| text.strip_prefix(scheme)).unwrap_or_default();
     let plain = |b: u8| b.is_ascii_alphanumeric() || b".:-_[]".contains(&b);
@@ -138,7 +138,7 @@ fn origin(text: &str) -> Result<HeaderValue, Error> {
 fn host_of(origin: &HeaderValue) -> Option<String> {
     let (_, host) = origin.to_str().ok()?.split_once("://")?;
     let name = match host.rsplit_once(':') {
-        // An address of version 6 without a port ends so.
+        // An IPv6 address without a port ends in `]`.
         Some((name, _)) if !host.ends_with(']') => name,
         _ => host,
     };
@@ -158,7 +158,7 @@ async fn listen(listen: SocketAddr) -> Result<(TcpListener, SocketAddr), Error> 
     Ok((listener, address))
 }
 
-/// Takes connections until the end.
+/// Accepts connections until the server is stopped.
 async fn accept(listener: TcpListener, service: &Arc<Service>, origins: &[HeaderValue], stop: &Stop) {
     let app = router(service, origins);
     let seats = Arc::new(Semaphore::new(service.limits.connections));
@@ -171,7 +171,7 @@ async fn accept(listener: TcpListener, service: &Arc<Service>, origins: &[Header
         let (stream, peer) = match accepted {
             Ok(accepted) => accepted,
             Err(error) => {
-                // As when there are too many open files: some will be closed.
+                // For example too many open files; some will be closed soon.
                 tracing::warn!(%error, "a connection could not be accepted");
                 tokio::time::sleep(Duration::from_millis(50)).await;
                 continue;
@@ -181,7 +181,7 @@ async fn accept(listener: TcpListener, service: &Arc<Service>, origins: &[Header
             refuse(&stream);
             continue;
         };
-        // Small answers are not to wait for more.
+        // Small responses must not wait to be batched (Nagle).
         let _ = stream.set_nodelay(true);
         let mut stream = TimeoutStream::new(stream);
         stream.set_write_timeout(Some(STALL));
@@ -196,21 +196,51 @@ async fn accept(listener: TcpListener, service: &Arc<Service>, origins: &[Header
         let service = Arc::clone(service);
         tokio::spawn(async move {
             service.metrics.connections.inc();
-            // A client that breaks off is none of our errors.
+            // A client that disconnects is not a server error.
             let _ = connection.await;
             service.metrics.connections.dec();
             drop(seat);
         });
     }
-    // Who comes now is refused at once.
+    // New connections are refused at once.
     drop(listener);
-    tracing::info!("shutting down; open requests are finished");
-    let _ = tokio::time::timeout(FAREWELL, graceful.shutdown()).await;
+    tracing::info!("shutting down; finishing open requests");
+    let _ = tokio::time::timeout(GRACE, graceful.shutdown()).await;
 }
 
-/// Says in as few bytes as can be that there is no room, and closes.
+/// Answers 503 in as few bytes as possible and closes the connection.
 fn refuse(stream: &TcpStream) {
     let answer =
         b"HTTP/1.1 503 Service Unavailable\r\nRetry-After: 2\r\nContent-Length: 0\r\nConnection: close\r\n\r\n";
     let _ = stream.try_write(answer);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_origins_have_a_scheme_and_no_path() {
+        for right in ["*", "http://localhost:3000", "https://example.org", "http://[::1]:8080"] {
+            assert_eq!(origin(right).unwrap(), right);
+        }
+        for wrong in ["", "example.org", "ftp://example.org", "http://", "https://example.org/", "http://a,b"] {
+            let said = origin(wrong).unwrap_err().to_string();
+            assert!(said.starts_with(&format!("`--cors {wrong}`: it must be an origin")), "{said}");
+        }
+    }
+
+    #[test]
+    fn val_hosts_of_origins_have_no_port() {
+        let of = |text: &'static str| host_of(&HeaderValue::from_static(text));
+        for (text, host) in [
+            ("http://example.org", "example.org"),
+            ("https://example.org:8443", "example.org"),
+            ("http://[::1]", "[::1]"),
+            ("http://[::1]:80", "[::1]"),
+        ] {
+            assert_eq!(of(text).as_deref(), Some(host));
+        }
+        assert_eq!(of("*"), None);
+    }
 }

@@ -1,4 +1,4 @@
-//! A study's graph under construction: what is there so far, and what later sections refer to.
+//! Builder of a study's graph: the items so far, and what later sections can refer to.
 
 use crate::job::ItemRef;
 use crate::operations::drawn::{Drawn, Routes};
@@ -15,7 +15,7 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// Suffixes that files of the release add to an id.
+/// Suffixes that file names in a release add to an id.
 const RESERVED: [&str; 12] = [
     "license",
     "raw",
@@ -34,7 +34,7 @@ const RESERVED: [&str; 12] = [
 /// Why a study has no graph.
 #[derive(Debug, thiserror::Error)]
 pub enum BuildError {
-    /// The study is wrong.
+    /// The study is invalid.
     #[error(transparent)]
     Study(#[from] Refusals),
     /// An input file is missing or cannot be read.
@@ -48,23 +48,27 @@ impl From<StudyError> for BuildError {
     }
 }
 
-/// What was refused so far.
+/// Errors so far.
 #[derive(Default)]
 struct Refused {
     errors: Vec<StudyError>,
-    /// Input files.
-    inputs: Vec<String>,
-    /// Ids of refused tables: that they are not in the graph is no error of whoever names them.
+    /// Input files: the message, and the same at the table that names the file.
+    inputs: Vec<(String, StudyError)>,
+    /// Ids of refused tables; references to them are not reported as further errors.
     ids: BTreeSet<String>,
-    /// True when a refused table has no id that can be read.
+    /// True if a refused table has no readable id.
     nameless: bool,
 }
 
 impl Refused {
-    fn add(&mut self, error: BuildError) {
+    /// Adds an error; `placed` puts that of an input file at its place in the study.
+    fn add(&mut self, error: BuildError, placed: impl FnOnce(&str) -> StudyError) {
         match error {
             BuildError::Study(Refusals(errors)) => self.errors.extend(errors),
-            BuildError::Input(message) => self.inputs.push(message),
+            BuildError::Input(message) => {
+                let error = placed(&message);
+                self.inputs.push((message, error));
+            }
         }
     }
 
@@ -73,26 +77,26 @@ impl Refused {
         self.ids.extend(id.map(str::to_owned));
     }
 
-    /// True for an id of a refused table, or of what belongs to it (`<id>-0001`, `<id>.albedo`).
+    /// True for the id of a refused table or of something derived from it (`<id>-0001`, `<id>.albedo`).
     fn holds(&self, id: &str) -> bool {
         let ends = id.match_indices(['-', '.']).map(|(at, _)| at).chain([id.len()]);
         self.nameless || ends.into_iter().any(|end| self.ids.contains(&id[..end]))
     }
 }
 
-/// The file of every item that makes a heightfield.
+/// File name of the heights of an item.
 pub const HEIGHTS: &str = "heights.tif";
 
 /// A heightfield that other items can refer to.
 #[derive(Clone, Debug)]
 pub struct Heightfield {
-    /// The item that makes it; its file is [`HEIGHTS`].
+    /// The item that produces it; its file is [`HEIGHTS`].
     pub item: ItemRef,
-    /// Label for statistics; of a DEM or texture its id, where the study gives none.
+    /// Label for statistics; for a DEM or texture without one, its id.
     pub group: Option<String>,
-    /// True when the study gives the label.
+    /// True if the study gives the label.
     pub is_grouped: bool,
-    /// What differs from other heightfields of the group.
+    /// Parameters that differ from other heightfields of the group.
     pub variant: Option<String>,
     /// Position among the replicates of its item, from 0; measured DEMs have none.
     pub replicate: Option<u64>,
@@ -104,19 +108,19 @@ pub struct Heightfield {
     pub streams: Option<Streams>,
     /// Its path in the release.
     pub release_path: String,
-    /// Number of cells; for a measured DEM whose file does not state it, as many as it may hold.
+    /// Number of cells; for a measured DEM whose file does not state it, an upper bound.
     pub cells: u64,
-    /// Smaller side of a cell, m, where it is known before the run.
+    /// Smaller side of a cell, m, if known before the run.
     pub cell_m: Option<f64>,
-    /// Shape and place of a surface that is made on cells of its own, where they are known before the run.
+    /// Geometry of a surface generated on its own cells, if known before the run.
     pub geometry: Option<Geometry>,
-    /// Shape and place, of measured surfaces and of what lies on them as well, where parameters and the headers of files tell them before
-    /// the run.
+    /// Geometry, also of measured surfaces and of textures on them, if it follows before the run from parameters and file
+    /// headers.
     pub expected: Option<Geometry>,
 }
 
 impl Heightfield {
-    /// Words of its random streams.
+    /// Label of its random streams.
     pub fn stream(&self) -> Option<String> {
         self.streams.as_ref().map(Streams::label)
     }
@@ -127,17 +131,17 @@ impl Heightfield {
 pub struct Image {
     /// Its id.
     pub id: String,
-    /// The item that makes it; its files are those of `jobs::image`.
+    /// The item that produces it; its files are those of `jobs::image`.
     pub item: ItemRef,
-    /// Number of pixels, roughly.
+    /// Approximate number of pixels.
     pub pixels: u64,
     /// Id of the surface that it shows.
     pub surface: String,
-    /// Sun that lights it.
+    /// Its sun direction.
     pub sun: Sun,
 }
 
-/// A graph under construction, with what later sections refer to.
+/// A graph under construction, with what later sections can refer to.
 pub struct Builder<'a> {
     /// The study.
     pub study: &'a Study,
@@ -145,46 +149,46 @@ pub struct Builder<'a> {
     pub heightfields: BTreeMap<String, Heightfield>,
     /// Ids of heightfields that are exported for simulators.
     pub exported: BTreeSet<String>,
-    /// Ids that an id in the study stands for (its replicates and sweeps).
+    /// Ids that an id in the study expands to (its replicates and sweeps).
     pub families: BTreeMap<String, Vec<String>>,
     /// Ids of fits.
     pub fits: Vec<String>,
-    /// What is known of the fits before the run, by id.
+    /// What is known about the fits before the run, by id.
     pub prospects: BTreeMap<String, Prospect>,
-    /// Missions by id: what is drawn on which heightfields.
+    /// Missions by id, with their heightfields.
     pub missions: BTreeMap<String, Drawn>,
-    /// Routes by id; a swept id stands for several searches.
+    /// Routes by id; a swept id has several searches.
     pub routes: BTreeMap<String, Vec<Routes>>,
-    /// Images by id; the id of an item or of a swept part stands for several.
+    /// Images by id; the id of a table or of a swept value may have several.
     pub images: BTreeMap<String, Vec<Image>>,
-    /// Where each input file goes in the release.
+    /// Path of each input file in the release.
     pub inputs: Vec<InputPlace>,
     /// The items so far.
     pub graph: Graph,
-    /// What makes no sense though it is allowed, for the user to know before the run.
+    /// Warnings before the run: what is allowed but makes no sense.
     pub doubts: Vec<String>,
     ids: BTreeMap<String, Origin>,
     refused: Refused,
-    /// Most items.
+    /// Maximum number of items.
     items_max: usize,
-    /// True when an item was refused because there are too many.
+    /// True if an item was refused because there are too many.
     is_full: bool,
 }
 
-/// The table of a study that an id comes from: its section, and its place in it.
+/// The table of a study that an id comes from: its section, and its index in it.
 pub type Origin = (&'static str, usize);
 
-/// An input file and its place in the release.
+/// An input file and its path in the release.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputPlace {
-    /// Path of the key that names it in the study.
+    /// Path of its key in the study.
     pub key: Vec<String>,
     /// Path in the release.
     pub release_path: String,
 }
 
 impl<'a> Builder<'a> {
-    /// Begins the graph of a study of which this is refused already.
+    /// Begins the graph of a study in which these errors were found already.
     pub fn new(study: &'a Study, errors: Vec<StudyError>) -> Self {
         Self {
             study,
@@ -201,7 +205,7 @@ impl<'a> Builder<'a> {
             doubts: Vec::new(),
             ids: BTreeMap::new(),
             refused: Refused {
-                // A section whose name is misspelt may hold what others name.
+                // A section with a misspelt name may contain items that others refer to.
                 nameless: errors.iter().any(|e| e.message.starts_with(UNKNOWN_SECTION) && e.help.is_some()),
                 errors,
                 ..Refused::default()
@@ -211,8 +215,8 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// Adds the items of a section, table by table. What is wrong with one is kept for [`Self::check`] and keeps none of the others from
-    /// being read, except where there are too many items.
+    /// Adds the items of a section, table by table. Errors are collected for [`Self::check`]; reading continues with the next table
+    /// unless there are too many items.
     ///
     /// # Errors
     /// A section that is not an array of tables.
@@ -228,53 +232,59 @@ impl<'a> Builder<'a> {
             let Err(error) = add(self, &entry) else { continue };
             self.refused.table(entry.id());
             let error = if self.is_full { entry.error("count", too_many(self.items_max)).into() } else { error };
-            self.refused.add(error);
+            self.refused.add(error, |message| entry.error("", message));
         }
         Ok(())
     }
 
-    /// True when an item was refused because there are too many: what comes after it need not be read.
+    /// True if an item was refused because there are too many, so that the rest need not be read.
     pub fn is_full(&self) -> bool {
         self.is_full
     }
 
-    /// Keeps what is wrong with a section as a whole.
+    /// Records an error of a section.
     pub fn refuse(&mut self, error: BuildError) {
         self.refused.table(None);
-        self.refused.add(error);
+        self.refused.add(error, |message| StudyError::at(None, message));
     }
 
-    /// True when something was refused.
+    /// True if there are errors.
     pub fn has_refused(&self) -> bool {
         !self.refused.errors.is_empty() || !self.refused.inputs.is_empty()
     }
 
-    /// All that was refused, at once.
+    /// Returns all errors at once.
     ///
     /// # Errors
-    /// When anything was.
+    /// If there are any.
     pub fn check(&mut self) -> Result<(), BuildError> {
         let refused = std::mem::take(&mut self.refused);
         let is_own = |error: &StudyError| error.missing_id.as_ref().is_none_or(|id| !refused.holds(id));
         let mut errors: Vec<StudyError> = refused.errors.iter().filter(|error| is_own(error)).cloned().collect();
         let inputs = refused.inputs;
-        if errors.is_empty() && !inputs.is_empty() {
-            return Err(BuildError::Input(inputs.join("; ")));
+        if errors.is_empty() && inputs.is_empty() {
+            // Tables that miss themselves or each other, or an id that begins like their own, do not excuse each other.
+            errors = refused.errors;
         }
-        errors.extend(inputs.into_iter().map(|message| StudyError::at(None, message)));
+        if errors.is_empty() && !inputs.is_empty() {
+            let messages: Vec<String> = inputs.into_iter().map(|(message, _)| message).collect();
+            return Err(BuildError::Input(messages.join("; ")));
+        }
+        errors.extend(inputs.into_iter().map(|(_, error)| error));
         Ok(Refusals::none(errors)?)
     }
 
-    /// Takes an id; ids are unique in a study, across sections.
+    /// Claims an id; ids are unique in a study, across sections.
     ///
     /// # Errors
-    /// When it is taken.
+    /// If it is taken.
     pub fn claim(&mut self, entry: &Entry<'_>, section: &'static str, id: &str) -> Result<(), StudyError> {
         let ending = id.rsplit_once('.').map_or("", |(_, ending)| ending);
         if RESERVED.contains(&ending) || sastrugi_terrain::MAPS.iter().any(|map| map.name == ending) {
-            return Err(
-                entry.error("id", format!("the id \"{id}\" ends in .{ending}, which names files of the release"))
-            );
+            return Err(entry.error(
+                "id",
+                format!("the id \"{id}\" ends in .{ending}, a suffix reserved for files of the release"),
+            ));
         }
         match self.ids.insert(id.to_owned(), (section, entry.index())) {
             None => Ok(()),
@@ -285,12 +295,12 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The table that each claimed id comes from; they are there once.
+    /// Takes the table of each claimed id; can be called once.
     pub fn take_origins(&mut self) -> BTreeMap<String, Origin> {
         std::mem::take(&mut self.ids)
     }
 
-    /// Streams of an item: the study's, or those of its explicit seed.
+    /// Random streams of an item: from the study's seed, or from its explicit seed.
     pub fn streams(&self, stage: &str, id: &str, seed: Option<u64>, replicate: u64) -> Streams {
         match seed {
             Some(seed) => Streams::for_seed(seed.wrapping_add(replicate), stage),
@@ -303,10 +313,10 @@ impl<'a> Builder<'a> {
         self.study.head.pairing == Pairing::Common
     }
 
-    /// Names a family of ids, to which references resolve.
+    /// Registers a family of ids, to which references resolve.
     ///
     /// # Errors
-    /// When another family has that name.
+    /// If another family has that name.
     pub fn name_family(&mut self, entry: &Entry<'_>, name: &str, ids: Vec<String>) -> Result<(), StudyError> {
         match self.families.insert(name.to_owned(), ids) {
             None => Ok(()),
@@ -317,7 +327,7 @@ impl<'a> Builder<'a> {
     /// Adds an item to the graph.
     ///
     /// # Errors
-    /// When there are [`ITEMS_MAX`] already; when its name is taken or a parent is missing: a stage registered out of order.
+    /// If there are [`ITEMS_MAX`] already; if its name is taken or a parent is missing, because a stage is registered out of order.
     pub fn node(&mut self, node: Node) -> Result<(), StudyError> {
         if self.graph.len() >= self.items_max {
             self.is_full = true;
@@ -328,15 +338,15 @@ impl<'a> Builder<'a> {
         placed.then_some(()).ok_or_else(|| StudyError::at(None, format!("{name} cannot be placed in the graph")))
     }
 
-    /// The heightfield that a key names.
+    /// The heightfield that a key refers to.
     ///
     /// # Errors
-    /// An id that no earlier heightfield has.
+    /// An id that is not an earlier heightfield.
     pub fn surface(&self, entry: &Entry<'_>, key: &str, id: &str) -> Result<&Heightfield, StudyError> {
         self.heightfields.get(id).ok_or_else(|| unknown_id(entry, key, id, self.heightfields.keys()))
     }
 
-    /// What a fit file says of its source: the measured file, or the generated heightfield's path in the release.
+    /// The source recorded in a fit file: the measured file, or the generated heightfield's path in the release.
     pub fn source_of(&self, id: &str, field: &Heightfield) -> Source {
         let input = self.graph.find(&field.item).and_then(|p| self.graph.node(p).inputs.first());
         let window = field.parameters.get("window").and_then(|w| serde_json::from_value(w.clone()).ok());
@@ -351,10 +361,10 @@ impl<'a> Builder<'a> {
         }
     }
 
-    /// The ids that a reference stands for.
+    /// The ids that a reference expands to.
     ///
     /// # Errors
-    /// An id that no earlier item has.
+    /// An id that is not an earlier item.
     pub fn family(&self, entry: &Entry<'_>, key: &str, id: &str) -> Result<Vec<String>, StudyError> {
         if self.heightfields.contains_key(id) {
             return Ok(vec![id.to_owned()]);
@@ -363,23 +373,23 @@ impl<'a> Builder<'a> {
     }
 }
 
-/// The sentence on a study with too many items.
+/// Message for a study with too many items.
 fn too_many(most: usize) -> String {
     format!(
         "the study expands to more than {most} items, the limit; split it into several studies (each surface counts as two items)"
     )
 }
 
-/// The error for a reference to nothing.
+/// The error for an unknown id.
 pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterator<Item = &'s String>) -> StudyError {
     let known: Vec<&str> = known.map(String::as_str).collect();
     let nearest = crate::study::keys::nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
-    let list = if known.is_empty() { "there are none".to_owned() } else { format!("there are {}", known.join(", ")) };
-    let error = entry.error(key, format!("`{key}` names \"{id}\", which no item before it has"));
+    let list = if known.is_empty() { "there are none".to_owned() } else { format!("known: {}", known.join(", ")) };
+    let error = entry.error(key, format!("`{key}` names \"{id}\", which no earlier section defines"));
     StudyError { missing_id: Some(id.to_owned()), ..error.with_help(Some(nearest.unwrap_or(list))) }
 }
 
-/// Word of the random streams that replicate `replicate` (from 0) shares with that of other items when they are paired.
+/// Label of the random streams that replicate `replicate` (from 0) shares with the same replicate of other items when paired.
 pub fn common(replicate: u64) -> String {
     format!("common-{:04}", replicate + 1)
 }
@@ -404,7 +414,7 @@ mod tests {
     use crate::jobs;
     use std::path::Path;
 
-    /// A study with tables of three and of two terrains, of which so many items are possible: what is refused, and how many items there are.
+    /// A study with tables of three, two and one terrains, with a limit on items: the error, and the number of items.
     fn refused(items_max: usize) -> (String, usize) {
         let table = |id: &str, count: u32| {
             format!("[[terrain]]\nid = \"{id}\"\nkind = \"gap\"\nsize_px = [64, 64]\ncount = {count}\n")
@@ -425,14 +435,14 @@ mod tests {
         (said, builder.graph.len())
     }
 
-    /// Too many items in several tables are one error, with the table that is too many; tables after it are not expanded.
+    /// Too many items in several tables are one error, at the table that exceeds the limit; later tables are not expanded.
     #[test]
     fn val_items_of_all_tables_are_limited_together() {
         assert_eq!(refused(12), (String::new(), 12));
         let (said, items) = refused(4);
         assert!(said.contains("terrain \"b\": the study expands to more than 4 items") && items == 4, "{said}");
         assert!(!said.contains("terrain \"c\""), "{said}");
-        // Describing the surfaces is too much.
+        // The descriptions of the surfaces exceed the limit.
         let (said, items) = refused(8);
         assert!(said.contains("more than 8 items") && items == 8, "{said}");
     }

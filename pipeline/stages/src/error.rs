@@ -1,4 +1,4 @@
-//! What a caller of this room can be told, sorted by what the caller should do about it.
+//! Errors of this room, grouped by what the caller should do about them.
 
 use crate::builder::BuildError;
 use crate::job::{Cause, JobError};
@@ -11,40 +11,40 @@ use sastrugi_store::release::ReleaseError;
 use sastrugi_texture::FitError;
 use std::path::Path;
 
-/// An error, one sentence each.
+/// An error; each message is one sentence.
 #[derive(Debug, thiserror::Error)]
 pub enum Error {
-    /// The study's text is wrong.
+    /// The study is invalid.
     #[error("{name}: {refusals}")]
     Study {
         /// Name of the file.
         name: String,
         /// Its text.
         text: String,
-        /// What is wrong, and where.
+        /// The errors and their places.
         refusals: Refusals,
     },
-    /// The call is wrong.
+    /// Bad usage.
     #[error("{0}")]
     Usage(String),
     /// Input data is missing or unusable.
     #[error("{0}")]
     Input(String),
-    /// The work could not be done.
+    /// Failure on this machine.
     #[error("{0}")]
     Failed(String),
-    /// The work cannot be done now, but later.
+    /// Failure that may succeed on a retry.
     #[error("{0}")]
     Retry(String),
 }
 
 impl Error {
-    /// Work that could not be done.
+    /// A failure on this machine.
     pub fn failed(message: impl std::fmt::Display) -> Self {
         Self::Failed(message.to_string())
     }
 
-    /// A failure to read or write: to be tried again where the error says that this may help.
+    /// A failure to read or write; retryable if the kind of error is.
     pub fn io(error: impl std::error::Error + 'static) -> Self {
         match fault(&error) {
             Some(Fault::Passing) => Self::Retry(error.to_string()),
@@ -52,7 +52,7 @@ impl Error {
         }
     }
 
-    /// The same about a file; one that is no regular file is unusable input.
+    /// The same for a file; one that is not a regular file is unusable input.
     pub fn at(path: &Path, error: std::io::Error) -> Self {
         let words = format!("{}: {error}", path.display());
         if error.kind() == std::io::ErrorKind::InvalidInput {
@@ -78,7 +78,7 @@ impl From<JobError> for Error {
 impl From<Stopped> for Error {
     fn from(stopped: Stopped) -> Self {
         let Stopped { item, error } = stopped;
-        let advice = "the run stopped and no release was written; finished items are kept in the work area, so run again once this is fixed";
+        let advice = "the run stopped without writing a release; finished items are kept in the work area, so rerun once this is fixed";
         error.reworded(|words| format!("{item}: {words}; {advice}")).into()
     }
 }
@@ -104,7 +104,7 @@ impl From<ReleaseError> for Error {
 }
 
 impl From<FitError> for Error {
-    /// A parameter out of range is the caller's; anything else lies in the DEM.
+    /// A parameter out of range is bad usage; anything else is a problem with the DEM.
     fn from(error: FitError) -> Self {
         match error {
             FitError::Parameter(parameter) => parameter.into(),
@@ -119,10 +119,49 @@ impl From<ParameterError> for Error {
     }
 }
 
-/// Joins an error of the graph to the text that it is about.
+/// Attaches the study's text to an error in its graph.
 pub fn of_build(name: &str, text: &str, error: BuildError) -> Error {
     match error {
         BuildError::Study(refusals) => Error::Study { name: name.to_owned(), text: text.to_owned(), refusals },
         BuildError::Input(message) => Error::Input(message),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use std::io::{Error as IoError, ErrorKind};
+
+    /// What the caller should do about an error follows from its cause: exit codes depend on it.
+    #[test]
+    fn val_causes_become_kinds_of_errors() {
+        let of = |cause: Cause| Error::from(JobError { message: "why".to_owned(), cause });
+        assert!(matches!(of(Cause::Input), Error::Input(message) if message == "why"));
+        assert!(matches!(of(Cause::Item), Error::Failed(message) if message == "why"));
+        assert!(matches!(of(Cause::Machine(Fault::Lasting)), Error::Failed(_)));
+        assert!(matches!(of(Cause::Machine(Fault::Passing)), Error::Retry(message) if message == "why"));
+        let usage = Error::from(ParameterError::new("trim", "is 2"));
+        assert!(matches!(usage, Error::Usage(message) if message == "`trim` is 2"));
+    }
+
+    /// A full disk may pass, a file that is not one is the user's, everything else is a failure; messages name the file.
+    #[test]
+    fn val_errors_of_files_name_them() {
+        let path = Path::new("a/b.tif");
+        let no_space = 28;
+        for (error, expected) in [
+            (IoError::from_raw_os_error(no_space), "retry"),
+            (IoError::new(ErrorKind::InvalidInput, "not a file"), "input"),
+            (IoError::new(ErrorKind::NotFound, "gone"), "failed"),
+        ] {
+            let found = Error::at(path, error);
+            let kind = match &found {
+                Error::Retry(_) => "retry",
+                Error::Input(_) => "input",
+                Error::Failed(_) => "failed",
+                other => panic!("{other}"),
+            };
+            assert!(kind == expected && found.to_string().starts_with("a/b.tif: "), "{kind}: {found}");
+        }
     }
 }

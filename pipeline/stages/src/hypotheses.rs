@@ -1,5 +1,5 @@
-//! `[[hypothesis]]`: claims that are part of the study, and so of its hash, before anything runs. No item comes of them and no key
-//! holds them; the report tests them.
+//! `[[hypothesis]]`: claims stated in the study, and so in its hash, before the run. They create no items and are not part of any
+//! item's key; the report tests them.
 
 use crate::builder::{BuildError, Builder, Heightfield};
 use crate::jobs::traverse;
@@ -11,17 +11,17 @@ use sastrugi_statistics::{holm, least_p_apart, least_p_in_blocks};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Number of terrains of a group that is enough for any claim.
+/// Number of terrains per group that is sufficient for any claim.
 const UNITS_ENOUGH: usize = 100;
 /// Name of the section.
 pub const SECTION: &str = "hypothesis";
 
-/// Checks the hypotheses of a study against the groups that are driven in it.
+/// Checks the hypotheses of a study against the groups with missions.
 ///
 /// # Errors
 /// A section that is not an array of tables.
 pub fn check(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    // Groups of a study that is refused so far may be those of what was refused.
+    // In a study with errors, a missing group may belong to a refused table.
     let groups_are_known = !builder.has_refused();
     let mut families = BTreeMap::new();
     builder.each(SECTION, |builder, entry| check_table(builder, entry, &mut families, groups_are_known))
@@ -44,7 +44,7 @@ fn check_table(
     let known = groups(builder);
     let unknown = item.groups.iter().enumerate().find(|(_, group)| !known.contains(group.as_str()));
     if let Some((k, group)) = unknown {
-        let error = entry.error(&format!("groups.{k}"), format!("no missions are driven in a group \"{group}\""));
+        let error = entry.error(&format!("groups.{k}"), format!("no missions are driven in group \"{group}\""));
         return Err(suggesting(error, group, &known).into());
     }
     check_run(builder, entry, &item)
@@ -53,18 +53,18 @@ fn check_table(
 fn suggesting(error: StudyError, group: &str, known: &BTreeSet<&str>) -> StudyError {
     let list = || match known.len() {
         0 => "no missions are driven in this study".to_owned(),
-        _ => format!("there are {}", known.iter().copied().collect::<Vec<_>>().join(", ")),
+        _ => format!("known: {}", known.iter().copied().collect::<Vec<_>>().join(", ")),
     };
     let help = nearest(group, known.iter().copied()).map_or_else(list, |n| format!("did you mean \"{n}\"?"));
     error.with_help(Some(help))
 }
 
-/// Groups of the missions that are driven, as the report knows them: the label of the heightfield, its kind where it has none.
+/// Groups of the missions, as in the report: the label of the heightfield or, without one, its kind.
 fn groups<'b>(builder: &'b Builder<'_>) -> BTreeSet<&'b str> {
     driven(builder).map(|(_, group)| group).collect()
 }
 
-/// Run and group of everything that is driven.
+/// Traverse and group of all missions.
 fn driven<'b>(builder: &'b Builder<'_>) -> impl Iterator<Item = (&'b str, &'b str)> {
     let items = builder.graph.nodes().iter().map(|node| &node.item).filter(|item| item.stage == traverse::STAGE);
     items.filter_map(|item| {
@@ -73,8 +73,8 @@ fn driven<'b>(builder: &'b Builder<'_>) -> impl Iterator<Item = (&'b str, &'b st
     })
 }
 
-/// Refuses a run that does not drive every group, and the lack of one where several drive them: their missions are no repetitions of
-/// each other. Values of a sweep are variants, which no hypothesis is about.
+/// Refuses a traverse that does not drive every group, and a missing `traverse` if several drive them, since their missions are not
+/// repetitions of each other. Values of a sweep are variants, which hypotheses do not cover.
 fn check_run(builder: &Builder<'_>, entry: &Entry<'_>, item: &HypothesisItem) -> Result<(), BuildError> {
     let mut plain = BTreeSet::new();
     for entry in builder.study.entries(traverse::STAGE)? {
@@ -91,19 +91,21 @@ fn check_run(builder: &Builder<'_>, entry: &Entry<'_>, item: &HypothesisItem) ->
     let of_all: Vec<&str> = any.iter().copied().filter(|run| runs.iter().all(|of| of.contains(run))).collect();
     let list = of_all.join(", ");
     let message = match item.traverse.as_deref() {
-        _ if of_all.is_empty() => "has no answer: no run without a sweep drives all of these groups".to_owned(),
-        None if any.len() > 1 => format!("is missing; several drive these groups, all of them: {list}"),
+        _ if of_all.is_empty() => {
+            "cannot be determined: no traverse without a sweep drives all of these groups".to_owned()
+        }
+        None if any.len() > 1 => format!("is missing; several traverses drive these groups: {list}"),
         Some(run) if !of_all.contains(&run) => {
-            format!("is \"{run}\", which does not drive all of these groups, or is swept; there are: {list}")
+            format!("is \"{run}\", which is swept or does not drive all of these groups; choose one of: {list}")
         }
         _ => return Ok(()),
     };
     Err(entry.refuse(ParameterError::new("traverse", message)).into())
 }
 
-/// Claims that no data of so many terrains could support, after Holm's adjustment over their family, as the report tests them.
+/// Claims that no data from this number of terrains could support, after Holm's adjustment over their family, as tested in the report.
 pub fn doubts(builder: &Builder<'_>) -> Vec<String> {
-    // Each was checked when it was added.
+    // Each was checked when added.
     let entries = builder.study.entries(SECTION).unwrap_or_default();
     let claims: Vec<HypothesisItem> =
         entries.iter().filter_map(|entry| entry.read::<HypothesisItem>().ok()).map(|(item, _)| item).collect();
@@ -134,17 +136,17 @@ pub fn doubts(builder: &Builder<'_>) -> Vec<String> {
     claims.iter().enumerate().filter_map(doubt).collect()
 }
 
-/// What counts once in the test of a claim.
+/// Independent units in the test of a claim.
 #[derive(Clone)]
 enum Units {
-    /// Terrains of each group.
+    /// Number of terrains of each group.
     Apart(Vec<usize>),
-    /// Blocks of terrains that share their draws, and the number of groups.
+    /// Number of groups, and of blocks of terrains that share their draws.
     Blocks(usize, usize),
 }
 
 impl Units {
-    /// As far as the claim names groups whose terrains are driven, in runs without a sweep; values of swept terrains are variants.
+    /// The units of a claim, from traverses without a sweep; values of swept terrains are variants. `None` if a group has no missions.
     fn of(builder: &Builder<'_>, claim: &HypothesisItem) -> Option<Self> {
         let runs = builder.study.entries(traverse::STAGE).ok()?;
         let runs = runs.iter().filter_map(|entry| entry.read::<TraverseItem>().ok()).map(|(run, _)| run);
@@ -174,7 +176,7 @@ impl Units {
         }
     }
 
-    /// The least p of their test.
+    /// The smallest possible p of their test.
     fn least_p(&self) -> f64 {
         match self {
             Self::Apart(sizes) => least_p_apart(sizes),
@@ -182,7 +184,7 @@ impl Units {
         }
     }
 
-    /// The same with so many of each group.
+    /// The same with this number per group.
     fn with(&self, count: usize) -> Self {
         match self {
             Self::Apart(sizes) => Self::Apart(vec![count; sizes.len()]),
@@ -211,7 +213,7 @@ impl std::fmt::Display for Units {
     }
 }
 
-/// Of equivalence there is no least p, as none of groups that are not driven.
+/// The smallest possible p of a claim; 0 for equivalence and for groups without missions.
 fn least_p(claim: &HypothesisItem, units: Option<&Units>) -> f64 {
     match (claim.test, units) {
         (HypothesisTest::Equivalence, _) | (_, None) => 0.0,
@@ -219,7 +221,7 @@ fn least_p(claim: &HypothesisItem, units: Option<&Units>) -> f64 {
     }
 }
 
-/// Refuses another level than that of the family: it is shared.
+/// Refuses a level that differs from that of the family, which shares one level.
 fn check_level(
     families: &mut BTreeMap<String, f64>,
     entry: &Entry<'_>,
@@ -229,6 +231,6 @@ fn check_level(
     if alpha == item.alpha {
         return Ok(());
     }
-    let message = format!("is {}; the family shares one level, and others of it have {alpha}", item.alpha);
+    let message = format!("is {}; a family shares one level, and others of this family have {alpha}", item.alpha);
     Err(entry.refuse(ParameterError::new("alpha", message)).into())
 }

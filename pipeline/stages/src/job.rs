@@ -1,4 +1,4 @@
-//! What an item of a study does: the trait of all jobs, what they are given and what they leave.
+//! The trait of all jobs, with their inputs and outcomes.
 
 use crate::machine::{Fault, fault};
 use crate::revision::Room;
@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 /// Name of an item: its stage and its id.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord, Hash, Serialize, Deserialize)]
 pub struct ItemRef {
-    /// Stage, as `terrain`.
+    /// Stage, such as `terrain`.
     pub stage: String,
     /// Id, unique within the stage.
     pub id: String,
@@ -33,15 +33,15 @@ impl fmt::Display for ItemRef {
     }
 }
 
-/// What one item of a study does. A job is glue: it reads the artifacts of its parents, calls a kernel, and writes files.
+/// The work of one item. A job is glue: it reads the artifacts of its parents, calls a kernel, and writes files.
 pub trait Job: Send + Sync {
-    /// Everything in the study that decides what the result holds, defaults filled in.
+    /// Everything in the study that determines the content of the result, with defaults filled in.
     fn recipe(&self) -> Value;
-    /// What decides only how the same heights are packed: items made from them stay as they are. Null for the usual way.
+    /// Settings that determine only how the same content is packed; changing them does not invalidate dependants. Null for the default.
     fn packing(&self) -> Value {
         Value::Null
     }
-    /// Rooms whose code decides the result, besides the ones that every job stands on.
+    /// Rooms whose code determines the result, besides those that all jobs depend on.
     fn rooms(&self) -> &'static [Room];
     /// Peak working memory, bytes.
     fn memory_bytes(&self) -> u64;
@@ -50,7 +50,7 @@ pub trait Job: Send + Sync {
     /// Does the work.
     ///
     /// # Errors
-    /// Why this item has no result; the other items go on.
+    /// Why this item has no result; other items continue.
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError>;
 }
 
@@ -63,7 +63,7 @@ pub struct Estimate {
     pub bytes: f64,
 }
 
-/// Where a job finds its inputs and leaves its outputs.
+/// Input and output folders of a job.
 pub struct Work<'a> {
     /// Folder for the outputs.
     pub folder: Draft<'a>,
@@ -75,7 +75,7 @@ impl Work<'_> {
     /// A file of a parent.
     ///
     /// # Errors
-    /// When the item is no parent (a bug in the stage's registration).
+    /// If the item is not a parent (a bug in the stage's registration).
     pub fn parent(&self, item: &ItemRef, file: &str) -> Result<PathBuf, JobError> {
         let folder = self.parents.get(item).ok_or_else(|| JobError::new(format!("{item} is not a parent")))?;
         Ok(folder.join(file))
@@ -86,7 +86,7 @@ impl Work<'_> {
         self.folder.file(file)
     }
 
-    /// An error of the item without the folder's path: messages are part of the release, which does not depend on where it is made.
+    /// Removes the folder's path from an error of the item: messages are part of the release, which must not depend on where it was made.
     fn without_folder(&self, error: JobError) -> JobError {
         let folder = format!("{}/", self.folder.0.display());
         if error.cause == Cause::Item { error.reworded(|words| words.replace(&folder, "")) } else { error }
@@ -95,26 +95,26 @@ impl Work<'_> {
     /// Writes an output of a few bytes.
     ///
     /// # Errors
-    /// When the file system refuses.
+    /// File-system errors.
     pub fn write(&self, file: &str, bytes: &[u8]) -> Result<(), JobError> {
         atomic::write(&self.output(file), bytes).map_err(|e| JobError::at(&self.folder.0.join(file), e))
     }
 }
 
-/// What a job leaves behind.
+/// Result of a job.
 #[derive(Clone, Debug, Default, Serialize, Deserialize)]
 pub struct Outcome {
     /// Files in the item's folder.
     pub products: Vec<Product>,
-    /// Sentences that a reader must know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
 }
 
 impl Outcome {
-    /// Writes the item's rows of a table, sorted by key. Without rows there is no file. The release merges the rows of all items.
+    /// Writes the item's rows of a table, sorted by key; without rows, no file is written. The release merges the rows of all items.
     ///
     /// # Errors
-    /// Rows that are not sorted, or a table that the item has written (bugs); the file cannot be written.
+    /// Rows that are not sorted, or a table written twice by the item (both bugs); a file that cannot be written.
     pub fn write_rows<R: Record>(
         &mut self,
         work: &Work<'_>,
@@ -134,23 +134,23 @@ impl Outcome {
     }
 }
 
-/// One file that a job made.
+/// One file written by a job.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Product {
     /// Name in the item's folder.
     pub file: String,
-    /// Path in the release; absent for files that serve later stages only.
+    /// Path in the release; absent for files that only later stages use.
     pub release_path: Option<String>,
-    /// Hash of the decoded content (heights, rows, messages), where there is one.
+    /// Hash of the decoded content (heights, rows, messages), if any.
     pub content: Option<String>,
     /// Number of messages of a recording, or of rows.
     pub records: Option<u64>,
-    /// The rows in it, where it holds some of a table of the release.
+    /// The rows in it, if it contains rows of a table of the release.
     #[serde(default)]
     pub fragment: Option<Fragment>,
 }
 
-/// Rows of a table that one item made.
+/// Rows of a table from one item.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Fragment {
     /// The table.
@@ -183,18 +183,18 @@ impl Product {
 pub struct JobError {
     /// One sentence.
     pub message: String,
-    /// Where the reason lies.
+    /// Cause of the failure.
     pub cause: Cause,
 }
 
-/// Where the reason for a failure lies.
+/// Cause of a failure.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Cause {
-    /// In the item: other items are not concerned.
+    /// The item itself; other items are not affected.
     Item,
-    /// In the item's input data.
+    /// The item's input data.
     Input,
-    /// In the machine: every item would fail.
+    /// The machine; every item would fail.
     Machine(Fault),
 }
 
@@ -204,18 +204,18 @@ impl JobError {
         Self { message: message.to_string(), cause: Cause::Item }
     }
 
-    /// A failure that lies in the input data.
+    /// A failure caused by the input data.
     pub fn input(message: impl fmt::Display) -> Self {
         Self { message: message.to_string(), cause: Cause::Input }
     }
 
-    /// A failure to read or write: the machine's where the error says so, else the item's.
+    /// A failure to read or write, attributed to the machine or the item according to the error.
     pub fn io(error: impl std::error::Error + 'static) -> Self {
         let cause = fault(&error).map_or(Cause::Item, Cause::Machine);
         Self { message: error.to_string(), cause }
     }
 
-    /// The same about a file; one that is no regular file is unusable input.
+    /// The same for a file; one that is not a regular file is unusable input.
     pub fn at(path: &Path, error: std::io::Error) -> Self {
         if error.kind() == std::io::ErrorKind::InvalidInput {
             return Self::input(format!("{}: {error}", path.display()));
@@ -223,7 +223,7 @@ impl JobError {
         Self::io(error).reworded(|words| format!("{}: {words}", path.display()))
     }
 
-    /// The same with other words.
+    /// The same with another message.
     pub fn reworded(self, words: impl FnOnce(&str) -> String) -> Self {
         Self { message: words(&self.message), ..self }
     }

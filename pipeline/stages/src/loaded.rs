@@ -1,4 +1,4 @@
-//! A study read from its file: checked, with the graph of its items.
+//! Loading of studies: reading, checking, and building the graph of items.
 
 use crate::builder::{BuildError, Builder, Heightfield, InputPlace, Origin};
 use crate::error::{Error, of_build};
@@ -17,13 +17,13 @@ pub struct Loaded {
     pub study: Study,
     /// Its items.
     pub graph: Graph,
-    /// The study's text as released: input files by their place in the release.
+    /// The study's text as released: input files are given by their path in the release.
     pub released: String,
-    /// Which terrains are for training, validation and test.
+    /// Split (training, validation or test) of each terrain.
     pub splits: Splits,
     /// The table that each id comes from.
     pub origins: BTreeMap<String, Origin>,
-    /// What makes no sense though it is allowed, a sentence each.
+    /// Warnings: what is allowed but makes no sense, one sentence each.
     pub doubts: Vec<String>,
     /// Its heightfields by id.
     pub(crate) heightfields: BTreeMap<String, Heightfield>,
@@ -32,7 +32,7 @@ pub struct Loaded {
 /// Reads a study file.
 ///
 /// # Errors
-/// A missing file, a wrong study, or a missing input file.
+/// A missing file, an invalid study, or a missing input file.
 pub fn load(path: &Path) -> Result<Loaded, Error> {
     let text = read(path)?;
     load_text(&text, &path.display().to_string(), path.parent().unwrap_or(Path::new("")))
@@ -52,16 +52,47 @@ fn io_reason(error: &std::io::Error) -> String {
     if error.kind() == std::io::ErrorKind::NotFound { "no such file".to_owned() } else { error.to_string() }
 }
 
-/// Reads a study from text; relative paths start from `folder`.
+/// Reads a study from text; relative paths start from `folder`. `name` stands for the file in messages.
 ///
 /// # Errors
 /// As [`load`].
+///
+/// # Examples
+/// All errors are told at once, each with its place in the text.
+///
+/// ```
+/// use sastrugi_stages::Error;
+/// use sastrugi_stages::loaded::load_text;
+/// use std::path::Path;
+///
+/// let text = r#"
+/// [study]
+/// name = "x"
+/// sead = 1
+/// date = "2026-01-01"
+///
+/// [[terrain]]
+/// id = "hill"
+/// kind = "multifractal"
+/// cell_m = -0.1
+/// "#;
+/// let Err(Error::Study { refusals, .. }) = load_text(text, "study.toml", Path::new("")) else {
+///     panic!("the study has errors")
+/// };
+/// let [seed, cell] = refusals.0.as_slice() else { panic!("{refusals}") };
+/// assert_eq!(seed.message, "unknown key `sead` in study");
+/// assert_eq!(seed.help.as_deref(), Some("did you mean `seed`?"));
+/// assert!(cell.message.starts_with("terrain \"hill\": `cell_m`"));
+/// assert_eq!(cell.span.clone().map(|span| &text[span]), Some("-0.1"));
+/// ```
 pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error> {
     let refused = |error: BuildError| of_build(name, text, error);
     let (study, errors) = Study::read(text, folder, &registry::section_names()).map_err(|e| refused(e.into()))?;
     let plan = build(&study, errors).map_err(refused)?;
     if plan.graph.is_empty() {
-        return Err(Error::Usage(format!("{name}: the study has no items; add [[terrain]], [[dem]] ...")));
+        return Err(Error::Usage(format!(
+            "{name}: the study has no items; add a table such as [[terrain]] or [[dem]]"
+        )));
     }
     let released = released_text(text, &study, &plan);
     Ok(Loaded {
@@ -75,7 +106,7 @@ pub fn load_text(text: &str, name: &str, folder: &Path) -> Result<Loaded, Error>
     })
 }
 
-/// The study with its input files at their places in the release; every other byte stays.
+/// The study with input files replaced by their paths in the release; all other bytes are unchanged.
 fn released_text(text: &str, study: &Study, plan: &Plan) -> String {
     let mut places: Vec<(Range<usize>, String)> = Vec::new();
     for place in &plan.inputs {
@@ -83,7 +114,7 @@ fn released_text(text: &str, study: &Study, plan: &Plan) -> String {
             places.push((span, toml_edit::Value::from(place.release_path.as_str()).to_string()));
         }
     }
-    // From the end, so that the places before stay where they are.
+    // From the end, so that earlier positions stay valid.
     places.sort_by_key(|(span, _)| std::cmp::Reverse(span.start));
     places.into_iter().fold(text.to_owned(), |mut text, (span, path)| {
         text.replace_range(span, &path);
@@ -95,22 +126,22 @@ fn released_text(text: &str, study: &Study, plan: &Plan) -> String {
 struct Plan {
     /// The graph.
     graph: Graph,
-    /// Where input files go in the release.
+    /// Paths of input files in the release.
     inputs: Vec<InputPlace>,
-    /// Which terrains are for training, validation and test.
+    /// Split (training, validation or test) of each terrain.
     splits: Splits,
     /// The table that each id comes from.
     origins: BTreeMap<String, Origin>,
-    /// What makes no sense though it is allowed.
+    /// Warnings: what is allowed but makes no sense.
     doubts: Vec<String>,
     /// Heightfields by id.
     heightfields: BTreeMap<String, Heightfield>,
 }
 
-/// Builds the graph of a study. Input files are hashed, nothing else is read.
+/// Builds the graph of a study. Input files are hashed but not parsed.
 ///
 /// # Errors
-/// All that is wrong with the study, `errors` among it, or input files that cannot be read.
+/// All errors in the study, including `errors`, or input files that cannot be read.
 fn build(study: &Study, errors: Vec<StudyError>) -> Result<Plan, BuildError> {
     let mut builder = Builder::new(study, errors);
     for section in &SECTIONS {

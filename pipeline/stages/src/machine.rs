@@ -1,30 +1,30 @@
-//! Errors of the machine: no space, no memory, no permission, a failing device. They say nothing about a study, so they end a
+//! Errors of the machine: no space, no memory, no permission, a failing device. They do not depend on the study, so they stop a
 //! run and never count as failed items.
 
 use std::error::Error;
 use std::io::{self, ErrorKind};
 use std::iter::successors;
 
-/// Numbers that Linux gives to errors which the standard library does not name.
+/// Linux numbers of errors that the standard library does not name.
 mod os {
     /// Input or output failed.
     pub const EIO: i32 = 5;
-    /// The system has no more open files.
+    /// The system limit on open files is reached.
     pub const ENFILE: i32 = 23;
-    /// The process has no more open files.
+    /// The process limit on open files is reached.
     pub const EMFILE: i32 = 24;
 }
 
-/// Whether the same call may work later.
+/// Whether the same call may succeed later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// It may: no space, quota, memory or open files.
+    /// It may: out of space, quota, memory or open files.
     Passing,
-    /// It will not, until somebody mends the place: read-only, not permitted, largest file exceeded, failing device.
+    /// Not until the cause is fixed: read-only file system, no permission, file-size limit exceeded, failing device.
     Lasting,
 }
 
-/// The fault of the machine behind an error; `None` where the cause lies elsewhere.
+/// The fault of the machine behind an error; `None` if the cause lies elsewhere.
 pub fn fault(error: &(dyn Error + 'static)) -> Option<Fault> {
     successors(Some(error), |&e| e.source()).find_map(|e| of_io(e.downcast_ref()?))
 }
@@ -37,7 +37,7 @@ fn of_io(error: &io::Error) -> Option<Fault> {
             Some(Fault::Lasting)
         }
         (_, Some(os::EIO)) => Some(Fault::Lasting),
-        // An error that wraps another one tells its own kind only.
+        // An error that wraps another reports only its own kind.
         _ => error.get_ref().and_then(|inner| fault(inner)),
     }
 }
@@ -53,7 +53,7 @@ mod tests {
     }
 
     #[test]
-    fn val_faults_are_told_from_other_errors() {
+    fn val_faults_are_distinguished_from_other_errors() {
         let passing = [28, 122, 12, 24, 23];
         let lasting = [27, 5, 30, 13, 1];
         let cases = passing.map(|n| (n, Fault::Passing)).into_iter().chain(lasting.map(|n| (n, Fault::Lasting)));

@@ -1,4 +1,4 @@
-//! A release as one archive with reproducible bytes.
+//! Packs a release into one archive with reproducible bytes.
 
 use crate::error::Error;
 use crate::runner::progress::Progress;
@@ -9,7 +9,7 @@ use serde::Serialize;
 use std::cell::Cell;
 use std::path::{Path, PathBuf};
 
-/// What packing came to.
+/// Result of packing.
 #[derive(Debug, Serialize)]
 pub struct Packing {
     /// The archive.
@@ -18,16 +18,16 @@ pub struct Packing {
     pub files: u64,
     /// Its length, bytes.
     pub bytes: u64,
-    /// SHA-256 of its bytes; absent where the release is damaged, and no archive was written.
+    /// SHA-256 of its bytes; absent if the release is damaged and no archive was written.
     pub sha256: Option<String>,
-    /// What is wrong with the release.
+    /// Damage to the release.
     pub differences: Vec<Difference>,
 }
 
-/// Checks a release and writes it to the archive `output`. A damaged one is not packed: its differences are listed.
+/// Checks a release and writes it to the archive `output`. A damaged release is not packed; its differences are listed.
 ///
 /// # Errors
-/// A folder that is no release, an output that lies in it or is a folder, or work that cannot be done.
+/// A folder that is not a release; an output inside it or that is a folder; failures of the machine.
 pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Packing, Error> {
     check_output(folder, output)?;
     progress.phase("checking files");
@@ -43,7 +43,7 @@ pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Pac
     let done = Cell::new(0);
     progress.copied(0, report.bytes);
     let added = |_: &str, bytes: u64| {
-        // The list of checksums is not among the bytes that were checked.
+        // The checksum list is not among the bytes that were checked.
         done.set((done.get() + bytes).min(report.bytes));
         progress.copied(done.get(), report.bytes);
     };
@@ -54,25 +54,26 @@ pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Pac
 
 fn check_output(folder: &Path, output: &Path) -> Result<(), Error> {
     if resolved(output).starts_with(resolved(folder)) {
-        let message = "the archive cannot go into the release, which is sealed; name a file beside it with -o";
+        let message =
+            "the archive cannot be written into the release, which is sealed; choose a file outside it with -o";
         return Err(Error::Usage(message.to_owned()));
     }
     if output.is_dir() {
-        return Err(Error::Usage(format!("{}: is a folder; -o names a file", output.display())));
+        return Err(Error::Usage(format!("{} is a folder; -o must be a file", output.display())));
     }
     if output.exists() && output.extension().is_none_or(|ending| ending != "tar") {
-        let advice = "is there already and is no .tar; name another file with -o";
-        return Err(Error::Usage(format!("{}: {advice}", output.display())));
+        let advice = "already exists and is not a .tar; choose another file with -o";
+        return Err(Error::Usage(format!("{} {advice}", output.display())));
     }
     Ok(())
 }
 
-/// Midnight UTC of a day YYYY-MM-DD, s since 1970-01-01; days before that count as it, since archives know no earlier ones.
+/// Midnight UTC of a day YYYY-MM-DD, s since 1970-01-01; earlier days count as that day, since archives cannot store them.
 fn unix_seconds(date: &str) -> u64 {
     let part =
         |range: std::ops::Range<usize>| date.get(range).and_then(|text| text.parse::<i64>().ok()).unwrap_or_default();
     let (year, month, day) = (part(0..4), part(5..7), part(8..10));
-    // Years that begin in March have their leap day at the end; 306 days from March to December.
+    // With years beginning in March, the leap day comes last; March to December have 306 days.
     let (year, month) = if month > 2 { (year, month - 3) } else { (year - 1, month + 9) };
     let days =
         365 * year + year.div_euclid(4) - year.div_euclid(100) + year.div_euclid(400) + (153 * month + 2) / 5 + day - 1;

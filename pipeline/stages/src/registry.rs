@@ -1,4 +1,4 @@
-//! The list of stages.
+//! The registry of sections and stages.
 
 use crate::builder::{BuildError, Builder};
 use crate::hypotheses;
@@ -13,27 +13,27 @@ use serde_json::Value;
 pub struct Section {
     /// Its name.
     pub name: &'static str,
-    /// How it is written.
+    /// Table or array of tables.
     pub form: Form,
     /// JSON Schema of the envelope.
     pub envelope: fn() -> Value,
-    /// Kinds whose parameters stand beside the envelope's keys.
+    /// Kinds, whose parameters are given along with the envelope's keys.
     pub kinds: fn() -> Vec<Kind>,
     /// Adds the section's items to the graph.
     pub add: fn(&mut Builder<'_>) -> Result<(), BuildError>,
 }
 
-/// Keys by which a table says of which kind it is.
+/// Keys that select the kind of a table.
 const SELECTORS: [&str; 2] = ["kind", "method"];
 
 impl Section {
-    /// The key of the envelope by which a table says of which kind it is, if there is one.
+    /// The envelope's key that selects the kind of a table, if there is one.
     pub fn selector(&self) -> Option<&'static str> {
         let keys = properties(&(self.envelope)());
         SELECTORS.into_iter().find(|selector| keys.iter().any(|key| key == selector))
     }
 
-    /// The kinds whose tables have keys of their own: the first alone where all have the same and no key of the envelope tells them apart.
+    /// The kinds whose tables have their own keys; only the first if all have the same keys and no key of the envelope selects them.
     pub fn distinct_kinds(&self) -> Vec<Kind> {
         let mut kinds = (self.kinds)();
         let own = |kind: &Kind| kind.parameters["properties"].clone();
@@ -44,10 +44,10 @@ impl Section {
     }
 }
 
-/// How a section is written.
+/// Form of a section in a study.
 #[derive(Clone, Copy, PartialEq, Eq)]
 pub enum Form {
-    /// `[name]`, once: settings of a stage whose items follow from those of others.
+    /// `[name]`, once: settings of a stage whose items follow from the items of others.
     Table,
     /// `[[name]]`, once for each item.
     Array,
@@ -148,12 +148,23 @@ pub const SECTIONS: [Section; 13] = [
     },
 ];
 
-/// Names of the sections beside `[study]`.
+/// Names of the sections except `[study]`.
 pub fn section_names() -> Vec<&'static str> {
     SECTIONS.iter().map(|s| s.name).collect()
 }
 
 /// Every generator, fit, covariance model, method, mission rule, run, vehicle.
+///
+/// ```
+/// use sastrugi_stages::registry::kinds;
+///
+/// let kinds = kinds();
+/// let husky = kinds.iter().find(|kind| kind.kind == "husky_a200").ok_or("no such kind")?;
+/// assert_eq!(husky.family, "vehicle");
+/// // A vehicle states its values, and the source of each.
+/// assert!(husky.values().is_some() && husky.sources().is_some());
+/// # Ok::<(), &str>(())
+/// ```
 pub fn kinds() -> Vec<Kind> {
     let models = sastrugi_texture::kinds().into_iter().filter(|k| k.family == "covariance");
     SECTIONS.iter().flat_map(|s| (s.kinds)()).chain(models).chain(sastrugi_mobility::registry::kinds()).collect()
@@ -163,16 +174,50 @@ pub fn kinds() -> Vec<Kind> {
 mod tests {
     use super::*;
 
-    /// A key of an envelope would never reach a generator.
+    /// A parameter with the name of an envelope key would never reach its generator.
     #[test]
     fn val_no_parameter_has_the_name_of_an_envelope_key() {
+        let mut parameters = 0;
         for section in &SECTIONS {
             let envelope = properties(&(section.envelope)());
+            assert_eq!(section.form == Form::Array, envelope.iter().any(|key| key == "id"), "{}", section.name);
             for kind in (section.kinds)() {
                 let own = properties(&kind.parameters);
                 let shared: Vec<&String> = own.iter().filter(|key| envelope.contains(key)).collect();
                 assert!(shared.is_empty(), "[[{}]] {}: {shared:?}", section.name, kind.kind);
+                parameters += own.len();
             }
+        }
+        assert!(parameters > 100, "{parameters}");
+    }
+
+    /// The key that selects the kind of a table.
+    #[test]
+    fn val_selectors() {
+        let selector = |name: &str| SECTIONS.iter().find(|section| section.name == name).unwrap().selector();
+        assert_eq!(["terrain", "missions", "rover"].map(selector), [Some("kind"); 3]);
+        assert_eq!(selector("texture"), Some("method"));
+        assert_eq!(["dem", "fit", "roughness", "traverse", "hypothesis"].map(selector), [None; 5]);
+    }
+
+    /// A table may refer to tables of earlier sections only.
+    #[test]
+    fn val_sections_stand_after_those_that_they_refer_to() {
+        let names = section_names();
+        let place = |name: &str| names.iter().position(|other| *other == name).unwrap();
+        for (earlier, later) in [
+            ("dem", "terrain"),
+            ("terrain", "fit"),
+            ("fit", "texture"),
+            ("texture", "image"),
+            ("image", "photoclinometry"),
+            ("photoclinometry", "missions"),
+            ("missions", "traverse"),
+            ("route", "navigate"),
+            ("texture", "rover"),
+            ("traverse", "hypothesis"),
+        ] {
+            assert!(place(earlier) < place(later), "[[{later}]] refers to [[{earlier}]]");
         }
     }
 }

@@ -1,7 +1,7 @@
-//! Revisions of the rooms: hashes of their sources, made by the build script. They are part of cache keys only; a release
-//! holds the crate version.
+//! Revisions of the rooms: hashes of their sources, computed by the build script. They are used in cache keys only; a release
+//! states the crate version.
 
-/// A room as far as cache keys go.
+/// A room that may be part of a cache key.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Room {
     /// `pipeline/roughness`.
@@ -20,7 +20,7 @@ pub enum Room {
     Statistics,
 }
 
-/// What every stage stands on: schemas, numeric, store, the jobs with their trait and operations, and the locked dependencies.
+/// What all stages depend on: schemas, numeric, store, the jobs with their trait and operations, and the locked dependencies.
 const FOUNDATION: [&str; 7] = [
     env!("SASTRUGI_REVISION_SCHEMAS"),
     env!("SASTRUGI_REVISION_NUMERIC"),
@@ -50,4 +50,22 @@ pub fn revision(rooms: &[Room]) -> String {
         hasher.update(part.as_bytes());
     }
     hasher.finalize().to_hex()[..16].to_owned()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A change of one room must not go unnoticed because it looks like another.
+    #[test]
+    fn prop_every_room_has_its_own_revision() {
+        use Room::{Imaging, Mobility, Navigation, Roughness, Statistics, Terrain, Texture};
+        let rooms = [Roughness, Terrain, Texture, Mobility, Navigation, Imaging, Statistics];
+        let mut all: Vec<String> = rooms.iter().map(|room| revision(&[*room])).collect();
+        all.extend([revision(&[]), revision(&[Terrain, Texture])]);
+        assert!(all.iter().all(|hex| hex.len() == 16 && hex.bytes().all(|b| b.is_ascii_hexdigit())), "{all:?}");
+        all.sort_unstable();
+        all.dedup();
+        assert_eq!(all.len(), rooms.len() + 2);
+    }
 }

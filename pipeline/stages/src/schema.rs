@@ -1,7 +1,7 @@
-//! JSON Schema of a study file (draft 2020-12): for validators, and for editors that complete and check as people write.
+//! JSON Schema of a study file (draft 2020-12), for validators and for completion and checks in editors.
 //!
-//! All definitions stand at the root, named by where they come from (`terrain`, `terrain.multifractal`, `terrain.multifractal.RawLayer`), so that
-//! every reference can be followed. Each kind of a section is a choice with all keys of its tables.
+//! All definitions are at the root, named by their origin (`terrain`, `terrain.multifractal`, `terrain.multifractal.RawLayer`), so that
+//! every reference can be resolved. Each kind of a section is one alternative, with all keys of its tables.
 
 use crate::registry::{Form, SECTIONS, Section};
 use sastrugi_schemas::Kind;
@@ -9,10 +9,17 @@ use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::study::StudyHead;
 use serde_json::{Map, Value, json};
 
-/// Key of a table that names several kinds at once, and holds the keys of all of them.
+/// Key of a table that names several kinds at once and accepts the keys of all of them.
 const SEVERAL: &str = "methods";
 
 /// JSON Schema of a study file.
+///
+/// ```
+/// let schema = sastrugi_stages::schema::study_schema();
+/// assert_eq!(schema["required"], serde_json::json!(["study"]));
+/// // A section is a list of tables, one for each item.
+/// assert_eq!(schema["properties"]["terrain"]["type"], "array");
+/// ```
 pub fn study_schema() -> Value {
     let mut definitions = Map::new();
     let mut properties = Map::new();
@@ -37,7 +44,7 @@ pub fn study_schema() -> Value {
     })
 }
 
-/// Moves a schema and its definitions to the root; what stands in its place.
+/// Moves a schema and its definitions to the root; returns the reference that replaces it.
 fn hoist(name: &str, mut schema: Value, definitions: &mut Map<String, Value>) -> Value {
     if let Some(object) = schema.as_object_mut() {
         object.remove("$schema");
@@ -56,7 +63,7 @@ fn reference(name: &str) -> Value {
     json!({ "$ref": format!("#/$defs/{name}") })
 }
 
-/// References as they are at the root.
+/// Adapts references to the root.
 fn rename(schema: &mut Value, name: &str) {
     match schema {
         Value::Object(map) => map.iter_mut().for_each(|(key, value)| match value {
@@ -68,7 +75,7 @@ fn rename(schema: &mut Value, name: &str) {
     }
 }
 
-/// A table of a section: the envelope's keys, and those of the kind that it is of.
+/// A table of a section: the keys of the envelope and of its kind.
 fn table(section: &Section, definitions: &mut Map<String, Value>) -> Value {
     let place = hoist(section.name, (section.envelope)(), definitions);
     let envelope = definitions.get(section.name).and_then(|e| e["properties"].as_object()).cloned().unwrap_or_default();
@@ -94,7 +101,7 @@ fn table(section: &Section, definitions: &mut Map<String, Value>) -> Value {
         if let Some(key) = selector.filter(|_| title != SEVERAL) {
             definition["properties"][key] = json!({ "const": title });
         }
-        // In every choice, not beside them: editors that know earlier drafts of JSON Schema pass over `unevaluatedProperties`.
+        // In every alternative, not next to them: editors that support only earlier drafts of JSON Schema ignore `unevaluatedProperties`.
         definition["additionalProperties"] = Value::Bool(false);
         choices.push(reference(&name));
     }
@@ -107,7 +114,7 @@ fn table(section: &Section, definitions: &mut Map<String, Value>) -> Value {
     place
 }
 
-/// What a table of a kind has beside its envelope. Keys that are required may come from a sweep, so none is here.
+/// The keys of a kind. None is required here, since a required key may come from a sweep.
 fn parameters_of(kind: &Kind) -> Value {
     let mut parameters = kind.parameters.clone();
     if let Some(object) = parameters.as_object_mut() {
@@ -116,4 +123,72 @@ fn parameters_of(kind: &Kind) -> Value {
         object.insert("description".to_owned(), format!("{} Source: {}", kind.summary, kind.source).into());
     }
     parameters
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::starting::STARTING;
+    use crate::study::StudyText;
+
+    /// Every `$ref` in a value.
+    fn references<'a>(value: &'a Value, found: &mut Vec<&'a str>) {
+        match value {
+            Value::Object(map) => map.iter().for_each(|(key, value)| match value.as_str() {
+                Some(target) if key == "$ref" => found.push(target),
+                _ => references(value, found),
+            }),
+            Value::Array(list) => list.iter().for_each(|value| references(value, found)),
+            _ => {}
+        }
+    }
+
+    #[test]
+    fn val_every_reference_resolves() {
+        let schema = study_schema();
+        let mut found = Vec::new();
+        references(&schema, &mut found);
+        assert!(found.len() > 50, "{}", found.len());
+        for target in found {
+            assert!(target.strip_prefix('#').is_some_and(|path| schema.pointer(path).is_some()), "{target}");
+        }
+    }
+
+    /// Each kind of a section is one alternative, which accepts the keys of the envelope and its own, and no others.
+    #[test]
+    fn val_kinds_are_alternatives() {
+        let schema = study_schema();
+        let definitions = &schema["$defs"];
+        let section = SECTIONS.iter().find(|section| section.name == "terrain").unwrap();
+        let choices = definitions["terrain"]["anyOf"].as_array().unwrap();
+        assert_eq!(choices.len(), (section.kinds)().len());
+        for kind in (section.kinds)() {
+            let name = format!("terrain.{}", kind.kind);
+            assert!(choices.contains(&reference(&name)), "{name}");
+            let table = &definitions[&name];
+            assert_eq!(
+                (&table["additionalProperties"], &table["properties"]["kind"]["const"]),
+                (&false.into(), &kind.kind.into())
+            );
+            for key in ["id", "count", "sweep"] {
+                assert!(table["properties"].get(key).is_some(), "{name}: {key}");
+            }
+        }
+        assert!(definitions["terrain.multifractal"]["properties"].get("high").is_some());
+        assert!(definitions["terrain.gap"]["properties"].get("high").is_none());
+    }
+
+    /// The sections of the starting studies are those of the schema.
+    #[test]
+    fn val_starting_studies_have_known_sections() {
+        let schema = study_schema();
+        for starting in STARTING {
+            let study = StudyText::parse(starting.text).unwrap().to_json().unwrap();
+            let sections = study.as_object().unwrap();
+            assert!(sections.contains_key("study") && sections.len() > 1, "{}", starting.name);
+            for section in sections.keys() {
+                assert!(schema["properties"].get(section).is_some(), "{}: {section}", starting.name);
+            }
+        }
+    }
 }

@@ -1,9 +1,9 @@
-//! Terrains for training, validation and test: one part for each terrain and everything on it, every group in the same shares.
+//! Splits: assigns each terrain and everything on it to training, validation or test, with the same shares in every group.
 //!
-//! What must not be torn apart is one unit: terrains that share their random draws (`pairing = "common"`, or one `seed`), and a texture and
-//! the heightfield that it lies on. Units are drawn group by group; units whose terrains are of several groups are
-//! drawn together with those of the same groups. A unit's place in the draw comes from its own random stream, so that more
-//! terrains move few others.
+//! Terrains that share data form one unit and stay in the same split: terrains with common random draws (`pairing = "common"`, or
+//! the same `seed`), and a texture and the heightfield it is added to. Units are drawn group by group; units with terrains of
+//! several groups are drawn together with others of the same groups. The rank of a unit comes from its own random stream, so
+//! adding terrains moves few others.
 
 use crate::builder::{Heightfield, common};
 use crate::job::ItemRef;
@@ -15,22 +15,22 @@ use sastrugi_schemas::tables::CellType;
 use sastrugi_schemas::{Cell, Table};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Names of the parts, in the order of `[study] split`.
+/// Names of the splits, in the order of `[study] split`.
 pub const PARTS: [&str; 3] = ["train", "validation", "test"];
-/// What stands for a part where a row is in none.
+/// Split of rows that belong to none.
 pub const OTHER: &str = "other";
-/// Column that names the part of a row.
+/// Column with the split of a row.
 const COLUMN: &str = "split";
-/// Column that names the terrain of a row.
+/// Column with the terrain of a row.
 const TERRAIN: &str = "terrain_id";
 /// First word of the random streams after the seed.
 const STAGE: &str = "split";
 
-/// Part of each terrain, by id; terrains without a part are absent.
+/// Split of each terrain, by id; terrains without a split are absent.
 pub type Splits = BTreeMap<String, String>;
 
-/// Writes the part into a row that names a terrain and has the column `split`: items are made without it, so that another
-/// split makes nothing again.
+/// Writes the split into a row that has the columns for terrain and `split`. Items are computed without it, so changing the
+/// split recomputes nothing.
 pub fn fill(table: &Table, cells: &mut [Cell], splits: &Splits) {
     let (Some(split), Some(terrain)) = (table.position(COLUMN), table.position(TERRAIN)) else { return };
     let part = match &cells[terrain] {
@@ -40,18 +40,18 @@ pub fn fill(table: &Table, cells: &mut [Cell], splits: &Splits) {
     cells[split] = part.to_cell();
 }
 
-/// Whether every file of a table holds rows of one part: the study has parts, and the table names them.
-fn is_parted(table: &Table, splits: &Splits) -> bool {
+/// Whether every file of a table contains rows of one split only: the study has splits, and the table a column for them.
+fn is_split(table: &Table, splits: &Splits) -> bool {
     !splits.is_empty() && table.position(COLUMN).is_some() && table.position(TERRAIN).is_some()
 }
 
-/// Names of the files of a table that has one for each part; none where it has one in all, or one for each terrain.
+/// File names of a table that has one file per split; empty if it has a single file or one per terrain.
 pub fn files(table: &Table, splits: &Splits) -> Vec<&'static str> {
-    let parted = is_parted(table, splits) && table.file_per.is_none();
+    let parted = is_split(table, splits) && table.file_per.is_none();
     PARTS.into_iter().chain([OTHER]).filter(|_| parted).collect()
 }
 
-/// Whether a row, whose part is filled, belongs to the file of that name.
+/// Whether a row, whose split is filled in, belongs to the file of that name.
 pub fn is_in_file(table: &Table, cells: &[Cell], file: &str) -> bool {
     match table.position(COLUMN).map(|split| &cells[split]) {
         Some(Cell::Text(part)) => part == file,
@@ -59,8 +59,8 @@ pub fn is_in_file(table: &Table, cells: &[Cell], file: &str) -> bool {
     }
 }
 
-/// The part that all rows of a table's file are in, by the file's name ([`OTHER`] for none of them); nothing where rows of several parts
-/// may be in it.
+/// The split of all rows in a table's file, by the file's name ([`OTHER`] for rows of no split); `None` if the file may mix
+/// splits.
 pub fn of_file(table: &Table, file: &str, splits: &Splits) -> Option<&'static str> {
     let part = match table.file_per {
         Some(TERRAIN) => splits.get(file).map(String::as_str),
@@ -68,20 +68,20 @@ pub fn of_file(table: &Table, file: &str, splits: &Splits) -> Option<&'static st
         None => Some(file),
     };
     let known = PARTS.into_iter().find(|known| Some(*known) == part);
-    is_parted(table, splits).then_some(known.unwrap_or(OTHER))
+    is_split(table, splits).then_some(known.unwrap_or(OTHER))
 }
 
-/// Terrains that stay together.
+/// Terrains that stay in the same split.
 struct Unit {
     terrains: Vec<String>,
     /// Labels of its terrains; empty when none has one.
     groups: BTreeSet<String>,
-    /// Its place in the draw.
+    /// Its rank in the draw.
     rank: u64,
 }
 
-/// Draws the part of every terrain, if the study asks for it. Terrains without a group take no part while others have
-/// one, unless they belong to the unit of such a terrain.
+/// Draws the split of every terrain, if the study has splits. If some terrains have a group, terrains without one are left out,
+/// unless they belong to the unit of a terrain with a group.
 ///
 /// # Errors
 /// A group with too few terrains.
@@ -114,23 +114,23 @@ fn too_few(study: &Study, groups: &BTreeSet<String>, units: &[Unit], shares: &[f
     let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
     let tied = match units.iter().max_by_key(|unit| unit.terrains.len()) {
         Some(Unit { terrains: tied, .. }) if terrains > units.len() => format!(
-            " in {} ({} belong together, made from one another or from the same random draws)",
+            " in {} ({} belong together: one is made from the other or they share random draws)",
             counted(units.len(), "independent set"),
             tied.join(", ")
         ),
         _ => String::new(),
     };
     let message = format!(
-        "`split` asks for {parts} parts, but {of} has {}{tied}; each part needs at least one",
+        "too few terrains for the {parts} splits of `split`: {of} has {}{tied}; each split needs at least one",
         counted(terrains, "terrain")
     );
     let span = study.span_of(&["study".to_owned(), "split".to_owned()]);
-    let help = (!groups.is_empty()).then(|| "terrains without a `group` take no part".to_owned());
+    let help = (!groups.is_empty()).then(|| "terrains without a `group` are left out of the splits".to_owned());
     StudyError::at(span, message).with_help(help)
 }
 
-/// How many of `count` units go to each part: shares rounded by the largest remainders, at least one for each share above 0.
-/// Nothing when there are too few.
+/// Number of the `count` units in each split: shares rounded by largest remainder, at least one for each share above 0.
+/// `None` if there are too few.
 fn counts(count: usize, shares: &[f64; 3]) -> Option<[usize; 3]> {
     let wanted = shares.map(|share| share * count as f64);
     let mut counts = wanted.map(|w| w.floor() as usize);
@@ -148,7 +148,7 @@ fn counts(count: usize, shares: &[f64; 3]) -> Option<[usize; 3]> {
     Some(counts)
 }
 
-/// Terrains by what ties them to one another.
+/// Groups terrains that share data into units.
 fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -> Vec<Unit> {
     let mut sets = DisjointSets::default();
     let makers: BTreeMap<&ItemRef, &str> = fields.iter().map(|(id, field)| (&field.item, id.as_str())).collect();
@@ -159,7 +159,7 @@ fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -
         if let Some(word) = shared_draw(study, field) {
             sets.join(id, &word);
         }
-        // Explicit seeds may give one stream twice. The sign sorts after all ids, so that none of these words stands for a unit.
+        // Explicit seeds may give the same stream twice. `~` sorts after all ids, so none of these words represents a unit.
         let stream = graph.find(&field.item).and_then(|p| graph.node(p).stream.clone());
         if let Some(stream) = stream {
             sets.join(id, &format!("~{stream}"));
@@ -180,13 +180,13 @@ fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -
     units.into_values().collect()
 }
 
-/// Word of the draws that a heightfield shares with others.
+/// Name of the draws that a heightfield shares with others.
 fn shared_draw(study: &Study, field: &Heightfield) -> Option<String> {
-    // Ids hold no blank, so that none is taken for this word, which comes before all of them.
+    // Ids contain no blank, so they differ from this word, which sorts before all of them.
     field.replicate.filter(|_| study.head.pairing == Pairing::Common).map(|k| format!(" {}", common(k)))
 }
 
-/// Names that belong together; the first of them in order stands for all.
+/// Disjoint sets of names, each represented by its first name in order.
 #[derive(Default)]
 struct DisjointSets(BTreeMap<String, String>);
 
@@ -246,7 +246,7 @@ mod tests {
     }
 
     #[test]
-    fn val_without_groups_all_are_one_group() {
+    fn val_without_groups_all_terrains_are_one_group() {
         let text = format!("{HEAD}split = [0.5, 0.0, 0.5]\n{}", terrain("a", "", 4));
         assert_eq!(number(&splits(&text).unwrap(), "a"), [2, 0, 2]);
     }
@@ -265,7 +265,7 @@ mod tests {
         assert_eq!(number(&drawn, "a"), [6, 2, 2]);
     }
 
-    /// Replicate k of a seed draws as seed + k - 1 does: the same heights are never in two parts.
+    /// Replicate k of a seed draws as seed + k - 1 does; equal heights are never in two splits.
     #[test]
     fn val_terrains_of_one_seed_stay_together() {
         let seeded = |id: &str, seed: u32| terrain(id, "a", 8).replace("count", &format!("seed = {seed}\ncount"));
@@ -278,7 +278,7 @@ mod tests {
     fn val_too_few_terrains_are_refused() {
         let text = format!("{HEAD}split = [0.7, 0.15, 0.15]\n{}{}", terrain("a", "a", 20), terrain("b", "b", 2));
         let error = splits(&text).unwrap_err();
-        assert!(error.contains("group \"b\" has 2 terrains") && error.contains("3 parts"), "{error}");
+        assert!(error.contains("group \"b\" has 2 terrains") && error.contains("3 splits"), "{error}");
         let onto = "[[texture]]\nid = \"t\"\nfit = { model = \"exponential\", sigma_m = 0.03, range_m = 0.5 }\nonto = \"a-0001\"\ngroup = \"a\"\n\
             size_m = [3.2, 3.2]\ncell_m = 0.05\n";
         let error = splits(&format!("{HEAD}split = [0.7, 0.15, 0.15]\n{}{onto}", terrain("a", "a", 2))).unwrap_err();
@@ -296,12 +296,12 @@ mod tests {
         let drawn = splits(&format!("{HEAD}split = [0.8, 0.2]\n{}", terrain("a", "a", 10))).unwrap();
         assert_eq!(number(&drawn, "a"), [8, 0, 2]);
         let error = splits(&format!("{HEAD}split = [1.0]\n{}", terrain("a", "a", 10))).unwrap_err();
-        assert!(error.contains("two or three parts"), "{error}");
+        assert!(error.contains("two or three splits"), "{error}");
     }
 
-    /// Tables of runs have a file for each part, their samples one for each terrain; other tables hold what they hold.
+    /// Tables of runs have one file per split, their samples one per terrain; other tables are not split.
     #[test]
-    fn val_every_file_of_a_parted_table_is_of_one_part() {
+    fn val_every_file_of_a_split_table_is_of_one_split() {
         use sastrugi_schemas::tables::by_name;
         let [missions, samples, psd] = ["missions", "samples", "psd"].map(|name| by_name(name).unwrap());
         let drawn: Splits = [("a".to_owned(), "test".to_owned())].into();
@@ -315,7 +315,7 @@ mod tests {
     }
 
     #[test]
-    fn prop_counts_add_up_and_leave_no_part_empty() {
+    fn prop_counts_add_up_and_leave_no_split_empty() {
         for count in 3..200 {
             for shares in [[0.7, 0.15, 0.15], [0.98, 0.01, 0.01], [1.0 / 3.0; 3], [0.9, 0.1, 0.0]] {
                 let counts = counts(count, &shares).unwrap();
@@ -328,5 +328,8 @@ mod tests {
             }
         }
         assert_eq!((counts(2, &[0.7, 0.15, 0.15]), counts(0, &[0.5, 0.0, 0.5])), (None, None));
+        // By hand: of 7, 1.5 and 1.5 the first of two equal remainders is rounded up; of 3.9, 0.04 and 0.04 the largest gives to the others.
+        assert_eq!(counts(10, &[0.7, 0.15, 0.15]), Some([7, 2, 1]));
+        assert_eq!(counts(4, &[0.98, 0.01, 0.01]), Some([2, 1, 1]));
     }
 }

@@ -1,33 +1,33 @@
-//! Studies to start from: small, complete, with a comment on every line that a newcomer asks about.
+//! Starting studies: small, complete and commented.
 
-/// A study to start from.
+/// A starting study.
 #[derive(Clone, Copy, Debug)]
 pub struct Starting {
-    /// The stage that it leads to.
+    /// Name of the study, after its last stage.
     pub name: &'static str,
-    /// What it makes.
+    /// What it produces.
     pub summary: &'static str,
-    /// What has to be there before it can be planned.
+    /// What the user must provide before it can be planned.
     pub needs: Option<&'static str>,
     /// Its text.
     pub text: &'static str,
 }
 
-/// Name of the schema that the studies refer to, beside them.
+/// File name of the schema that the studies refer to, in the same folder.
 pub const SCHEMA: &str = "study.schema.json";
 
 /// All of them.
 pub const STARTING: [Starting; 6] = [
     Starting {
         name: "terrain",
-        summary: "generated terrains of several roughnesses",
+        summary: "generated terrains of different roughness",
         needs: None,
         text: include_str!("starting/terrain.toml"),
     },
     Starting {
         name: "texture",
-        summary: "the covariance of a measured DEM, and synthetic surfaces that match it",
-        needs: Some("put your DEM beside it as site.tif, or change `file` to its name"),
+        summary: "covariance fit of a measured DEM, and synthetic surfaces that match it",
+        needs: Some("put your DEM next to the study as site.tif, or change `file` to its name"),
         text: include_str!("starting/texture.toml"),
     },
     Starting {
@@ -44,13 +44,13 @@ pub const STARTING: [Starting; 6] = [
     },
     Starting {
         name: "rover",
-        summary: "rovers that find their way among rocks",
+        summary: "rovers that find their own way among rocks",
         needs: None,
         text: include_str!("starting/rover.toml"),
     },
     Starting {
         name: "photoclinometry",
-        summary: "rendered images of a planet, and heights from them",
+        summary: "rendered images of a planetary surface, and heights recovered from them",
         needs: None,
         text: include_str!("starting/photoclinometry.toml"),
     },

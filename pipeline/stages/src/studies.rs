@@ -1,4 +1,4 @@
-//! What a command does with a whole study: run, plan, merge. What it does with a release is in [`crate::verification`].
+//! Commands on studies: run, plan, merge. For commands on releases see [`crate::verification`].
 
 use crate::error::Error;
 use crate::jobs::{fit, original};
@@ -22,37 +22,37 @@ use std::path::{Component, Path, PathBuf};
 /// A run.
 #[derive(Clone, Copy)]
 pub struct RunRequest<'a> {
-    /// Release folder, or folder of the shard.
+    /// Release folder, or folder of a shard.
     pub output: &'a Path,
-    /// Work area; `<output>.work` when absent.
+    /// Work area; default: `<output>.work`.
     pub work: Option<&'a Path>,
-    /// Part of the study to run.
+    /// Shard of the study to run.
     pub part: Option<Part>,
-    /// The stage whose results are asked for: without any of them there is nothing to release.
+    /// The stage whose results are wanted; without any of them no release is written.
     pub purpose: Option<&'static str>,
-    /// Whether a release of the same study with fewer failed items is replaced.
+    /// Whether to replace a release of the same study that has fewer failed items.
     pub replace: bool,
     /// Limits.
     pub limits: Limits,
 }
 
-/// What a run came to.
+/// Summary of a run.
 #[derive(Debug, Serialize)]
 pub struct RunSummary {
     /// Release or shard folder.
     pub output: PathBuf,
     /// Items that were needed.
     pub items: usize,
-    /// Items that were computed now.
+    /// Items computed in this run.
     pub computed: usize,
     /// Items without a result.
     pub failures: Vec<Failure>,
-    /// Sentences about the items of a release, as its manifest has them; none of a shard.
+    /// Notes on the items of a release, as in its manifest; empty for a shard.
     pub notes: Vec<ItemNote>,
 }
 
 impl RunSummary {
-    /// What each fit came to: the first of its notes.
+    /// The verdict on each fit, which is the first of its notes.
     pub fn verdicts(&self) -> Vec<&ItemNote> {
         let of_fits = self.notes.iter().filter(|note| note.stage == fit::STAGE);
         let mut verdicts: Vec<&ItemNote> = of_fits.collect();
@@ -62,16 +62,23 @@ impl RunSummary {
 }
 
 /// The work area that belongs to a release folder.
+///
+/// ```
+/// use sastrugi_stages::studies::default_work;
+/// use std::path::Path;
+///
+/// assert_eq!(default_work(Path::new("out/snow")), Path::new("out/snow.work"));
+/// ```
 pub fn default_work(output: &Path) -> PathBuf {
     let name = output.file_name().map_or_else(|| "release".into(), |n| n.to_string_lossy().into_owned());
     output.with_file_name(format!("{name}.work"))
 }
 
-/// Runs a study to a release, or a shard of it to a partial folder.
+/// Runs a study and writes a release, or runs a shard of it and writes a shard folder.
 ///
 /// # Errors
-/// A destination that is not ours, a busy work area, or no item with a result. Failed items are no error as long as some
-/// have a result: they are listed.
+/// A destination that is not a sastrugi folder, a busy work area, or no item with a result. As long as some items have a
+/// result, failed items are not an error but are listed.
 pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -> Result<RunSummary, Error> {
     check_destination(request)?;
     let work = request.work.map_or_else(|| default_work(request.output), Path::to_owned);
@@ -110,13 +117,13 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
     Ok(RunSummary { output, items, computed, failures, notes })
 }
 
-/// Items of a part of a study with those that they need; all of them without a part.
+/// Items of a shard and their ancestors; all items without a shard.
 fn needed(loaded: &Loaded, part: Option<Part>) -> Vec<usize> {
     let graph = &loaded.graph;
     graph.closure((0..graph.len()).filter(|&p| part.is_none_or(|part| part.owns(graph.key(p)))))
 }
 
-/// Refuses a run with an item that needs more memory by itself than there may be, before anything is computed.
+/// Refuses, before anything is computed, a run with an item that needs more memory than the limit.
 fn check_memory(loaded: &Loaded, cache: &Cache, needed: &[usize], limits: Limits) -> Result<(), Error> {
     let graph = &loaded.graph;
     let missing =
@@ -126,7 +133,7 @@ fn check_memory(loaded: &Loaded, cache: &Cache, needed: &[usize], limits: Limits
         Some((bytes, item)) if bytes > limits.memory_bytes && !limits.beyond => {
             let gib = |bytes: u64| bytes as f64 / f64::from(1u32 << 30);
             Err(Error::Usage(format!(
-                "`--memory {:.3}`: {item} needs about {:.2} GiB by itself; give at least that much, or make the item smaller",
+                "`--memory {:.3}`: {item} alone needs about {:.2} GiB; raise the limit, or make the item smaller",
                 gib(limits.memory_bytes),
                 gib(bytes)
             )))
@@ -135,41 +142,41 @@ fn check_memory(loaded: &Loaded, cache: &Cache, needed: &[usize], limits: Limits
     }
 }
 
-/// Files are only copied: with nothing else there is no release to make.
+/// Input files are only copied; with nothing else there is nothing to release.
 fn is_worth_a_release(stage: &str, purpose: Option<&str>) -> bool {
     purpose.map_or(!original::only_copies(stage), |purpose| purpose == stage)
 }
 
-/// A folder that is not ours is refused before any work is done.
+/// Refuses a foreign destination before any work is done.
 fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
     let ours = if request.part.is_some() { release::SHARD } else { release::MANIFEST };
     match fs::read_dir(request.output).map(|mut entries| entries.next().is_some()) {
         Ok(true) if !request.output.join(ours).is_file() => {
             let what = if request.part.is_some() { "shard" } else { "release" };
             let path = request.output.display();
-            Err(Error::Usage(format!("{path}: not a sastrugi {what}, and not empty; choose another folder with -o")))
+            Err(Error::Usage(format!("{path} is not empty and not a sastrugi {what}; choose another folder with -o")))
         }
         Err(e) if e.kind() == std::io::ErrorKind::NotADirectory => {
-            Err(Error::Usage(format!("{}: is a file; -o names a folder", request.output.display())))
+            Err(Error::Usage(format!("{} is a file; -o must be a folder", request.output.display())))
         }
         _ => Ok(()),
     }?;
     let inside = request.work.is_some_and(|work| resolved(work).starts_with(resolved(request.output)));
     if inside {
         return Err(Error::Usage(
-            "the work area lies inside of the output, which is replaced as a whole; name another --work".to_owned(),
+            "the work area lies inside the output folder, which is replaced; choose another --work".to_owned(),
         ));
     }
     if resolved(request.output) == resolved(Path::new(".")) {
-        return Err(Error::Usage("the output is the current folder; name a folder to make with -o".to_owned()));
+        return Err(Error::Usage("the output is the current folder; choose a new folder with -o".to_owned()));
     }
     Ok(())
 }
 
-/// What the study of a release says of it as a whole.
+/// The `[study]` table of a release.
 ///
 /// # Errors
-/// A study that is missing or wrong.
+/// A study that is missing or invalid.
 pub fn head_of(release: &Path) -> Result<StudyHead, Error> {
     let path = release.join("study.toml");
     let refuse = |why: &dyn std::fmt::Display| Error::Input(format!("{}: {why}", path.display()));
@@ -196,12 +203,12 @@ fn all_failed(failures: &[Failure]) -> Error {
     let first = causes.first().map_or_else(String::new, |f| format!("{}: {}", f.item, f.message));
     let message = match causes.len() {
         0 | 1 => first,
-        n => format!("every item failed, {n} of them by themselves; the first: {first}"),
+        n => format!("every item failed, {n} of them on their own; the first: {first}"),
     };
     if causes.iter().all(|f| f.unusable_input) { Error::Input(message) } else { Error::Failed(message) }
 }
 
-/// Keeps the wall time of every item that ran, for people; no result depends on it.
+/// Records the wall time of every item that ran, for information; no result depends on it.
 fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
     let path = cache.folder().join("timings.json");
     let earlier = fs::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
@@ -211,20 +218,40 @@ fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
     sastrugi_store::atomic::write(&path, &text).map_err(|e| Error::at(&path, e))
 }
 
-/// What a run would do, without doing it.
+/// Plans a run: the items that it would compute, with cost and reason, and the doubts about the study.
 ///
 /// # Errors
-/// When the work area cannot be read.
+/// If the work area cannot be read.
+///
+/// # Examples
+/// ```
+/// use sastrugi_stages::loaded::load_text;
+/// use sastrugi_stages::starting::STARTING;
+/// use sastrugi_stages::studies::plan_of;
+/// use std::path::Path;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let nowhere = tempfile::tempdir()?;
+/// let terrain = STARTING.iter().find(|starting| starting.name == "terrain").ok_or("no such study")?;
+/// let loaded = load_text(terrain.text, "study.toml", Path::new(""))?;
+/// let plan = plan_of(&loaded, &nowhere.path().join("release"), None, None)?;
+/// // Nothing is there yet, and nothing in the study is doubtful.
+/// assert!(plan.items > 0 && plan.ready == 0 && plan.stale.len() == plan.items);
+/// assert!(plan.stale.iter().all(|stale| stale.reason == "new"));
+/// assert!(plan.doubts.is_empty());
+/// # Ok(())
+/// # }
+/// ```
 pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>, part: Option<Part>) -> Result<PlanSummary, Error> {
     let work = work.map_or_else(|| default_work(output), Path::to_owned);
     let plan = plan(&loaded.graph, &needed(loaded, part), &Cache::look(&work));
     Ok(PlanSummary { doubts: loaded.doubts.clone(), ..plan })
 }
 
-/// Joins shards to a release.
+/// Merges shards into a release.
 ///
 /// # Errors
-/// Shards that do not make one study, or a destination that is not ours.
+/// Shards that do not form one complete study, or a destination that is not a sastrugi folder.
 pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Progress) -> Result<RunSummary, Error> {
     let joined = shard::join(shards)?;
     let study = Study::parse(&joined.study, Path::new(""), &registry::section_names()).map_err(Error::failed)?;
@@ -241,7 +268,7 @@ pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Pr
     Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures, notes })
 }
 
-/// Runs a study that a verb made up, to a release of its own.
+/// Runs a study composed by a verb and writes its release.
 ///
 /// # Errors
 /// As [`run`].
@@ -258,7 +285,14 @@ pub fn run_text(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::registry::Form;
+    use crate::study::keys::properties;
+    use crate::study::{Refusals, StudyError};
+    use proptest::collection::{btree_map, vec};
+    use proptest::option::weighted;
     use proptest::prelude::*;
+    use proptest::sample::select;
+    use sastrugi_schemas::kind::schema_of;
 
     const STUDY: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
         count = 2\nsize_px = [64, 64]\nhigh.fractal_dimension = 2.5\nsweep.cell_m = [0.05, 0.1]\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\n\n\
@@ -267,7 +301,7 @@ mod tests {
     #[test]
     fn val_a_study_becomes_its_items() {
         let loaded = load_text(STUDY, "study", Path::new("")).unwrap();
-        // Four terrains, each described, with missions drawn and driven.
+        // Four terrains, each with its description, missions and traverse.
         assert_eq!(loaded.graph.len(), 16);
         assert_eq!(loaded.released, STUDY);
     }
@@ -290,7 +324,7 @@ mod tests {
         let text = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"d\"\nfile = \"my dem.TIF\" # mine\n";
         let loaded = load_text(text, "study", folder.path()).unwrap();
         assert_eq!(loaded.released, text.replace("my dem.TIF", "dem/d.tif"));
-        // Bytes that editors leave: a byte order mark, line ends of two bytes; tables in line.
+        // A byte order mark, CRLF line ends, and inline tables.
         let windows = format!("\u{feff}{}", text.replace('\n', "\r\n"));
         let loaded = load_text(&windows, "study", folder.path()).unwrap();
         assert_eq!(loaded.released, windows.replace("my dem.TIF", "dem/d.tif"));
@@ -300,18 +334,265 @@ mod tests {
         assert_eq!(loaded.released, inline.replace("'my dem.TIF'", "\"dem/d.tif\""));
     }
 
-    proptest! {
-        /// Whatever bytes a study file holds, reading it ends in a study or an error, never in a panic.
-        #[test]
-        fn prop_any_text_is_read_or_refused(text in "\\PC*") {
-            let _ = load_text(&text, "study", Path::new(""));
+    /// Folders of others, files, and work areas that would be replaced are refused before any work; a shard is not written over a release.
+    #[test]
+    fn val_destinations() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        for name in ["empty", "foreign", "release", "shard"] {
+            fs::create_dir(path(name)).unwrap();
         }
+        for name in ["file", "foreign/thesis.txt"] {
+            fs::write(path(name), "precious").unwrap();
+        }
+        fs::write(path("release").join(release::MANIFEST), "").unwrap();
+        fs::write(path("shard").join(release::SHARD), "").unwrap();
+        let limits = Limits { workers: 1, memory_bytes: 1 << 20, beyond: true };
+        let check = |output: &str, work: Option<&str>, part: Option<&str>| {
+            let (output, work) = (path(output), work.map(path));
+            let part = part.map(|text| Part::parse(text).unwrap());
+            let request =
+                RunRequest { output: &output, work: work.as_deref(), part, purpose: None, replace: false, limits };
+            check_destination(&request).err().map(|e| e.to_string()).unwrap_or_default()
+        };
+        for name in ["empty", "new", "release"] {
+            assert_eq!(check(name, None, None), "", "{name}");
+        }
+        assert_eq!(check("shard", None, Some("1/2")), "");
+        assert!(check("release", None, Some("1/2")).contains("is not empty and not a sastrugi shard"));
+        assert!(check("shard", None, None).contains("is not empty and not a sastrugi release"));
+        assert!(check("foreign", None, None).contains("is not empty"));
+        assert!(check("file", None, None).contains("is a file; -o must be a folder"));
+        assert_eq!(check("new", Some("new.work"), None), "");
+        assert!(check("new", Some("empty/../new/work"), None).contains("the work area lies inside the output folder"));
+    }
 
+    /// Beside other errors a missing file is one refusal more, at the table that names it; alone it is missing input.
+    #[test]
+    fn val_a_missing_file_has_its_place() {
+        let head = STUDY.split_once("[[terrain]]").unwrap().0;
+        let text = format!("{head}[[dem]]\nid = \"d\"\nfile = \"none.tif\"\n");
+        let alone = load_text(&text, "study", Path::new("")).err().unwrap();
+        assert!(matches!(&alone, Error::Input(message) if message == "none.tif: no such file"), "{alone}");
+        let text = format!("{text}[[terrain]]\nid = \"t\"\nkind = \"nothing\"\n");
+        let Err(Error::Study { refusals: Refusals(errors), .. }) = load_text(&text, "study", Path::new("")) else {
+            panic!("the study is not refused")
+        };
+        let messages: Vec<&str> = errors.iter().map(|error| error.message.as_str()).collect();
+        assert!(errors.len() == 2 && messages[1].starts_with("terrain \"t\": "), "{messages:?}");
+        assert_eq!(messages[0], "dem \"d\": none.tif: no such file");
+        assert_eq!(errors[0].span.clone().map(|span| &text[span]), Some("[[dem]]"));
+    }
+
+    /// A table that misses an id like its own, itself, or another table that misses it, is refused and not passed over.
+    #[test]
+    fn val_references_to_nothing_are_refused() {
+        let fit = |id: &str, dem: &str| format!("[[fit]]\nid = \"{id}\"\ndem = \"{dem}\"\n");
+        let texture = |id: &str, onto: &str| {
+            format!(
+                "[[texture]]\nid = \"{id}\"\nfit = {{ model = \"exponential\", sigma_m = 0.03, range_m = 0.3 }}\n\
+                 onto = \"{onto}\"\nsize_m = [3.2, 3.2]\ncell_m = 0.05\n"
+            )
+        };
+        for (tables, missing) in [
+            (fit("snow", "snow-site"), "`dem` names \"snow-site\""),
+            (fit("snow", "snow"), "`dem` names \"snow\""),
+            (texture("a", "b") + &texture("b", "a"), "`onto` names \"b\""),
+        ] {
+            let refused = load_text(&format!("{STUDY}\n{tables}"), "study", Path::new("")).err().unwrap().to_string();
+            assert!(refused.contains(missing), "{refused}");
+        }
+        // What follows from another error is not told.
+        let wrong = fit("snow", "site") + "[[dem]]\nid = \"site\"\npath = \"site.tif\"\n";
+        let refused = load_text(&format!("{STUDY}\n{wrong}"), "study", Path::new("")).err().unwrap().to_string();
+        assert!(refused.contains("unknown key `path`") && !refused.contains("names \"site\""), "{refused}");
+    }
+
+    /// Numbers, of which most parameters accept some.
+    const NUMBERS: &[&str] =
+        &["-1", "0", "1", "2", "3", "64", "300", "0.0", "0.05", "0.5", "2.5", "-2.5", "1e300", "1e-300"];
+    const FLAGS: &[&str] = &["true", "false"];
+    const WORDS: &[&str] =
+        &["\"t\"", "\"f\"", "\"m\"", "\"straight\"", "\"exponential\"", "\"\"", "\"A b\"", "\"€\"", "\"10 %\""];
+    /// Values that no parameter accepts, nor any other after them is looked at.
+    const NEVER: &[&str] = &["nan", "-inf", "2026-01-01", "07:32:00", "1979-05-27T07:32:00Z"];
+
+    /// Tables without an error, by section: keys and values.
+    const RIGHT: &[(&str, &[(&str, &[&str])])] = &[
+        ("study", &[("name", &["\"x\""]), ("seed", &["1"]), ("date", &["\"2026-01-01\""])]),
+        ("dem", &[("id", &["\"s\""]), ("file", &["\"none.tif\""])]),
+        (
+            "terrain",
+            &[
+                ("id", &["\"t\"", "\"u\"", "\"v\""]),
+                ("kind", &["\"gap\"", "\"multifractal\"", "\"weierstrass_mandelbrot\"", "\"spheroids\""]),
+                ("size_px", &["[64, 64]"]),
+            ],
+        ),
+        ("fit", &[("id", &["\"f\"", "\"g\""]), ("dem", &["\"t\""])]),
+        (
+            "texture",
+            &[
+                ("id", &["\"x\"", "\"y\""]),
+                ("fit", &["{ model = \"exponential\", sigma_m = 0.03, range_m = 0.28 }", "\"f\""]),
+                ("size_m", &["[4.0, 4.0]"]),
+                ("cell_m", &["0.1"]),
+            ],
+        ),
+        ("image", &[("id", &["\"i\"", "\"j\""]), ("surface", &["\"t\""])]),
+        ("photoclinometry", &[("id", &["\"p\""]), ("images", &["[\"i\"]"])]),
+        ("missions", &[("id", &["\"m\"", "\"n\""]), ("terrains", &["[\"t\"]"])]),
+        ("traverse", &[("id", &["\"d\"", "\"e\""]), ("missions", &["\"m\""])]),
+        ("route", &[("id", &["\"r\""]), ("terrains", &["[\"t\"]"])]),
+        ("navigate", &[("id", &["\"o\""]), ("route", &["\"r\""])]),
+        ("rover", &[("id", &["\"q\""]), ("kind", &["\"sojourner_like\""]), ("terrains", &["[\"t\"]"])]),
+        (
+            "hypothesis",
+            &[
+                ("id", &["\"h\""]),
+                ("statistic", &["\"success\""]),
+                ("groups", &["[\"a\", \"b\"]"]),
+                ("test", &["\"difference\""]),
+            ],
+        ),
+    ];
+
+    fn scalar() -> BoxedStrategy<String> {
+        prop_oneof![24 => select(NUMBERS), 6 => select(FLAGS), 24 => select(WORDS), 1 => select(NEVER)]
+            .prop_map(str::to_owned)
+            .boxed()
+    }
+
+    /// A value of any type that TOML has, as text.
+    fn value(keys: &[String]) -> BoxedStrategy<String> {
+        let list = vec(scalar(), 0..4).prop_map(|all| format!("[{}]", all.join(", "))).boxed();
+        let table = btree_map(select(keys.to_vec()), prop_oneof![scalar(), list.clone()], 0..3).prop_map(|all| {
+            let pairs: Vec<String> = all.iter().map(|(key, value)| format!("{key} = {value}")).collect();
+            format!("{{ {} }}", pairs.join(", "))
+        });
+        prop_oneof![6 => scalar(), 3 => list, 1 => table].boxed()
+    }
+
+    /// The lines of a table: right ones, of which some are missing or have another value, and up to two with any of the keys.
+    fn table(section: &str, keys: &[String]) -> BoxedStrategy<String> {
+        let right = RIGHT.iter().find(|(name, _)| *name == section).map_or(&[] as &[_], |entry| entry.1);
+        let line = |&(key, values): &(&'static str, &'static [&'static str])| {
+            prop_oneof![
+                18 => select(values).prop_map(move |value| Some((key.to_owned(), value.to_owned()))),
+                1 => value(keys).prop_map(move |value| Some((key.to_owned(), value))),
+                1 => Just(None::<(String, String)>),
+            ]
+            .boxed()
+        };
+        let right: Vec<BoxedStrategy<Option<(String, String)>>> = right.iter().map(line).collect();
+        let more = vec((select(keys.to_vec()), value(keys)), 0..3);
+        let text = |(right, more): (Vec<Option<(String, String)>>, Vec<(String, String)>)| {
+            let lines: BTreeMap<String, String> = more.into_iter().chain(right.into_iter().flatten()).collect();
+            lines.iter().map(|(key, value)| format!("{key} = {value}\n")).collect::<String>()
+        };
+        (right, more).prop_map(text).boxed()
+    }
+
+    /// One or two tables of a section, seldom in the wrong form.
+    fn section(name: &str, keys: &[String], form: Form) -> BoxedStrategy<String> {
+        let name = name.to_owned();
+        (vec(table(&name, keys), 1..3), prop::bool::weighted(0.97))
+            .prop_map(move |(tables, is_right)| match (form == Form::Array) == is_right {
+                true => tables.iter().map(|lines| format!("[[{name}]]\n{lines}")).collect::<String>(),
+                false => format!("[{name}]\n{}", tables[0]),
+            })
+            .boxed()
+    }
+
+    /// Studies in valid TOML with some of the sections; most have errors, seldom one that hides the others.
+    fn studies() -> impl Strategy<Value = String> {
+        let of = |section_of: &registry::Section| {
+            let mut keys = properties(&(section_of.envelope)());
+            keys.extend((section_of.kinds)().iter().flat_map(|kind| properties(&kind.parameters)));
+            keys.push("colour".to_owned());
+            weighted(0.4, section(section_of.name, &keys, section_of.form))
+        };
+        let head = properties(&schema_of::<StudyHead>());
+        let mut sections = vec![weighted(0.97, section("study", &head, Form::Table))];
+        sections.extend(registry::SECTIONS.iter().map(of));
+        sections.push(weighted(0.05, section("terain", &["id".to_owned()], Form::Array)));
+        sections.prop_map(|sections| format!("# A study.\n{}", sections.into_iter().flatten().collect::<String>()))
+    }
+
+    /// What a refusal of one of these studies fails to say, if anything: its line, or the section, item or key that is wrong, which must be that of
+    /// the line.
+    fn unsaid(text: &str, error: &StudyError) -> Option<&'static str> {
+        let message = error.message.as_str();
+        let Some(span) = error.span.clone() else {
+            return (!message.starts_with("missing section [study]")).then_some("its line");
+        };
+        let place = text.get(span.clone()).unwrap_or_default();
+        if place.is_empty() {
+            return Some("a place in the text");
+        }
+        if message.starts_with("the number is not finite") || message.starts_with("dates must be written as text") {
+            return (!NEVER.contains(&place)).then_some("the value");
+        }
+        // Only headings start a line with a bracket.
+        let Some(start) = text[..span.end].rfind("\n[") else { return Some("its table") };
+        let table = &text[start + 1..];
+        let table = table.find("\n[").map_or(table, |end| &table[..end]);
+        let section = table.lines().next().unwrap_or_default().trim_matches(['[', ']']);
+        let is_of_item = || {
+            let id = message.strip_prefix(&format!("{section} \""))?.split_once("\": ")?.0;
+            table.lines().any(|line| line == format!("id = \"{id}\"")).then_some(())
+        };
+        let says = message.starts_with(&format!("[{section}] "))
+            || message.starts_with(&format!("{section} number "))
+            || (message.starts_with("unknown key `") && message.ends_with(&format!("` in {section}")))
+            || message.contains(&format!("`{section}`"))
+            || (section == "study" && message.contains("`split`"))
+            || is_of_item().is_some();
+        (!says).then_some("the section or key of its line")
+    }
+
+    proptest! {
+        #![proptest_config(ProptestConfig::with_cases(128))]
+
+        /// Whatever its tables hold, a study is loaded, or every refusal names what is wrong and where.
+        #[test]
+        fn prop_refusals_name_a_section_or_key_and_its_line(text in studies()) {
+            match load_text(&text, "study", Path::new("")) {
+                Ok(loaded) => {
+                    // No table is passed over.
+                    let ids = text.lines().filter_map(|line| line.strip_prefix("id = \"")?.strip_suffix('"'));
+                    for id in ids {
+                        let of_table = |claimed: &String| claimed == id || claimed.starts_with(&format!("{id}-"));
+                        prop_assert!(loaded.origins.keys().any(of_table), "\"{id}\" is not in the plan\n{text}");
+                    }
+                }
+                Err(Error::Study { refusals: Refusals(errors), .. }) => {
+                    prop_assert!(!errors.is_empty());
+                    for error in &errors {
+                        prop_assert!(!error.message.starts_with("not valid TOML"), "{}\n{text}", error.message);
+                        let unsaid = unsaid(&text, error);
+                        prop_assert!(unsaid.is_none(), "{error:?} does not say {unsaid:?}\n{text}");
+                    }
+                }
+                // Nothing but files is missing.
+                Err(Error::Input(message)) => prop_assert!(message.contains("no such file"), "{message}\n{text}"),
+                Err(Error::Usage(message)) => prop_assert!(message.contains("the study has no items"), "{message}\n{text}"),
+                Err(other) => prop_assert!(false, "{other}\n{text}"),
+            }
+        }
+    }
+
+    proptest! {
+        /// A study with a few characters changed is loaded or refused, never a panic, and refusals lie within it.
         #[test]
         fn prop_a_damaged_study_is_read_or_refused(at in 0usize..STUDY.len(), cut in 0usize..6, put in "[\\[\\]{}=\"'.,#0-9a-z\\-\n]{0,4}") {
             let end = (at + cut).min(STUDY.len());
             let text = format!("{}{put}{}", &STUDY[..at], &STUDY[end..]);
-            let _ = load_text(&text, "study", Path::new(""));
+            if let Err(Error::Study { refusals: Refusals(errors), .. }) = load_text(&text, "study", Path::new("")) {
+                prop_assert!(!errors.is_empty());
+                let places = || errors.iter().filter_map(|error| error.span.as_ref());
+                prop_assert!(places().all(|span| span.start <= span.end && span.start <= text.len()), "{errors:?}\n{text}");
+            }
         }
     }
 }

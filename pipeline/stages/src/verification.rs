@@ -1,4 +1,4 @@
-//! What a release says of itself, held against its bytes and against what its study gives here and now.
+//! Verification of a release against its manifest and, on request, against a recomputation of its study.
 
 use crate::documents::sources::Sources;
 use crate::error::Error;
@@ -24,12 +24,12 @@ use std::path::{Path, PathBuf};
 /// Key of a manifest's list of files.
 const ARTIFACTS: &str = "artifacts";
 
-/// Which items to compute again.
+/// Which items to recompute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Recompute {
-    /// Every one, and the tables and the report.
+    /// All items, the tables and the report.
     All,
-    /// This many, chosen by their keys.
+    /// This number of items, chosen by their keys.
     Some(usize),
 }
 
@@ -38,29 +38,29 @@ pub enum Recompute {
 pub struct Difference {
     /// File in the release.
     pub path: String,
-    /// What is wrong.
+    /// The problem.
     pub problem: String,
 }
 
-/// What verification found.
+/// Result of a verification.
 #[derive(Debug, Serialize)]
 pub struct Verification {
     /// Files checked.
     pub files: u64,
     /// Bytes checked.
     pub bytes: u64,
-    /// Items computed again.
+    /// Items recomputed.
     pub recomputed: Vec<String>,
-    /// Differences; none in a good release.
+    /// Differences; empty for a good release.
     pub differences: Vec<Difference>,
-    /// Why bytes cannot be compared, where they cannot.
+    /// Why bytes cannot be compared, if so.
     pub not_comparable: Option<String>,
 }
 
-/// Checks a release; with `recompute`, also against what its own study gives here and now.
+/// Checks a release; with `recompute`, also against a recomputation of its study.
 ///
 /// # Errors
-/// A folder that is no release, or work that cannot be done.
+/// A folder that is not a release; failures of the machine.
 pub fn verify(
     folder: &Path,
     recompute: Option<Recompute>,
@@ -82,7 +82,7 @@ pub fn verify(
     if release.manifest().version != ours {
         let theirs = &release.manifest().version;
         verification.not_comparable =
-            Some(format!("made by version {theirs}, this is {ours}: not comparable byte by byte"));
+            Some(format!("made by version {theirs}, this is {ours}; bytes cannot be compared"));
         return Ok(verification);
     }
     let loaded = load(&folder.join("study.toml"))?;
@@ -97,7 +97,7 @@ pub fn verify(
     Ok(verification)
 }
 
-/// What is wrong with a release's files.
+/// Problems with a release's files.
 pub fn differences(report: &VerifyReport) -> Vec<Difference> {
     let difference = |p: &Problem| Difference { path: p.path.clone(), problem: problem_text(p.kind, &p.message) };
     report.problems.iter().map(difference).collect()
@@ -108,13 +108,13 @@ fn problem_text(kind: ProblemKind, message: &str) -> String {
     if message.is_empty() { kind } else { format!("{kind}: {message}") }
 }
 
-/// A folder of this process alone, gone with its holder.
+/// A private temporary folder, removed on drop.
 struct Scratch(PathBuf);
 
 impl Scratch {
     fn new() -> Result<Self, Error> {
         let path = std::env::temp_dir().join(format!("sastrugi-verify-{}", std::process::id()));
-        // Left by a killed process that had the same number.
+        // Left by a killed process with the same id.
         let _ = fs::remove_dir_all(&path);
         fs::create_dir(&path).map_err(|e| Error::at(&path, e))?;
         Ok(Self(path))
@@ -123,7 +123,7 @@ impl Scratch {
 
 impl Drop for Scratch {
     fn drop(&mut self) {
-        // What cannot be removed lies in the folder for temporary files.
+        // If it cannot be removed, it stays in the folder for temporary files.
         let _ = fs::remove_dir_all(&self.0);
     }
 }
@@ -154,14 +154,14 @@ fn recompute_all(
     Ok(())
 }
 
-/// The manifest in a folder with all that its text holds, known to this program or not.
+/// The manifest in a folder as JSON, including keys unknown to this program.
 fn manifest_in(folder: &Path) -> Result<Value, Error> {
     let path = folder.join(MANIFEST);
     let text = sastrugi_store::file::read(&path).map_err(|e| Error::at(&path, e))?;
     serde_json::from_slice(&text).map_err(|e| Error::Input(format!("{}: {e}", path.display())))
 }
 
-/// Every file and every statement of a manifest that is not what is computed again.
+/// All files and keys of a manifest that differ from the recomputed manifest.
 fn compare_manifests(there: &Value, here: &Value) -> Vec<Difference> {
     let (files_there, files_here) = (files_of(there), files_of(here));
     let paths: BTreeSet<&str> = files_there.keys().chain(files_here.keys()).copied().collect();
@@ -174,7 +174,7 @@ fn compare_manifests(there: &Value, here: &Value) -> Vec<Difference> {
     differences
 }
 
-/// What a manifest says of each file, by path.
+/// The files in a manifest, by path.
 fn files_of(manifest: &Value) -> BTreeMap<&str, &Value> {
     let artifacts = manifest[ARTIFACTS].as_array().into_iter().flatten();
     artifacts.filter_map(|artifact| Some((artifact["path"].as_str()?, artifact))).collect()
@@ -183,16 +183,16 @@ fn files_of(manifest: &Value) -> BTreeMap<&str, &Value> {
 fn compare_files(path: &str, there: Option<&&Value>, here: Option<&&Value>) -> Vec<Difference> {
     let difference = |problem: &str| vec![Difference { path: path.to_owned(), problem: problem.to_owned() }];
     match (there, here) {
-        (Some(a), Some(b)) if a["sha256"] != b["sha256"] => difference("computed again, its bytes differ"),
+        (Some(a), Some(b)) if a["sha256"] != b["sha256"] => difference("its bytes differ when recomputed"),
         (Some(a), Some(b)) => differing_keys(a, b).iter().map(|key| stated(path, key)).collect(),
-        (Some(_), None) => difference("computed again, it does not appear"),
-        _ => difference("computed again, it appears, and is not in the release"),
+        (Some(_), None) => difference("missing when recomputed"),
+        _ => difference("appears when recomputed but is not in the release"),
     }
 }
 
-/// The difference of a statement in the manifest.
+/// A difference in a key of the manifest.
 fn stated(path: &str, key: &str) -> Difference {
-    let problem = format!("computed again, `{key}` differs from what {MANIFEST} states");
+    let problem = format!("when recomputed, `{key}` differs from {MANIFEST}");
     Difference { path: path.to_owned(), problem }
 }
 
@@ -220,10 +220,8 @@ fn recompute_some(
         release.manifest().failed.iter().map(|f| ItemRef::new(&f.stage, &f.item)).collect();
     let unexpected = execution.failures.iter().filter(|f| !failed_there.contains(&f.item));
     verification.differences.extend(
-        unexpected.map(|f| Difference {
-            path: f.item.to_string(),
-            problem: format!("cannot be computed again: {}", f.message),
-        }),
+        unexpected
+            .map(|f| Difference { path: f.item.to_string(), problem: format!("cannot be recomputed: {}", f.message) }),
     );
     let Loaded { study, released, splits, .. } = loaded;
     let mut again = Again { sources: Sources::of(study)?, ..Again::default() };
@@ -241,7 +239,7 @@ fn recompute_some(
     Ok(())
 }
 
-/// What a manifest says of some items, computed again.
+/// The manifest's entries for recomputed items.
 #[derive(Default)]
 struct Again {
     sources: Sources,
@@ -257,7 +255,7 @@ impl Again {
         self.notes.extend(notes_of(record));
     }
 
-    /// Compares the release's manifest with itself after its lines on these items are replaced.
+    /// Compares the release's manifest with a copy in which the entries of these items are replaced.
     fn compare(self, there: &Manifest, head: Head) -> Result<Vec<Difference>, Error> {
         let Self { sources, items, artifacts, mut notes } = self;
         let others = |stage: &str, item: &str| !items.contains(&ItemRef::new(stage, item));
@@ -300,7 +298,7 @@ fn compare_fragments(
     Ok(differences)
 }
 
-/// A difference when the release's table lacks one of these rows.
+/// A difference if the release's table lacks any of these rows.
 fn compare_rows(release: &Release, table: &Table, mut missing: BTreeSet<String>) -> Result<Option<Difference>, Error> {
     let count = missing.len();
     for file in release.sealed_parts(table.name) {
@@ -308,6 +306,62 @@ fn compare_rows(release: &Release, table: &Table, mut missing: BTreeSet<String>)
             missing.remove(&format!("{:?}", row.map_err(ReleaseError::from)?));
         }
     }
-    let problem = format!("computed again, {} of {count} rows differ", missing.len());
+    let problem = format!("{} of {count} rows differ when recomputed", missing.len());
     Ok((!missing.is_empty()).then(|| Difference { path: format!("tables/{}", table.name), problem }))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use serde_json::json;
+
+    fn manifest() -> Value {
+        json!({
+            "name": "x",
+            "artifacts": [
+                { "path": "a.tif", "sha256": "1", "stage": "terrain" },
+                { "path": "b.tif", "sha256": "2", "stage": "terrain" },
+            ],
+        })
+    }
+
+    /// Each kind of difference alone, as path and problem.
+    #[test]
+    fn val_every_difference_of_manifests_is_found() {
+        assert_eq!(compare_manifests(&manifest(), &manifest()), []);
+        let found = |change: fn(&mut Value)| {
+            let mut here = manifest();
+            change(&mut here);
+            let differences = compare_manifests(&manifest(), &here);
+            let [Difference { path, problem }] = differences.as_slice() else { panic!("{differences:?}") };
+            format!("{path}: {problem}")
+        };
+        let cases: [(fn(&mut Value), &str); 6] = [
+            (|m| m["artifacts"][1]["sha256"] = "3".into(), "b.tif: its bytes differ when recomputed"),
+            (
+                |m| m["artifacts"][0]["stage"] = "texture".into(),
+                "a.tif: when recomputed, `stage` differs from manifest.json",
+            ),
+            (|m| drop(m["artifacts"].as_array_mut().unwrap().remove(0)), "a.tif: missing when recomputed"),
+            (
+                |m| m["artifacts"].as_array_mut().unwrap().push(json!({ "path": "c.tif", "sha256": "4" })),
+                "c.tif: appears when recomputed but is not in the release",
+            ),
+            (|m| m["seed"] = 7.into(), "manifest.json: when recomputed, `seed` differs from manifest.json"),
+            // The same files in another order.
+            (
+                |m| m["artifacts"].as_array_mut().unwrap().reverse(),
+                "manifest.json: when recomputed, `artifacts` differs from manifest.json",
+            ),
+        ];
+        for (change, expected) in cases {
+            assert_eq!(found(change), expected);
+        }
+    }
+
+    #[test]
+    fn val_problems_of_files_in_words() {
+        assert_eq!(problem_text(ProblemKind::Missing, ""), "missing");
+        assert_eq!(problem_text(ProblemKind::Missing, "no such file"), "missing: no such file");
+    }
 }

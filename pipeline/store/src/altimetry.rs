@@ -1,14 +1,15 @@
 //! Sparse altimetry: measured points as text.
 //!
-//! One line for each point, m, in the coordinates of the surface that passes through them.
+//! One line per point, in metres, in the coordinates of the surface that passes through them.
 //!
-//! * Columns are parted by `;`, else `,`, else tabs, else blanks, whichever the line holds. Decimals are written with a point.
-//! * A first line whose first field is no number names the columns: `x`, `y`, `z` and, where known, `sigma`, the standard error of z. Each may
-//!   end in `_m`; case does not matter; other columns are skipped. Without names the first three or four columns are these, in that order.
+//! * Columns are separated by `;`, or else `,`, tabs or blanks, whichever occurs first in that order. Decimals use a point.
+//! * A first line whose first field is not a number names the columns: `x`, `y`, `z` and, where known, `sigma`, the standard error
+//!   of z. Each may end in `_m`; case does not matter; other columns are ignored. Without names, the first three or four columns
+//!   are these, in that order.
 //! * Lines that start with `#` and empty lines are skipped.
 //! * A missing sigma is 0: the point counts as exact. A missing coordinate is an error.
 //!
-//! Memory: the text and 32 bytes a point.
+//! Memory: the text and 32 bytes per point.
 
 use crate::dem::{DemError, Refusal};
 use crate::transect::fields;
@@ -17,13 +18,24 @@ use std::path::Path;
 #[cfg(test)]
 mod tests;
 
-/// Names of the columns; the last may be missing.
+/// Column names; the last column may be missing.
 const NAMES: [&str; 4] = ["x", "y", "z", "sigma"];
 
 /// Reads points `[x, y, z, sigma]`, m.
 ///
 /// # Errors
-/// A file that is missing, or holds no such text (the message names line and column).
+/// A file that is missing or cannot be parsed (the message gives line and column).
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("laser.csv");
+/// std::fs::write(&path, "z_m,x_m,y_m,sigma_m\n12.5,100,200,0.25\n13,110,200,\n")?;
+/// assert_eq!(sastrugi_store::altimetry::read(&path)?, [[100.0, 200.0, 12.5, 0.25], [110.0, 200.0, 13.0, 0.0]]);
+/// # Ok(())
+/// # }
+/// ```
 pub fn read(path: &Path) -> Result<Vec<[f64; 4]>, DemError> {
     let bytes = crate::file::read(path).map_err(|e| DemError::reading(path, e))?;
     parse(&bytes).map_err(|refusal| refusal.about(path))
@@ -31,18 +43,18 @@ pub fn read(path: &Path) -> Result<Vec<[f64; 4]>, DemError> {
 
 fn parse(bytes: &[u8]) -> Result<Vec<[f64; 4]>, Refusal> {
     let text = std::str::from_utf8(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
-        .map_err(|e| Refusal::new(format!("is no text: byte {} is not UTF-8", e.valid_up_to())))?;
-    let told = |(_, line): &(usize, &str)| !line.is_empty() && !line.starts_with('#');
-    let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim())).filter(told).peekable();
+        .map_err(|e| Refusal::new(format!("is not text: byte {} is not UTF-8", e.valid_up_to())))?;
+    let has_values = |(_, line): &(usize, &str)| !line.is_empty() && !line.starts_with('#');
+    let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim())).filter(has_values).peekable();
     let first = lines.peek().map(|(_, line)| fields(line)).unwrap_or_default();
     let named = first.first().is_some_and(|field| field.parse::<f64>().is_err());
     let columns = if named { of_names(&first)? } else { [Some(0), Some(1), Some(2), (first.len() > 3).then_some(3)] };
     let points: Vec<[f64; 4]> =
         lines.skip(usize::from(named)).map(|(number, line)| point(number, line, &columns)).collect::<Result<_, _>>()?;
-    if points.is_empty() { Err(Refusal::new("holds no point")) } else { Ok(points) }
+    if points.is_empty() { Err(Refusal::new("has no points")) } else { Ok(points) }
 }
 
-/// Places of the columns by their names.
+/// Indices of the columns, by name.
 fn of_names(names: &[&str]) -> Result<[Option<usize>; 4], Refusal> {
     let plain = |name: &str| {
         let name = name.trim_matches('"').trim().to_lowercase();
@@ -51,7 +63,7 @@ fn of_names(names: &[&str]) -> Result<[Option<usize>; 4], Refusal> {
     let found = NAMES.map(|wanted| names.iter().position(|name| plain(name) == wanted));
     match found[..3].iter().position(Option::is_none) {
         Some(k) => Err(Refusal::new(format!(
-            "has no column `{}`; it has {}, and needs x, y, z and, where known, sigma",
+            "has no column `{}`; found {}, expected x, y, z and optionally sigma",
             NAMES[k],
             names.join(", ")
         ))),
@@ -65,7 +77,7 @@ fn point(number: usize, line: &str, columns: &[Option<usize>; 4]) -> Result<[f64
     for (k, column) in columns.iter().enumerate() {
         let Some(column) = *column else { continue };
         let field = fields.get(column).copied().unwrap_or_default();
-        // Only the standard error may be unknown.
+        // Only the standard error may be missing.
         if k == 3 && field.is_empty() {
             continue;
         }

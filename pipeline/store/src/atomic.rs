@@ -1,5 +1,5 @@
-//! Files that appear complete or not at all: written beside their place under a name no artifact has, brought to disk,
-//! renamed, and the folder brought to disk.
+//! Atomic writes: a file appears complete or not at all. It is written in the same folder under a temporary name, synced and
+//! renamed; then the folder is synced.
 
 use std::ffi::OsStr;
 use std::fs::{self, File, TryLockError};
@@ -11,7 +11,7 @@ use std::sync::{Arc, OnceLock};
 /// Start of the name of every file under construction; no artifact's name starts with a dot.
 const TEMPORARY_PREFIX: &str = ".sastrugi-partial-";
 
-/// Where a file goes, and who brings its name to disk: the file itself, unless it goes into a [`Draft`].
+/// Destination of a file. Committing the file syncs its folder, unless it goes into a [`Draft`].
 #[derive(Clone, Copy, Debug)]
 pub struct Target<'a> {
     /// Path of the file.
@@ -31,13 +31,13 @@ impl<'a> From<&'a DraftFile> for Target<'a> {
     }
 }
 
-/// A folder under construction. Who makes it brings its entries to disk ([`sync_folder`]), once, before it gets its name; so its
-/// files are not brought there name by name.
+/// A folder under construction. Its creator syncs it once ([`sync_folder`]) before giving it its final name, so that each file need
+/// not sync the folder.
 #[derive(Clone, Copy, Debug)]
 pub struct Draft<'a>(pub &'a Path);
 
 impl Draft<'_> {
-    /// A file of the folder.
+    /// A file in the folder.
     pub fn file(&self, name: &str) -> DraftFile {
         DraftFile(self.0.join(name))
     }
@@ -48,6 +48,28 @@ impl Draft<'_> {
 pub struct DraftFile(PathBuf);
 
 /// A file under construction. Dropped without [`AtomicFile::commit`], it leaves nothing behind.
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_store::atomic::AtomicFile;
+/// use std::io::Write;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("a.txt");
+/// let mut file = AtomicFile::create(&path)?;
+/// file.write_all(b"half")?;
+/// assert!(!path.exists());
+/// drop(file);
+/// assert_eq!(std::fs::read_dir(folder.path())?.count(), 0);
+///
+/// let mut file = AtomicFile::create(&path)?;
+/// file.write_all(b"complete")?;
+/// file.commit()?;
+/// assert_eq!(std::fs::read(&path)?, b"complete");
+/// # Ok(())
+/// # }
+/// ```
 #[derive(Debug)]
 pub struct AtomicFile {
     writer: Option<BufWriter<File>>,
@@ -57,7 +79,7 @@ pub struct AtomicFile {
     refused: Refused,
 }
 
-/// What the file system said when it first refused to write to a file: encoders turn such errors into words.
+/// First file-system error on writing to a file. Kept because encoders reduce such errors to text.
 #[derive(Clone, Debug, Default)]
 pub struct Refused(Arc<OnceLock<i32>>);
 
@@ -78,10 +100,10 @@ impl Refused {
 }
 
 impl AtomicFile {
-    /// Starts a file that will appear at `target`; missing folders are made.
+    /// Starts a file that will appear at `target`; missing folders are created.
     ///
     /// # Errors
-    /// The folder cannot be made or written to.
+    /// The folder cannot be created or written to.
     pub fn create<'a>(target: impl Into<Target<'a>>) -> io::Result<Self> {
         let Target { path, in_draft } = target.into();
         let folder = folder_of(path);
@@ -91,21 +113,21 @@ impl AtomicFile {
         Ok(Self { writer, temporary, path: path.to_owned(), in_draft, refused: Refused::default() })
     }
 
-    /// Brings the file to disk and gives it its name.
+    /// Syncs the file to disk and gives it its name.
     ///
     /// # Errors
-    /// The file system refused.
+    /// The file system failed.
     pub fn commit(mut self) -> io::Result<()> {
         let writer = self.writer.take().ok_or_else(closed)?;
         let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
         file.sync_all()?;
         fs::rename(&self.temporary, &self.path)?;
-        // Its lock kept the file from being cleared until it had its name.
+        // The lock protected the file from being cleared until it was renamed.
         drop(file);
         if self.in_draft { Ok(()) } else { sync_folder(folder_of(&self.path)) }
     }
 
-    /// To be asked for the file system's own words after an encoder has failed.
+    /// Handle to the file system's own error, for use after an encoder has failed.
     pub fn refused(&self) -> Refused {
         self.refused.clone()
     }
@@ -134,25 +156,25 @@ impl Seek for AtomicFile {
 
 impl Drop for AtomicFile {
     fn drop(&mut self) {
-        // After a commit the temporary name is gone and this does nothing; a leftover is harmless.
+        // After a commit the temporary name no longer exists and this does nothing; a leftover is harmless.
         let _ = fs::remove_file(&self.temporary);
     }
 }
 
-/// Writes a whole file.
+/// Writes a complete file.
 ///
 /// # Errors
-/// The file system refused.
+/// The file system failed.
 pub fn write<'a>(target: impl Into<Target<'a>>, bytes: &[u8]) -> io::Result<()> {
     let mut file = AtomicFile::create(target)?;
     file.write_all(bytes)?;
     file.commit()
 }
 
-/// Brings the entries of a folder to disk.
+/// Syncs the entries of a folder to disk.
 ///
 /// # Errors
-/// The file system refused.
+/// The file system failed.
 pub fn sync_folder(folder: &Path) -> io::Result<()> {
     File::open(folder)?.sync_all()
 }
@@ -164,29 +186,29 @@ fn folder_of(path: &Path) -> &Path {
     }
 }
 
-/// A new file in the folder, locked as long as it is under construction (see [`clear_leftovers`]).
+/// A new file in the folder, locked while it is under construction (see [`clear_leftovers`]).
 fn temporary_file(folder: &Path) -> io::Result<(File, PathBuf)> {
     static COUNT: AtomicU64 = AtomicU64::new(0);
     loop {
-        // Unique in this folder among living processes of this machine and their threads.
+        // Unique in this folder among the running processes of this machine and their threads.
         let count = COUNT.fetch_add(1, Ordering::Relaxed);
         let path = folder.join(format!("{TEMPORARY_PREFIX}{}-{count}", std::process::id()));
         let file = match File::options().read(true).write(true).create_new(true).open(&path) {
-            // Of a killed process that had this number, or of a living one in another container or machine.
+            // Left by a killed process with the same id, or in use by one in another container or on another machine.
             Err(e) if e.kind() == io::ErrorKind::AlreadyExists => continue,
             opened => opened?,
         };
         match file.try_lock() {
             Ok(()) if is_at(&file, &path) => return Ok((file, path)),
-            // Cleared, or about to be, between its making and its lock; another name then.
+            // Cleared, or about to be, between creation and lock: try another name.
             Ok(()) | Err(TryLockError::WouldBlock) => {}
-            // A file system without locks has no clearing either, which needs the lock.
+            // Without file locks nothing is cleared either, because clearing needs the lock.
             Err(TryLockError::Error(_)) => return Ok((file, path)),
         }
     }
 }
 
-/// True while the path leads to this open file.
+/// True while the path refers to this open file.
 #[cfg(unix)]
 fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
@@ -194,36 +216,36 @@ fn is_at(file: &File, path: &Path) -> bool {
     file.metadata().is_ok_and(|open| fs::symlink_metadata(path).is_ok_and(|there| identity(open) == identity(there)))
 }
 
-/// True while the path leads to this open file, as far as its name is unique.
+/// True while the path refers to this open file, assuming that its name is unique.
 #[cfg(not(unix))]
 fn is_at(_: &File, path: &Path) -> bool {
     path.exists()
 }
 
-/// True for the name of a file under construction, or of what a killed process left of one.
+/// True for the name of a file under construction, or of one left by a killed process.
 pub fn is_temporary(name: &OsStr) -> bool {
     name.to_string_lossy().starts_with(TEMPORARY_PREFIX)
 }
 
-/// Removes what killed processes left under construction in the folder of `path`. Files of living processes are locked and
-/// stay; one that is not locked yet is made again by its process under another name.
+/// Removes files that killed processes left under construction in the folder of `path`. Files of running processes are locked
+/// and stay; if one is removed before it is locked, its process creates another under a new name.
 pub fn clear_leftovers(path: &Path) {
     let entries = fs::read_dir(folder_of(path)).into_iter().flatten().flatten();
     entries.filter(|entry| is_temporary(&entry.file_name())).for_each(|entry| clear(&entry.path()));
 }
 
-/// Removes a file that no process has locked. What cannot be opened, locked or removed stays: it is harmless and bears no
-/// artifact's name.
+/// Removes a file that no process has locked. A file that cannot be opened, locked or removed stays: it is harmless, because no
+/// artifact has such a name.
 fn clear(path: &Path) {
     let Ok(file) = File::open(path) else { return };
-    // The lock is held until the name is gone: its maker, who locks it next, then finds it cleared.
+    // The lock is held until the file is removed: its creator, who locks it next, then finds it gone.
     if file.try_lock().is_ok() && is_at(&file, path) {
         let _ = fs::remove_file(path);
     }
 }
 
 fn closed() -> io::Error {
-    io::Error::other("the file is already committed")
+    io::Error::other("the file has already been committed")
 }
 
 #[cfg(test)]
@@ -239,15 +261,15 @@ mod tests {
         assert!(!path.exists());
         drop(file);
         assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 0);
-        write(&path, b"whole").unwrap();
+        write(&path, b"first").unwrap();
         write(&path, b"again").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"again");
         assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1);
     }
 
-    /// Who brings a name to disk goes by the type, whatever the folder is called.
+    /// Whether a file syncs its folder depends on the type of target, not on the folder's name.
     #[test]
-    fn val_only_drafts_leave_names_to_their_folder() {
+    fn val_only_drafts_leave_the_sync_to_their_folder() {
         let folder = tempfile::tempdir().unwrap();
         let unfinished = folder.path().join("unfinished-1");
         let draft = Draft(&unfinished);
@@ -259,7 +281,7 @@ mod tests {
     }
 
     #[test]
-    fn val_only_dead_files_are_cleared() {
+    fn val_only_unlocked_files_are_cleared() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("b.txt");
         fs::write(folder.path().join(format!("{TEMPORARY_PREFIX}1-0")), b"left").unwrap();
@@ -271,7 +293,7 @@ mod tests {
         assert!(path.exists());
     }
 
-    /// Whoever clears the folder meanwhile, every file gets its name, whole.
+    /// Every file appears complete, even while other threads clear the folder.
     #[test]
     fn val_files_appear_while_others_clear() {
         let folder = tempfile::tempdir().unwrap();
@@ -297,9 +319,9 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 300);
     }
 
-    /// A name that is taken is not written to: its owner may live on another machine.
+    /// An existing name is never written to: its owner may run on another machine.
     #[test]
-    fn val_names_that_are_taken_are_passed_over() {
+    fn val_existing_names_are_skipped() {
         let folder = tempfile::tempdir().unwrap();
         let (first, name) = temporary_file(folder.path()).unwrap();
         let word = name.file_name().unwrap().to_string_lossy().into_owned();

@@ -1,26 +1,40 @@
 //! Flat tables as CSV (RFC 4180), for spreadsheets and scripts.
 //!
 //! One header row, commas, lines that end in LF. A number is the shortest text that reads back as the same 64-bit number, with
-//! a full stop; what is not known (NaN, null) is empty; ends that are open are `inf` and `-inf`. The elements of a list
-//! are separated by blanks. Text with a comma, a quote or a line break is quoted.
+//! a decimal point; missing values (NaN, null) are empty; open ends are `inf` and `-inf`. The elements of a list are separated
+//! by blanks. Text with a comma, a quote or a line break is quoted.
 
 use crate::atomic;
 use sastrugi_schemas::{Cell, Record};
 use std::io;
 use std::path::Path;
 
-/// Writes rows under the names of their columns, in the order in which they come.
+/// Writes rows below a header of column names, in the given order.
 ///
 /// # Errors
-/// The file system refused.
+/// The file system failed.
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_schemas::Cell;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("a.csv");
+/// let row = vec![Cell::Text("dune, flat".to_owned()), Cell::F64(0.5), Cell::F64(f64::NAN), Cell::I64(3)];
+/// sastrugi_store::csv::write_rows(&path, &["name", "sigma_m", "b_m", "count"], [row])?;
+/// assert_eq!(std::fs::read_to_string(&path)?, "name,sigma_m,b_m,count\n\"dune, flat\",0.5,,3\n");
+/// # Ok(())
+/// # }
+/// ```
 pub fn write_rows(path: &Path, columns: &[&str], rows: impl IntoIterator<Item = Vec<Cell>>) -> io::Result<()> {
     atomic::write(path, text(columns, rows).as_bytes())
 }
 
-/// Writes the rows of a table, in the order in which they come.
+/// Writes the rows of a table, in the given order.
 ///
 /// # Errors
-/// The file system refused.
+/// The file system failed.
 pub fn write_records<R: Record>(path: &Path, rows: &[R]) -> io::Result<()> {
     let columns: Vec<&str> = R::TABLE.columns.iter().map(|c| c.name).collect();
     write_rows(path, &columns, rows.iter().map(Record::cells))
@@ -62,7 +76,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_fields_are_set_as_stated() {
+    fn val_fields_are_formatted_as_documented() {
         let row = vec![
             Cell::Text("a, \"b\"".into()),
             Cell::F64(1e-7),

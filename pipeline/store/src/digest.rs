@@ -1,7 +1,7 @@
 //! SHA-256 of files and of decoded content.
 //!
 //! A content hash covers what a reader decodes (heights, rows, messages), not the compressed bytes, so that a new
-//! compressor does not read as new data. Every part of it is preceded by its length or has a fixed one.
+//! compressor does not look like new data. Every part is preceded by its length or has a fixed one.
 
 use sastrugi_numeric::Grid;
 use sha2::{Digest, Sha256};
@@ -10,40 +10,40 @@ use std::path::Path;
 
 const BUFFER: usize = 1 << 18;
 
-/// Hash of decoded content under construction.
+/// Incremental hash of decoded content.
 #[derive(Clone)]
 pub struct ContentHash(Sha256);
 
 impl ContentHash {
-    /// A hash for one kind of content, as `heights` or `table missions`.
+    /// A hash for one kind of content, such as `heights` or `table missions`.
     pub fn new(kind: &str) -> Self {
         let mut hash = Self(Sha256::new());
         hash.text(kind);
         hash
     }
 
-    /// Bytes after their length.
+    /// Adds bytes, preceded by their length.
     pub fn bytes(&mut self, bytes: &[u8]) {
         self.u64(bytes.len() as u64);
         self.0.update(bytes);
     }
 
-    /// Text after its length.
+    /// Adds text, preceded by its length.
     pub fn text(&mut self, text: &str) {
         self.bytes(text.as_bytes());
     }
 
-    /// Bytes of a fixed number.
+    /// Adds a fixed number of bytes.
     pub fn raw(&mut self, bytes: &[u8]) {
         self.0.update(bytes);
     }
 
-    /// A number, little-endian.
+    /// Adds a number, little-endian.
     pub fn u64(&mut self, value: u64) {
         self.0.update(value.to_le_bytes());
     }
 
-    /// A float by its bits, little-endian.
+    /// Adds the bits of a float, little-endian.
     pub fn f64(&mut self, value: f64) {
         self.u64(value.to_bits());
     }
@@ -54,7 +54,7 @@ impl ContentHash {
     }
 }
 
-/// A reader or writer that counts and hashes what passes through it.
+/// A reader or writer that counts and hashes the bytes that pass through it.
 #[derive(Debug)]
 pub struct Hashed<T> {
     inner: T,
@@ -63,7 +63,7 @@ pub struct Hashed<T> {
 }
 
 impl<T> Hashed<T> {
-    /// Around a reader or writer, from here on.
+    /// Wraps a reader or writer.
     pub fn new(inner: T) -> Self {
         Self { inner, hash: Sha256::new(), bytes: 0 }
     }
@@ -98,8 +98,8 @@ impl<T: Write> Write for Hashed<T> {
     }
 }
 
-/// Content hash of heights as a release stores them: shape, cell size and single-precision values, no data as one NaN.
-/// (Not the place, which formats state in different ways that round differently.)
+/// Content hash of heights as a release stores them: shape, cell size and single-precision values, with a single NaN for no
+/// data. The position is left out, because formats state it in ways that round differently.
 pub fn heights(grid: &Grid) -> String {
     let mut hash = ContentHash::new("heights");
     geometry(&mut hash, grid);
@@ -130,6 +130,13 @@ fn canonical_f32(value: f64) -> f32 {
 }
 
 /// SHA-256 of bytes, in hexadecimal.
+///
+/// # Examples
+/// The first example of FIPS 180-2:
+/// ```
+/// let sha256 = sastrugi_store::digest::of_bytes(b"abc");
+/// assert_eq!(sha256, "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad");
+/// ```
 pub fn of_bytes(bytes: &[u8]) -> String {
     hex(&Sha256::digest(bytes))
 }

@@ -1,4 +1,5 @@
-//! Opening and reading files that people name. A pipe may never say anything and a device never ends, so only regular files are read.
+//! Opening and reading files named by the user. Only regular files are read, because a pipe may block forever and a device may never
+//! end.
 
 use std::fs::{self, File, FileType};
 use std::io::{self, ErrorKind, Read};
@@ -9,7 +10,7 @@ use std::path::Path;
 /// # Errors
 /// Those of the file system, and `InvalidInput` for a pipe, a socket or a device.
 pub fn open(path: &Path) -> io::Result<File> {
-    // Asked first: opening a pipe waits for somebody to write to it.
+    // Checked before opening, because opening a pipe blocks until something writes to it.
     let kind = fs::metadata(path)?.file_type();
     if kind.is_file() || kind.is_dir() {
         return File::open(path);
@@ -24,7 +25,7 @@ pub fn open(path: &Path) -> io::Result<File> {
 pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     let mut file = open(path)?;
     let mut bytes = Vec::new();
-    // A size that is too large to allocate is an error here and not the end of the program.
+    // Allocate fallibly: a file too large for memory is an error, not an abort.
     let size = file.metadata().ok().filter(fs::Metadata::is_file).map_or(0, |m| m.len());
     bytes
         .try_reserve_exact(usize::try_from(size).unwrap_or(usize::MAX))
@@ -33,7 +34,7 @@ pub fn read(path: &Path) -> io::Result<Vec<u8>> {
     Ok(bytes)
 }
 
-/// The first bytes of a regular file, at most so many.
+/// At most the first `bytes` bytes of a regular file.
 ///
 /// # Errors
 /// As [`open`].
@@ -46,7 +47,7 @@ pub fn head(path: &Path, bytes: u64) -> io::Result<Vec<u8>> {
 /// The text of a regular file.
 ///
 /// # Errors
-/// As [`open`], and `InvalidData` for what is not UTF-8.
+/// As [`open`], and `InvalidData` for text that is not UTF-8.
 pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(read(path)?).map_err(|_| io::Error::new(ErrorKind::InvalidData, "is not UTF-8 text"))
 }
@@ -73,7 +74,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_files_are_read_whole() {
+    fn val_files_are_read_completely() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("a");
         fs::write(&path, b"all of it").unwrap();
@@ -82,7 +83,7 @@ mod tests {
         assert_eq!(read(folder.path()).unwrap_err().kind(), ErrorKind::IsADirectory);
     }
 
-    /// Without a wait for somebody who writes, and without an end of memory.
+    /// Refused without blocking on a writer and without exhausting memory.
     #[cfg(unix)]
     #[test]
     fn val_pipes_sockets_and_devices_are_refused() {

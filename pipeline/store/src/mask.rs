@@ -1,10 +1,10 @@
-//! Masks: which cells of a DEM take part.
+//! Masks: which cells of a DEM are used.
 //!
 //! * GeoJSON (RFC 7946: Polygon, MultiPolygon, Feature, FeatureCollection) with coordinates in the DEM's own x and y: a cell
-//!   is kept when its centre lies inside.
-//! * A raster of any format that [`dem::read`] knows: a cell is kept when the cell of the mask under its centre holds a
-//!   finite number other than 0; cells beyond the mask are dropped. A raster that says neither place nor cell size (.npy,
-//!   .png, TIFF without georeferencing) must have the DEM's shape, and is taken cell by cell.
+//!   is kept if its centre lies inside. A ring has at least 3 corners; the first may be repeated as the last.
+//! * A raster of any format that [`dem::read`] supports: a cell is kept if the mask cell under its centre holds a finite number
+//!   other than 0; cells beyond the mask are dropped. A raster without georeferencing (.npy, .png, plain TIFF) must have the
+//!   DEM's shape, and is applied cell by cell.
 
 mod polygons;
 
@@ -16,10 +16,10 @@ use crate::geojson;
 use sastrugi_numeric::{Geometry, Grid};
 use std::path::{Path, PathBuf};
 
-/// Why a mask was not read.
+/// Failure to read a mask.
 #[derive(Debug, thiserror::Error)]
 pub enum MaskError {
-    /// The file is missing, is no raster that can be read, or could not be read.
+    /// The file is missing, is not a supported raster, or could not be read.
     #[error(transparent)]
     File(#[from] DemError),
     /// The mask cannot be used for this DEM.
@@ -33,7 +33,7 @@ pub enum MaskError {
 }
 
 impl MaskError {
-    /// True when the data that was given is the cause (missing or unusable), not the file system.
+    /// True if the cause is the given data (missing or unusable), not the file system.
     pub fn unusable_input(&self) -> bool {
         match self {
             Self::File(error) => error.unusable_input(),
@@ -42,17 +42,39 @@ impl MaskError {
     }
 }
 
-/// How a mask is understood.
+/// How a mask is interpreted.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct MaskOptions {
-    /// Drop what the mask marks, and keep the rest.
+    /// Drop the marked cells and keep the others.
     pub invert: bool,
 }
 
 /// Reads a mask for a grid: `rows * cols` values from the north-west cell, true where a cell is kept.
 ///
 /// # Errors
-/// A file that is missing or no mask; a raster without a place and with another shape; a mask that keeps no cell.
+/// A file that is missing or not a mask; a raster without georeferencing and with a different shape; a mask that keeps no cell.
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_numeric::Geometry;
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("mask.geojson");
+/// // The outline of a square with a hole in its middle.
+/// std::fs::write(
+///     &path,
+///     r#"{"type": "Polygon", "coordinates": [
+///         [[0, 0], [3, 0], [3, 3], [0, 3], [0, 0]],
+///         [[1, 1], [2, 1], [2, 2], [1, 2], [1, 1]]
+///     ]}"#,
+/// )?;
+/// let keep = sastrugi_store::mask::read(&path, &Geometry::square(3, 4, 1.0))?;
+/// assert_eq!(keep[..4], [true, true, true, false]);
+/// assert_eq!(keep[4..8], [true, false, true, false]);
+/// # Ok(())
+/// # }
+/// ```
 pub fn read(path: &Path, geometry: &Geometry) -> Result<Vec<bool>, MaskError> {
     read_with(path, geometry, &MaskOptions::default())
 }
@@ -75,25 +97,27 @@ pub fn read_with(path: &Path, geometry: &Geometry, options: &MaskOptions) -> Res
     }
     if !keep.contains(&true) {
         let ([x, y], [width, height]) = (geometry.origin, geometry.size());
-        let reach = format!("x {x} to {}, y {y} to {}", x + width, y + height);
-        return Err(unusable(format!("keeps none of the DEM's cells ({reach}); is it in the DEM's coordinates?")));
+        let extent = format!("x {x} to {}, y {y} to {}", x + width, y + height);
+        return Err(unusable(format!(
+            "keeps none of the DEM's cells ({extent}); check that it is in the DEM's coordinates"
+        )));
     }
     Ok(keep)
 }
 
-/// What a file of obstacles marks.
+/// Obstacles read from a file.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Obstacles {
     /// Polygons, each with its rings (an outline and its holes, even-odd rule), in the DEM's own coordinates.
     Polygons(Vec<Vec<Vec<[f64; 2]>>>),
-    /// `rows * cols` values from the north-west cell, true where a cell is marked.
+    /// `rows * cols` values from the north-west cell, true where an obstacle is marked.
     Cells(Vec<bool>),
 }
 
 /// Reads obstacles for a grid: polygons of a GeoJSON file, or the cells that a raster marks.
 ///
 /// # Errors
-/// A file that is missing or neither; a raster without a place and with another shape.
+/// A file that is missing or neither of the two; a raster without georeferencing and with a different shape.
 pub fn read_obstacles(path: &Path, geometry: &Geometry) -> Result<Obstacles, MaskError> {
     let unusable = |reason: String| MaskError::Unusable { path: path.to_owned(), reason };
     let bytes = crate::file::read(path).map_err(|e| DemError::reading(path, e))?;
@@ -115,7 +139,7 @@ fn of_raster(mask: &dem::Dem, geometry: &Geometry) -> Result<Vec<bool>, String> 
         if (marks.rows(), marks.cols()) != shape {
             let (rows, cols) = shape;
             return Err(format!(
-                "states no place, so it needs the DEM's {rows} x {cols} cells; it has {} x {}",
+                "has no georeferencing, so it must have the DEM's {rows} x {cols} cells; it has {} x {}",
                 marks.rows(),
                 marks.cols()
             ));

@@ -1,8 +1,9 @@
-//! Parquet tables of a release: rows of `sastrugi-schemas` out and in.
+//! Parquet tables of a release: writes and reads the rows of `sastrugi-schemas`.
 //!
-//! Units and descriptions stand in each field's metadata, provenance in the file's (`sastrugi.study_sha256`, `.seed`,
-//! `.version`, `.license`, `.table`) and, for readers that show the Arrow schema alone, in that of the schema. Rows are sorted by their keys, which are never null; a float that is `NaN` is
-//! stored as null, in a list too. Memory is bounded by one row group, whatever the number of rows.
+//! Each field's metadata holds its unit and description. The file's metadata holds the provenance (`sastrugi.study_sha256`,
+//! `.seed`, `.version`, `.license`, `.table`), repeated in the metadata of the Arrow schema for readers that show only that. Rows
+//! are sorted by their keys, which are never null; a `NaN` is stored as null, also within a list. Memory is bounded by one row
+//! group, whatever the number of rows.
 
 #[cfg(test)]
 mod tests;
@@ -33,19 +34,19 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Rows gathered before they are encoded.
+/// Rows collected before they are encoded.
 const BATCH_ROWS: usize = 4096;
-/// Rows of a row group: for the widest table about 28 MiB in memory.
+/// Rows of a row group: about 28 MiB in memory for the widest table.
 const ROW_GROUP_ROWS: usize = 1 << 16;
 /// Name that Parquet gives the elements of a list.
 const ELEMENT: &str = "element";
-/// Level of Zstandard: the fastest; higher ones gain 3 % on samples.
+/// Zstandard level: the fastest; higher levels gain 3 % on samples.
 const ZSTD_LEVEL: i32 = 1;
 
-/// Why a table was not written or read.
+/// Failure to write or read a table.
 #[derive(Debug, thiserror::Error)]
 pub enum TableError {
-    /// The file is no Parquet file, or not a whole one.
+    /// The file is not a complete Parquet file of the table.
     #[error("{}: {reason}", path.display())]
     Unusable {
         /// The file.
@@ -53,8 +54,8 @@ pub enum TableError {
         /// What is wrong with it.
         reason: String,
     },
-    /// The rows to write are not sorted by their keys, or a key comes twice.
-    #[error("{}: row {row} of table {table} does not come after the row before it in the order of its keys", path.display())]
+    /// The rows to write are not sorted by their keys, or a key is duplicated.
+    #[error("{}: row {row} of table {table} is out of order: its key must be greater than that of the row before", path.display())]
     Order {
         /// The file.
         path: PathBuf,
@@ -64,7 +65,7 @@ pub enum TableError {
         row: u64,
     },
     /// The rows could not be encoded.
-    #[error("{}: the rows could not be encoded: {source}", path.display())]
+    #[error("{}: could not encode the rows: {source}", path.display())]
     Encoding {
         /// The file.
         path: PathBuf,
@@ -82,7 +83,7 @@ pub enum TableError {
 }
 
 impl TableError {
-    /// True when the file that was given is the cause (missing or unusable), not the file system.
+    /// True if the cause is the given file (missing or unusable), not the file system.
     pub fn unusable_input(&self) -> bool {
         match self {
             Self::Unusable { .. } => true,
@@ -108,7 +109,7 @@ impl TableError {
     }
 }
 
-/// Provenance of a table, in its file's metadata.
+/// Provenance of a table, stored in the file's metadata.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TableMetadata {
     /// SHA-256 of the study.
@@ -134,7 +135,7 @@ impl TableMetadata {
     }
 }
 
-/// What was written.
+/// Summary of a written table.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TableSummary {
     /// Number of rows.
@@ -145,7 +146,7 @@ pub struct TableSummary {
     pub content_sha256: String,
 }
 
-/// The Arrow schema of a table, with its provenance where it has one.
+/// The Arrow schema of a table, with its provenance if given.
 fn schema(table: &Table, provenance: Option<&TableMetadata>) -> SchemaRef {
     let field = |column: &Column| {
         let metadata = [("unit", column.unit), ("description", column.description)];
@@ -172,7 +173,7 @@ fn element(data_type: DataType) -> FieldRef {
     Arc::new(Field::new(ELEMENT, data_type, true))
 }
 
-/// The floats of a column as Parquet names them; `None` where it holds none.
+/// Parquet path of the floats in a column; `None` if it has none.
 fn float_path(column: &Column) -> Option<ColumnPath> {
     match column.column_type {
         ColumnType::F64 => Some(ColumnPath::from(column.name)),
@@ -192,7 +193,7 @@ fn properties(table: &Table, metadata: Option<&TableMetadata>) -> Result<WriterP
         .set_max_row_group_row_count(Some(ROW_GROUP_ROWS))
         .set_sorting_columns(Some((0..table.key_count()).map(sorting).collect()))
         .set_key_value_metadata(metadata.map(pairs));
-    // Measured floats seldom repeat: byte planes compress better than a dictionary.
+    // Measured floats rarely repeat: byte planes compress better than a dictionary.
     for path in table.columns.iter().filter_map(float_path) {
         builder = builder
             .set_column_dictionary_enabled(path.clone(), false)
@@ -201,7 +202,7 @@ fn properties(table: &Table, metadata: Option<&TableMetadata>) -> Result<WriterP
     Ok(builder.build())
 }
 
-/// Writes one table row by row. The file appears when [`TableWriter::finish`] has succeeded.
+/// Writes one table row by row. The file appears once [`TableWriter::finish`] has succeeded.
 pub struct TableWriter {
     path: PathBuf,
     table: &'static Table,
@@ -220,7 +221,7 @@ impl TableWriter {
     /// Starts a table in a file; `metadata` is `None` for files outside a release.
     ///
     /// # Errors
-    /// The file cannot be made.
+    /// The file cannot be created.
     pub fn create<'a>(
         target: impl Into<Target<'a>>,
         table: &'static Table,
@@ -248,7 +249,7 @@ impl TableWriter {
         })
     }
 
-    /// Appends a row, its values in column order, which must come after the previous one in the order of the keys.
+    /// Appends a row, with its values in column order; its key must be greater than that of the previous row.
     ///
     /// # Errors
     /// [`TableError::Order`], or the file cannot be written.
@@ -280,7 +281,7 @@ impl TableWriter {
         written.map_err(|source| TableError::encoding(&self.path, source, &self.refused))
     }
 
-    /// Completes the file and brings it to disk under its name.
+    /// Completes the file and syncs it to disk under its name.
     ///
     /// # Errors
     /// The file cannot be written.
@@ -405,7 +406,7 @@ impl TableReader {
     /// Opens a file of a table.
     ///
     /// # Errors
-    /// The file is missing, no Parquet file, or has other columns than the table.
+    /// The file is missing, is not a Parquet file, or has different columns from the table.
     pub fn open(path: &Path, table: &Table) -> Result<Self, TableError> {
         let builder = open(path, table)?;
         let batches = decoding(path, || builder.with_batch_size(BATCH_ROWS).build())?;
@@ -418,7 +419,7 @@ impl TableReader {
             let batches = &mut self.batches;
             let Some(batch) = decoding(&self.path, || batches.next().transpose())? else { return Ok(false) };
             let values = batch.columns().iter().map(ColumnValues::of).collect::<Option<Vec<_>>>();
-            self.batch = values.ok_or_else(|| TableError::unusable(&self.path, "holds a column of an unknown type"))?;
+            self.batch = values.ok_or_else(|| TableError::unusable(&self.path, "has a column of unknown type"))?;
             (self.row, self.rows) = (0, batch.num_rows());
         }
         Ok(true)
@@ -484,7 +485,7 @@ impl ColumnValues {
     }
 }
 
-/// Lists of floats beside their elements, one list after the other.
+/// Lists of floats, with their elements stored one list after the other.
 struct Lists<T: ArrowPrimitiveType> {
     lists: ListArray,
     elements: PrimitiveArray<T>,
@@ -513,12 +514,12 @@ fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<Fi
     let found = builder.schema();
     for (column, expected) in schema(table, None).fields().iter().enumerate() {
         let Some(field) = found.fields().get(column) else {
-            let reason = format!("table {} lacks the column {}", table.name, expected.name());
+            let reason = format!("column {} of table {} is missing", expected.name(), table.name);
             return Err(TableError::unusable(path, reason));
         };
-        if field != expected {
+        if !is_same_column(field, expected) {
             let reason = format!(
-                "column {column} of table {} is {}, not {} as this version describes it",
+                "column {column} of table {} is {}, but this version expects {}",
                 table.name,
                 describe(field),
                 describe(expected)
@@ -527,8 +528,8 @@ fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<Fi
         }
     }
     if found.fields().len() > table.columns.len() {
-        let reason =
-            format!("table {} has {} columns too many", table.name, found.fields().len() - table.columns.len());
+        let extra = found.fields().len() - table.columns.len();
+        let reason = format!("table {} has {extra} unexpected columns", table.name);
         return Err(TableError::unusable(path, reason));
     }
     Ok(builder)
@@ -538,8 +539,14 @@ fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<Fi
 fn decoding<T, E: ToString>(path: &Path, decode: impl FnOnce() -> Result<T, E>) -> Result<T, TableError> {
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(decoded) => decoded.map_err(|e| TableError::unusable(path, e)),
-        Err(_) => Err(TableError::unusable(path, "the decoder gave up; the file is damaged")),
+        Err(_) => Err(TableError::unusable(path, "the file is damaged: decoding failed")),
     }
+}
+
+/// Whether a column can be read as the expected one. Its description is for people, and may be worded differently in another build.
+fn is_same_column(found: &Field, expected: &Field) -> bool {
+    let kind = |field: &Field| (field.name().clone(), field.data_type().clone(), field.is_nullable());
+    kind(found) == kind(expected) && found.metadata().get("unit") == expected.metadata().get("unit")
 }
 
 fn describe(field: &Field) -> String {
@@ -555,6 +562,33 @@ fn nullability(field: &Field) -> &'static str {
 ///
 /// # Errors
 /// As [`TableWriter::push`] and [`TableWriter::finish`].
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_schemas::tables::PsdRow;
+/// use sastrugi_store::parquet::{TableError, read_table, write_table};
+///
+/// let row = |bin: i64, psd_m4: f64| PsdRow {
+///     surface_id: "a".to_owned(),
+///     bin,
+///     frequency_cycles_m: 0.25 * bin as f64,
+///     psd_m4,
+///     modes: 8,
+/// };
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("psd.parquet");
+/// let summary = write_table(&path, [row(1, 0.5), row(2, f64::NAN)], None)?;
+/// assert_eq!(summary.rows, 2);
+/// let back: Vec<PsdRow> = read_table(&path)?;
+/// assert_eq!(back[0], row(1, 0.5));
+/// assert!(back[1].psd_m4.is_nan());
+///
+/// // Keys must increase.
+/// assert!(matches!(write_table(&path, [row(2, 1.0), row(1, 1.0)], None), Err(TableError::Order { row: 1, .. })));
+/// # Ok(())
+/// # }
+/// ```
 pub fn write_table<'a, R: Record>(
     target: impl Into<Target<'a>>,
     rows: impl IntoIterator<Item = R>,
@@ -568,7 +602,7 @@ pub fn write_table<'a, R: Record>(
 /// All rows of a file.
 ///
 /// # Errors
-/// As [`TableReader::open`]; also when the rows cannot be decoded.
+/// As [`TableReader::open`]; also if the rows cannot be decoded.
 pub fn read_table<R: Record>(path: &Path) -> Result<Vec<R>, TableError> {
     let mut rows = Vec::new();
     for_each_row(path, |row| rows.push(row))?;
@@ -580,17 +614,17 @@ pub fn read_table<R: Record>(path: &Path) -> Result<Vec<R>, TableError> {
 /// # Errors
 /// As [`read_table`].
 pub fn for_each_row<R: Record>(path: &Path, mut f: impl FnMut(R)) -> Result<(), TableError> {
-    let lacking = || TableError::unusable(path, "holds a null where a value is required");
+    let lacking = || TableError::unusable(path, "has a null in a column that requires a value");
     TableReader::open(path, &R::TABLE)?.try_for_each(|cells| {
         f(R::from_cells(cells?).ok_or_else(lacking)?);
         Ok(())
     })
 }
 
-/// What a Parquet file of ours is, for people.
+/// Human-readable description of a Parquet file of a release.
 ///
 /// # Errors
-/// As [`TableReader::open`]; also a table that is none of ours.
+/// As [`TableReader::open`]; also a file that is not a table of a release.
 pub fn describe_file(path: &Path) -> Result<serde_json::Value, TableError> {
     for table in sastrugi_schemas::tables::ALL {
         match open(path, table) {
@@ -608,7 +642,7 @@ pub fn describe_file(path: &Path) -> Result<serde_json::Value, TableError> {
             Err(_) => {}
         }
     }
-    Err(TableError::Unusable { path: path.to_owned(), reason: "holds none of the tables of a release".to_owned() })
+    Err(TableError::Unusable { path: path.to_owned(), reason: "is not a table of a release".to_owned() })
 }
 
 /// Checks that a file has a table's columns, types, units and descriptions; returns its number of rows.

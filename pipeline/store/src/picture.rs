@@ -1,4 +1,4 @@
-//! Pictures to look at, and map tiles: 8-bit PNG.
+//! 8-bit PNG pictures and map tiles.
 
 use crate::atomic::{self, Target};
 use sastrugi_numeric::Grid;
@@ -7,7 +7,7 @@ use std::io;
 /// Writes levels of grey with their opacity as a PNG.
 ///
 /// # Errors
-/// Too many pixels a side for a PNG, or a file that cannot be written.
+/// Too many pixels per side for a PNG, or a file that cannot be written.
 pub fn write_grey<'a>(target: impl Into<Target<'a>>, pixels: &Grid<[u8; 2]>) -> io::Result<()> {
     atomic::write(target, &grey_png(pixels)?)
 }
@@ -17,10 +17,10 @@ fn grey_png(pixels: &Grid<[u8; 2]>) -> io::Result<Vec<u8>> {
     encode(shape, png::ColorType::GrayscaleAlpha, png::Compression::Balanced, pixels.values.as_flattened())
 }
 
-/// The bytes of a PNG of red, green, blue and opacity, rows from the north: packed fast, for pictures that are looked at once.
+/// The bytes of an RGBA PNG, rows from the north; compressed fast, for pictures that are viewed once.
 ///
 /// # Errors
-/// Too many pixels a side for a PNG.
+/// Too many pixels per side for a PNG.
 pub fn rgba_png(shape: [usize; 2], pixels: &[[u8; 4]]) -> io::Result<Vec<u8>> {
     encode(shape, png::ColorType::Rgba, png::Compression::Fast, pixels.as_flattened())
 }
@@ -31,8 +31,9 @@ fn encode(
     compression: png::Compression,
     data: &[u8],
 ) -> io::Result<Vec<u8>> {
-    let side =
-        |n: usize| u32::try_from(n).map_err(|_| io::Error::other(format!("{n} pixels a side are too many for a PNG")));
+    let side = |n: usize| {
+        u32::try_from(n).map_err(|_| io::Error::other(format!("{n} pixels per side are too many for a PNG")))
+    };
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, side(cols)?, side(rows)?);
     encoder.set_color(color);
@@ -49,9 +50,9 @@ mod tests {
     use super::*;
     use sastrugi_numeric::Geometry;
 
-    /// A PNG decoder gives back every level.
+    /// A PNG decoder returns every level.
     #[test]
-    fn val_levels_come_back() {
+    fn val_levels_are_read_back() {
         let levels: Vec<[u8; 2]> = (0..12).map(|k| [20 * k, if k % 3 == 0 { 0 } else { 255 }]).collect();
         let file = grey_png(&Grid::new(Geometry::square(3, 4, 1.0), levels.clone())).unwrap();
         let mut reader = png::Decoder::new(io::Cursor::new(file)).read_info().unwrap();

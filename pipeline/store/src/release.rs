@@ -1,4 +1,4 @@
-//! The release folder: assembled aside, sealed with a manifest and checksums, given its name by one rename, and checked.
+//! The release folder: assembled in a temporary folder, sealed with a manifest and checksums, published by one rename, and verified.
 
 mod builder;
 mod pack;
@@ -22,34 +22,34 @@ use std::path::{Path, PathBuf};
 
 /// Name of the manifest in a release.
 pub const MANIFEST: &str = "manifest.json";
-/// Name of the list of checksums in a release, in the form of `sha256sum`.
+/// Name of the list of checksums in a release, in the format of `sha256sum`.
 pub const SUMS: &str = "SHA256SUMS";
-/// What a folder has that is one shard of a release.
+/// File that marks a folder as one shard of a release.
 pub const SHARD: &str = "shard.json";
 /// Folder of the tables in a release.
 pub const TABLES: &str = "tables";
 
-/// The one hidden file of a release: what an archive asks for on deposit.
+/// The only hidden file of a release: the metadata that an archive requires on deposit.
 pub const ZENODO: &str = ".zenodo.json";
 
-/// Why a release was not made, opened or checked.
+/// Failure to create, open or verify a release.
 #[derive(Debug, thiserror::Error)]
 pub enum ReleaseError {
-    /// The folder is missing or holds neither manifest nor checksums.
-    #[error("{}: no release: {reason}", path.display())]
+    /// The folder is missing or has neither manifest nor checksums.
+    #[error("{}: not a sastrugi release: {reason}", path.display())]
     NotARelease {
         /// The folder.
         path: PathBuf,
         /// What is missing or wrong.
         reason: String,
     },
-    /// The folder to write holds files that are not of a release, and is left alone.
-    #[error("{}: not a sastrugi release, and not empty; choose another folder with -o", path.display())]
+    /// The destination holds files that do not belong to a release, and is left untouched.
+    #[error("{}: the folder is not empty and not a sastrugi release; choose another folder with -o", path.display())]
     Occupied {
         /// The folder.
         path: PathBuf,
     },
-    /// A path in the release is not usable.
+    /// A path is not allowed in a release.
     #[error("\"{path}\" cannot be a file of a release: {reason}")]
     Path {
         /// The path.
@@ -57,8 +57,8 @@ pub enum ReleaseError {
         /// Why.
         reason: &'static str,
     },
-    /// A file of the release is not the one that was sealed.
-    #[error("{}: the file is not the one that was sealed; `verify` lists what changed", path.display())]
+    /// A file of the release has changed since it was sealed.
+    #[error("{}: the file has changed since the release was sealed; `verify` lists all changes", path.display())]
     Changed {
         /// The file.
         path: PathBuf,
@@ -67,7 +67,7 @@ pub enum ReleaseError {
     #[error(transparent)]
     Table(#[from] TableError),
     /// The manifest could not be written as JSON.
-    #[error("the manifest could not be written: {0}")]
+    #[error("could not write the manifest: {0}")]
     Json(#[from] serde_json::Error),
     /// The file system failed.
     #[error("{}: {source}", path.display())]
@@ -80,7 +80,7 @@ pub enum ReleaseError {
 }
 
 impl ReleaseError {
-    /// True when the data that was given is the cause (missing or unusable), not the file system.
+    /// True if the cause is the given data (missing or unusable), not the file system.
     pub fn unusable_input(&self) -> bool {
         match self {
             Self::NotARelease { .. } | Self::Changed { .. } => true,
@@ -98,7 +98,7 @@ impl ReleaseError {
     fn not_a_release(path: &Path, reason: impl Into<String>) -> Self {
         let reason = match path.join(SHARD).is_file() {
             true => {
-                "it is one shard of a release; join the shards first: `sastrugi merge SHARD... -o RELEASE`".to_owned()
+                "it is one shard of a release; merge the shards first: `sastrugi merge SHARD... -o RELEASE`".to_owned()
             }
             false => reason.into(),
         };
@@ -117,12 +117,12 @@ impl Release {
     /// Opens a release without checking its files (see [`verify`]).
     ///
     /// # Errors
-    /// [`ReleaseError::NotARelease`] when the folder has no manifest of ours.
+    /// [`ReleaseError::NotARelease`] if the folder has no sastrugi manifest.
     pub fn open(folder: &Path) -> Result<Self, ReleaseError> {
         let path = folder.join(MANIFEST);
         let text = crate::file::read(&path).map_err(|e| match e.kind() {
             io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-                ReleaseError::not_a_release(folder, format!("there is no {MANIFEST} in it"))
+                ReleaseError::not_a_release(folder, format!("it has no {MANIFEST}"))
             }
             _ => ReleaseError::io(&path)(e),
         })?;
@@ -140,12 +140,12 @@ impl Release {
         &self.folder
     }
 
-    /// Where a file of the manifest lies.
+    /// Path of a file listed in the manifest.
     pub fn path(&self, artifact: &str) -> PathBuf {
         self.folder.join(artifact)
     }
 
-    /// The files of a table, sorted; none when the table has no rows.
+    /// The files of a table, sorted; none if the table has no rows.
     pub fn table_files(&self, table: &str) -> Vec<PathBuf> {
         self.parts(table).map(|artifact| self.path(&artifact.path)).collect()
     }
@@ -157,7 +157,7 @@ impl Release {
     /// All rows of a table, sorted by key.
     ///
     /// # Errors
-    /// A file cannot be read, is not the one that was sealed, or has other columns.
+    /// A file cannot be read, has changed since it was sealed, or has different columns.
     pub fn rows<R: Record>(&self) -> Result<Vec<R>, ReleaseError> {
         let mut rows = vec![];
         self.for_each_row(|row| rows.push(row))?;
@@ -173,10 +173,10 @@ impl Release {
         self.sealed_parts(R::TABLE.name).try_for_each(|file| Ok(parquet::for_each_row(&file?, &mut f)?))
     }
 
-    /// The files of a table, sorted, each checked when it is its turn.
+    /// The files of a table, sorted; each is checked as the iterator reaches it.
     ///
     /// # Errors
-    /// A file cannot be read, or is not the one that was sealed.
+    /// A file cannot be read, or has changed since it was sealed.
     pub fn sealed_parts(&self, table: &str) -> impl Iterator<Item = Result<PathBuf, ReleaseError>> {
         self.parts(table).map(|part| {
             let file = self.path(&part.path);
@@ -187,18 +187,21 @@ impl Release {
 }
 
 fn parse_manifest(bytes: &[u8]) -> Result<Manifest, String> {
-    let manifest: Manifest = serde_json::from_slice(bytes).map_err(|e| format!("its {MANIFEST} is not ours: {e}"))?;
+    let manifest: Manifest = serde_json::from_slice(bytes).map_err(|e| format!("{MANIFEST} cannot be parsed: {e}"))?;
     if manifest.program != PROGRAM || manifest.format != FORMAT {
-        return Err(format!("its {MANIFEST} is of {} format {}", manifest.program, manifest.format));
+        return Err(format!(
+            "{MANIFEST} is of {} format {}, expected {PROGRAM} format {FORMAT}",
+            manifest.program, manifest.format
+        ));
     }
     let mut paths = BTreeSet::new();
     for Artifact { path, .. } in &manifest.artifacts {
-        check_path(path).map_err(|e| format!("its {MANIFEST} lists a file that cannot be one: {e}"))?;
+        check_path(path).map_err(|e| format!("{MANIFEST} lists an invalid path: {e}"))?;
         if !paths.insert(path) {
-            return Err(format!("its {MANIFEST} lists \"{path}\" twice"));
+            return Err(format!("{MANIFEST} lists \"{path}\" twice"));
         }
     }
-    check_path(&manifest.name).map_err(|e| format!("its {MANIFEST} has a name that cannot be one: {e}"))?;
+    check_path(&manifest.name).map_err(|e| format!("{MANIFEST} has an invalid study name: {e}"))?;
     Ok(manifest)
 }
 
@@ -209,20 +212,20 @@ fn table_of(path: &str) -> Option<&str> {
     file.ends_with(".parquet").then_some(table)
 }
 
-/// Refuses a path that would leave the release, or that `sha256sum` cannot list plainly.
+/// Refuses a path that would leave the release, or that `sha256sum` would have to escape.
 ///
 /// # Errors
-/// Why it cannot be a file of a release.
+/// [`ReleaseError::Path`] with the reason.
 pub fn check_path(path: &str) -> Result<(), ReleaseError> {
     let refuse = |reason| Err(ReleaseError::Path { path: path.to_owned(), reason });
     if path == MANIFEST || path == SUMS {
-        return refuse("the name is taken");
+        return refuse("the name is reserved");
     }
     if path.chars().any(|c| c.is_control() || c == '\\') {
-        return refuse("it has a control character or backslash");
+        return refuse("it contains a control character or backslash");
     }
     if path != ZENODO && path.split('/').any(|part| part.is_empty() || part.starts_with('.')) {
-        return refuse("it has an empty or hidden part");
+        return refuse("it contains an empty or hidden component");
     }
     Ok(())
 }

@@ -1,4 +1,4 @@
-//! What writing a raster allocates lies within what is said of it, and what reading a log allocates within what its file can hold.
+//! Memory limits: writing a raster stays within its documented memory, and reading a log within what its file can hold.
 
 use peak_alloc::PeakAlloc;
 use sastrugi_numeric::{Geometry, Grid};
@@ -10,13 +10,13 @@ use std::sync::Mutex;
 #[global_allocator]
 static ALLOCATED: PeakAlloc = PeakAlloc;
 
-/// Directories, buffers of the threads, and rows and columns that fill up tiles, bytes.
+/// Allowance for directories, thread buffers and padding of tiles, bytes.
 const SMALL: u64 = 8 << 20;
 
 /// Allocations are counted for the whole process, so one test runs at a time.
 static ALONE: Mutex<()> = Mutex::new(());
 
-/// What a call allocates at most at one time, bytes.
+/// Peak allocation of a call, bytes.
 fn peak_of<T>(call: impl FnOnce() -> T) -> (u64, T) {
     let before = ALLOCATED.current_usage();
     ALLOCATED.reset_peak_usage();
@@ -24,9 +24,9 @@ fn peak_of<T>(call: impl FnOnce() -> T) -> (u64, T) {
     ((ALLOCATED.peak_usage() - before) as u64, result)
 }
 
-/// Noise, which no compressor makes smaller, and a slope, which all do.
+/// Noise, which no compressor reduces, and a slope, which all reduce.
 #[test]
-fn val_writing_takes_the_memory_that_is_stated() {
+fn val_writing_stays_within_the_documented_memory() {
     let _alone = ALONE.lock().unwrap();
     let side = 2000;
     let noise = |k: usize| f64::from_bits(0x3ff0_0000_0000_0000 | (k as u64).wrapping_mul(0x9e37_79b9_7f4a_7c15) >> 12);
@@ -48,9 +48,9 @@ fn val_writing_takes_the_memory_that_is_stated() {
     }
 }
 
-/// Lengths that a damaged file states are no reason to ask for memory.
+/// Memory is not allocated for lengths that a damaged file merely claims.
 #[test]
-fn val_logs_take_no_memory_that_they_only_claim() {
+fn val_logs_allocate_no_memory_for_claimed_lengths() {
     let _alone = ALONE.lock().unwrap();
     const MAGIC: &[u8] = b"\x89MCAP0\r\n";
     let record = |opcode: u8, length: u64, content: &[u8]| [&[opcode], &length.to_le_bytes()[..], content].concat();

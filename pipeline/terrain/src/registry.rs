@@ -34,7 +34,7 @@ struct Entry {
 const ENTRIES: &[Entry] = &[
     Entry {
         kind: crate::weierstrass_mandelbrot::KIND,
-        summary: "monofractal sum of ridged plane waves, one fractal dimension everywhere",
+        summary: "monofractal sum of ridged plane waves, with the same fractal dimension everywhere",
         source: "Majhor and Bos, Eq. 1-2; Ausloos and Berman (1985)",
         parameters: schema_of::<RawWeierstrassMandelbrot>,
         prepare: prepare_as::<RawWeierstrassMandelbrot, WeierstrassMandelbrot>,
@@ -48,56 +48,56 @@ const ENTRIES: &[Entry] = &[
     },
     Entry {
         kind: crate::cascade::KIND,
-        summary: "true multifractal: fractionally integrated log-normal cascade with known K(q) and zeta(q)",
+        summary: "true multifractal: fractionally integrated log-normal cascade with prescribed K(q) and zeta(q)",
         source: "Schertzer and Lovejoy (1987); Gagnon, Lovejoy and Schertzer (2006)",
         parameters: schema_of::<RawCascade>,
         prepare: prepare_as::<RawCascade, Cascade>,
     },
     Entry {
         kind: crate::compose::KIND,
-        summary: "other generators and surfaces joined by an ordered list: sum, product, blend, mask, clip, scale to relief",
-        source: "ours",
+        summary: "other generators and surfaces combined step by step: sum, product, blend, mask, clip, scale to relief, trail",
+        source: "sastrugi",
         parameters: schema_of::<RawCompose>,
         prepare: prepare_as::<RawCompose, Compose>,
     },
     Entry {
         kind: crate::spheroids::KIND,
-        summary: "hills as upper halves of random spheroids, from plain to very rough",
+        summary: "hills shaped as upper halves of random spheroids, from plain to very rough",
         source: "Bayrak (2008), Algorithm 10",
         parameters: schema_of::<RawSpheroids>,
         prepare: prepare_as::<RawSpheroids, Spheroids>,
     },
     Entry {
         kind: mavs::MAVS_PERLIN,
-        summary: "a rough layer of Perlin noise over a rolling one",
+        summary: "a rough layer of Perlin noise over a gently rolling one",
         source: "Terrain Roughness in MAVS, Algorithm 1",
         parameters: schema_of::<RawTwoLayers>,
         prepare: prepare_as::<RawTwoLayers, TwoLayers>,
     },
     Entry {
         kind: mavs::MAVS_GAUSSIAN,
-        summary: "a Gaussian field with a correlation length over rolling ground, or its published listing",
+        summary: "a correlated Gaussian field over rolling ground, or the published listing",
         source: "Terrain Roughness in MAVS, Algorithm 2",
         parameters: schema_of::<RawGaussian>,
         prepare: prepare_as::<RawGaussian, Gaussian>,
     },
     Entry {
         kind: mavs::MAVS_VARIABLE,
-        summary: "octaves of Perlin noise with the published amplitudes, profiles with density f^-3, under a field of scales",
+        summary: "octaves of Perlin noise with the published amplitudes (profile PSD f^-3), modulated by a field of scales",
         source: "Terrain Roughness in MAVS, Algorithm 3",
         parameters: schema_of::<RawVariable>,
         prepare: prepare_as::<RawVariable, Variable>,
     },
     Entry {
         kind: mavs::VAN_DEUSEN,
-        summary: "octaves of Perlin noise with a power law, natural ground with f^-2, scaled to a roughness in a vehicle's band",
+        summary: "octaves of Perlin noise with a power-law PSD (natural ground: f^-2), scaled to a roughness in a vehicle's band",
         source: "Terrain Roughness in MAVS, Algorithm 3, corrected; Van Deusen (1967)",
         parameters: schema_of::<RawVanDeusen>,
         prepare: prepare_as::<RawVanDeusen, VanDeusen>,
     },
     Entry {
         kind: mavs::ORNSTEIN_UHLENBECK,
-        summary: "stationary Gaussian field, separable or isotropic, exponential or Gaussian covariance",
+        summary: "stationary Gaussian field with separable or isotropic, exponential or Gaussian covariance",
         source: "Terrain Roughness in MAVS, Algorithm 2, corrected; Dietrich and Newsam (1997)",
         parameters: schema_of::<RawOrnsteinUhlenbeck>,
         prepare: prepare_as::<RawOrnsteinUhlenbeck, OrnsteinUhlenbeck>,
@@ -125,14 +125,14 @@ const ENTRIES: &[Entry] = &[
     },
     Entry {
         kind: crate::planetary::KIND,
-        summary: "a patch of a world of texture, craters, rocks and dust: the same bits at any place and zoom",
+        summary: "a patch of a world with texture, craters, rocks and dust, bit-identical however it is cut and zoomed",
         source: "JPL synthetic terrain environment, section 2; Golombek and Rapp (1997)",
         parameters: schema_of::<RawPlanetary>,
         prepare: prepare_as::<RawPlanetary, Planetary>,
     },
     Entry {
         kind: crate::elaborate::KIND,
-        summary: "a measured DEM refined below its posts: its own background, fitted texture, bounded craters and rocks",
+        summary: "a measured DEM refined below its post spacing: its own background plus fitted texture, bounded craters and rocks",
         source: "JPL synthetic terrain environment, section 1; Keys (1981)",
         parameters: schema_of::<RawElaborate>,
         prepare: prepare_as::<RawElaborate, Elaborate>,
@@ -140,6 +140,13 @@ const ENTRIES: &[Entry] = &[
 ];
 
 /// Every generator, with the JSON Schema of its parameters.
+///
+/// ```
+/// let kinds = sastrugi_terrain::kinds();
+/// let cascade = kinds.iter().find(|kind| kind.kind == "cascade").expect("a generator");
+/// assert!(cascade.source.contains("Schertzer and Lovejoy"));
+/// assert!(cascade.parameters["properties"]["codimension"]["description"].is_string());
+/// ```
 pub fn kinds() -> Vec<Kind> {
     let describe = |e: &Entry| Kind {
         family: "terrain",
@@ -155,18 +162,36 @@ pub fn kinds() -> Vec<Kind> {
 ///
 /// # Errors
 /// A [`ParameterError`] for an unknown kind, an unknown parameter, or a value out of range.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::Streams;
+/// use sastrugi_terrain::prepare;
+/// use serde_json::json;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // A trench with upright walls, half a metre deep and ten cells wide.
+/// let params = json!({"size_px": [40, 5], "cell_m": 0.1, "depth_m": 0.5, "width_m": 1.0, "wall_angle_deg": 0.0});
+/// let terrain = prepare("gap", &params)?.generate(&Streams::for_seed(1, "terrain"), &[])?;
+/// assert_eq!(terrain.heights.row(0).iter().filter(|z| **z == -0.5).count(), 10);
+/// // Errors name the parameter.
+/// let refused = prepare("gap", &json!({"depth_m": -1.0})).err().map(|error| error.key);
+/// assert_eq!(refused.as_deref(), Some("depth_m"));
+/// # Ok(())
+/// # }
+/// ```
 pub fn prepare(kind: &str, params: &Value) -> Result<Box<dyn Generator>, ParameterError> {
     match ENTRIES.iter().find(|e| e.kind == kind) {
         Some(entry) => (entry.prepare)(params),
         None => {
             let known: Vec<String> = ENTRIES.iter().map(|e| format!("`{}`", e.kind)).collect();
-            let message = format!("`{kind}` is no terrain generator; the known ones are {}", known.join(", "));
+            let message = format!("`{kind}` is not a terrain generator; the known ones are {}", known.join(", "));
             Err(ParameterError::new("kind", message))
         }
     }
 }
 
-/// True where a generator has that parameter.
+/// Whether the generator `kind` has a parameter `name`.
 pub(crate) fn has_parameter(kind: &str, name: &str) -> bool {
     ENTRIES.iter().any(|e| e.kind == kind && (e.parameters)()["properties"].get(name).is_some())
 }
@@ -179,7 +204,7 @@ where
     Ok(Box::new(Checked::try_from(read::<Raw>(params)?)?))
 }
 
-/// Raw parameters: the given ones over the defaults.
+/// Raw parameters: the defaults, overridden by the given ones.
 pub(crate) fn read<Raw>(params: &Value) -> Result<Raw, ParameterError>
 where
     Raw: Default + Serialize + DeserializeOwned,
@@ -187,7 +212,7 @@ where
     read_parameters(&over_defaults::<Raw>(params)?)
 }
 
-/// The defaults with the given parameters laid over them, table by table: naming one parameter of a layer leaves the
+/// The defaults merged with the given parameters, table by table: setting one parameter of a layer leaves the
 /// others at that layer's defaults.
 fn over_defaults<Raw: Default + Serialize>(params: &Value) -> Result<Value, ParameterError> {
     let nothing = Map::new();
@@ -198,15 +223,15 @@ fn over_defaults<Raw: Default + Serialize>(params: &Value) -> Result<Value, Para
     };
     let mut all = serde_json::to_value(Raw::default()).map_err(|e| ParameterError::new("", e.to_string()))?;
     if let Value::Object(all) = &mut all {
-        lay_over(all, given);
+        merge(all, given);
     }
     Ok(all)
 }
 
-fn lay_over(all: &mut Map<String, Value>, given: &Map<String, Value>) {
+fn merge(all: &mut Map<String, Value>, given: &Map<String, Value>) {
     for (key, value) in given {
         match (all.get_mut(key), value) {
-            (Some(Value::Object(below)), Value::Object(above)) => lay_over(below, above),
+            (Some(Value::Object(below)), Value::Object(above)) => merge(below, above),
             _ => {
                 all.insert(key.clone(), value.clone());
             }

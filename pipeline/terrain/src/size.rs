@@ -3,11 +3,11 @@
 use sastrugi_numeric::Geometry;
 use sastrugi_schemas::{ParameterError, shown};
 
-/// Fewest cells along a side.
+/// Minimum number of cells along a side.
 const MIN_SIDE_PX: u32 = 3;
-/// Most cells of a heightfield: 2 GiB of heights, as many as can be read back.
+/// Maximum number of cells of a heightfield: 2 GiB of heights, the most that can be read back.
 const MAX_CELLS: u64 = 1 << 28;
-/// A quotient this near to an integer is that integer.
+/// A quotient this close to an integer counts as that integer.
 const INTEGER_TOLERANCE: f64 = 1e-6;
 
 /// A checked size in cells.
@@ -17,13 +17,13 @@ pub struct Size {
     pub px: [u32; 2],
     /// Side of the square cells, m.
     pub cell_m: f64,
-    /// The size asked for in m, where it is no whole number of cells.
+    /// The requested size in m, if it is not a whole number of cells.
     rounded_from_m: Option<[f64; 2]>,
 }
 
 impl Size {
     /// The size from `size_m` or `size_px` (not both; `default_px` when neither is given) and `cell_m`. Metres become
-    /// `round(size / cell)` cells where that is within 1e-6 of an integer, else the whole cells that fit.
+    /// `round(size / cell)` cells if `size / cell` is within 1e-6 of an integer, else the number of complete cells that fit.
     ///
     /// # Errors
     /// A [`ParameterError`] for a size or a cell that is not positive and finite, fewer than 3 cells along a side, or
@@ -36,9 +36,10 @@ impl Size {
     ) -> Result<Self, ParameterError> {
         ParameterError::positive("cell_m", cell_m)?;
         let size = match (size_m, size_px) {
-            (Some(_), Some(_)) => {
-                Err(ParameterError::new("size_m", "stands beside `size_px`; give the size in metres or in cells"))
-            }
+            (Some(_), Some(_)) => Err(ParameterError::new(
+                "size_m",
+                "conflicts with `size_px`; give the size either in metres or in cells",
+            )),
             (Some(metres), None) => Self::from_metres(metres, cell_m),
             (None, px) => Ok(Self { px: px.unwrap_or(default_px), cell_m, rounded_from_m: None }),
         }?;
@@ -62,10 +63,10 @@ impl Size {
             return Err(ParameterError::new(key, format!("gives {x} x {y} cells; it must give at least 3 x 3")));
         }
         if u64::from(x) * u64::from(y) > MAX_CELLS {
-            return Err(ParameterError::new(key, format!("gives {x} x {y} cells; the most is 2^28 in all")));
+            return Err(ParameterError::new(key, format!("gives {x} x {y} cells; at most 2^28 cells are allowed")));
         }
         if !self.geometry().size().iter().all(|side| side.is_finite()) {
-            let message = format!("is {}; sides of {x} x {y} such cells are no numbers", shown(self.cell_m));
+            let message = format!("is {}; the sides of {x} x {y} such cells overflow", shown(self.cell_m));
             return Err(ParameterError::new("cell_m", message));
         }
         Ok(self)
@@ -86,17 +87,17 @@ impl Size {
         u64::from(self.px[0]) * u64::from(self.px[1])
     }
 
-    /// The grid of that size.
+    /// The grid of this size.
     pub fn geometry(&self) -> Geometry {
         Geometry::square(self.rows(), self.cols(), self.cell_m)
     }
 
-    /// The sentence about a size that was rounded down, if it was.
+    /// A note on the size, if it was rounded down.
     pub fn note(&self) -> Option<String> {
         let [x, y] = self.rounded_from_m?;
         let [achieved_x, achieved_y] = self.geometry().size();
         Some(format!(
-            "{x} x {y} m is no whole number of cells of {} m: {} x {} cells, {achieved_x} x {achieved_y} m",
+            "{x} x {y} m is not a whole number of {} m cells; rounded down to {} x {} cells, {achieved_x} x {achieved_y} m",
             self.cell_m, self.px[0], self.px[1]
         ))
     }
@@ -117,7 +118,23 @@ mod tests {
         let odd = cells([10.06, 10.0], 0.1);
         assert_eq!(odd.px, [100, 100]);
         assert!(odd.note().unwrap().contains("10.06 x 10 m"));
+        assert!(odd.note().unwrap().ends_with("rounded down to 100 x 100 cells, 10 x 10 m"), "{:?}", odd.note());
         assert_eq!(Size::check(None, None, 0.05, DEFAULT).unwrap().px, DEFAULT);
+    }
+
+    /// Columns come first in a size, rows in a shape.
+    #[test]
+    fn val_columns_lie_east_and_rows_north() {
+        let size = Size::check(None, Some([7, 4]), 0.5, DEFAULT).unwrap();
+        assert_eq!((size.cols(), size.rows(), size.cells()), (7, 4, 28));
+        assert_eq!((size.geometry().rows, size.geometry().size()), (4, [3.5, 2.0]));
+    }
+
+    #[test]
+    fn val_the_limits_are_allowed() {
+        assert_eq!(Size::check(None, Some([16_384, 16_384]), 1.0, DEFAULT).unwrap().cells(), 1 << 28);
+        assert_eq!(Size::check(None, Some([16_384, 16_385]), 1.0, DEFAULT).unwrap_err().key, "size_px");
+        assert_eq!(Size::check(None, Some([3, 3]), 1.0, DEFAULT).unwrap().px, [3, 3]);
     }
 
     #[test]
@@ -131,5 +148,6 @@ mod tests {
             assert_eq!(refused(Some([bad, 5.0]), None, 0.1), "size_m");
         }
         assert_eq!(refused(Some([1e300, 1e300]), None, 0.1), "size_m");
+        assert_eq!(refused(None, Some([9, 9]), 1e308), "cell_m");
     }
 }

@@ -1,10 +1,10 @@
-//! Ground of which any window can be made, at any zoom of its lattice: what a server asks for.
+//! Ground that can be generated window by window, at any zoom of its lattice, as a server needs it.
 
 use crate::planetary::{Patch, Request, World};
 
-/// Ground of which any window can be made. Samples are pure functions of their lattice point and of the bound on features.
+/// Ground of which any window can be generated. Samples are pure functions of their lattice point and of the bound on features.
 pub trait Windows: Send + Sync {
-    /// The samples that are asked for, made on this thread; `None` once they are no longer wanted. Heights are NaN where there is no ground.
+    /// The requested samples, computed on this thread; `None` if the request was cancelled. Heights are NaN where there is no ground.
     fn patch_for(&self, request: &Request<'_>) -> Option<Patch>;
 
     /// Rough time of [`Self::patch_for`] on one core, s.
@@ -13,7 +13,7 @@ pub trait Windows: Send + Sync {
     /// Whether it has rocks.
     fn has_rocks(&self) -> bool;
 
-    /// Share of the ground that rocks no wider than `diameter_m` cover where the wider ones do not, at a coverage by all.
+    /// Fraction of the ground that only rocks up to `diameter_m` wide cover, given the coverage by all rocks.
     fn rock_cover_below(&self, coverage: f64, diameter_m: f64) -> f64;
 
     /// Whether it has an albedo.

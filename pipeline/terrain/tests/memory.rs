@@ -1,4 +1,4 @@
-//! What a generator allocates lies within what it says.
+//! Generators stay within the memory that they state.
 
 use peak_alloc::PeakAlloc;
 use sastrugi_numeric::{Geometry, Grid, Streams};
@@ -8,13 +8,14 @@ use serde_json::{Value, json};
 #[global_allocator]
 static ALLOCATED: PeakAlloc = PeakAlloc;
 
-/// What any generator may take beyond the statement, bytes: tables, and stacks of the pool.
+/// Allowance beyond the stated memory, bytes: tables, and the pool's stacks.
 const SMALL: f64 = 4e6;
-/// A statement may be so many times too large; where craters and rocks decide, it is made for the worst tile, of which a surface may have none.
+/// Largest permitted ratio of stated to measured memory. With craters and rocks the statement covers the worst tile, which a surface may not
+/// contain.
 const SLACK: f64 = 4.0;
 const SLACK_OF_FEATURES: f64 = 16.0;
 
-/// Bytes at the height of making a surface, and as stated.
+/// Peak memory while generating a surface, measured and stated, bytes.
 fn measured(kind: &str, params: &Value, inputs: &[Input], threads: usize) -> [f64; 2] {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().expect("a pool of threads");
     pool.install(|| {
@@ -28,7 +29,7 @@ fn measured(kind: &str, params: &Value, inputs: &[Input], threads: usize) -> [f6
     })
 }
 
-/// A DEM of that many posts a side, 5 m apart.
+/// A DEM of `side` x `side` posts, 5 m apart.
 fn dem(side: usize) -> Input {
     let mut geometry = Geometry::square(side, side, 5.0);
     geometry.origin = [0.0; 2];
@@ -39,9 +40,9 @@ fn dem(side: usize) -> Input {
     Input::Grid(Grid::new(geometry, (0..side * side).map(height).collect()))
 }
 
-/// Kinds with parameters of some size.
+/// Every kind, with parameters of a moderately large surface.
 fn cases() -> Vec<(&'static str, Value, Vec<Input>)> {
-    // The others take parameters, below.
+    // The other kinds need parameters and follow below.
     let plain = kinds().into_iter().map(|k| k.kind).filter(|k| !["planetary", "elaborate", "compose"].contains(k));
     let sized =
         |kind: &'static str| [[1000, 1000], [300, 2500]].map(|size| (kind, json!({ "size_px": size }), Vec::new()));
@@ -71,7 +72,7 @@ fn cases() -> Vec<(&'static str, Value, Vec<Input>)> {
 }
 
 #[test]
-fn val_generators_take_the_memory_that_they_state() {
+fn val_generators_stay_within_their_stated_memory() {
     let mut wrong = Vec::new();
     for (kind, params, inputs) in cases() {
         for threads in [1, 4] {

@@ -1,4 +1,4 @@
-//! One bit for each cell of a raster.
+//! One bit per cell of a raster.
 
 use std::ops::Range;
 
@@ -20,7 +20,7 @@ impl Bitmap {
         if self.len.is_multiple_of(64) {
             self.words.push(0);
         }
-        // The word was just made, or is the last one.
+        // Either pushed just above, or the last word so far.
         if let Some(word) = self.words.last_mut() {
             *word |= u64::from(bit) << (self.len % 64);
         }
@@ -32,7 +32,7 @@ impl Bitmap {
         bits.for_each(|bit| self.push(bit));
     }
 
-    /// Positions within `range` of the bits that are not set.
+    /// Positions of the unset bits within `range`.
     pub fn unset(&self, range: Range<usize>) -> impl Iterator<Item = usize> {
         let words = range.start / 64..range.end.div_ceil(64);
         let missing = words.flat_map(|w| set(!self.words.get(w).copied().unwrap_or(0)).map(move |bit| 64 * w + bit));
@@ -40,7 +40,7 @@ impl Bitmap {
         missing.skip_while(move |&k| k < from).take_while(move |&k| k < to)
     }
 
-    /// Bit `k`; false beyond the last one.
+    /// Bit `k`; false beyond the end.
     pub fn get(&self, k: usize) -> bool {
         self.words.get(k / 64).is_some_and(|word| word >> (k % 64) & 1 == 1)
     }
@@ -66,7 +66,7 @@ impl Bitmap {
     }
 }
 
-/// Position of the set bit number `n` of a word that has it.
+/// Position of the `n`-th set bit of a word, counted from 0; the word must have that many.
 fn nth_set(mut word: u64, n: usize) -> usize {
     (0..n).for_each(|_| word &= word - 1);
     word.trailing_zeros() as usize
@@ -83,7 +83,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_bits_are_found_again() {
+    fn val_bits_match_brute_force() {
         let set = |k: usize| k % 7 == 3 || k % 64 == 63;
         let mut bits = Bitmap::with_capacity(1000);
         (0..1000).for_each(|k| bits.push(set(k)));

@@ -1,4 +1,4 @@
-//! The `gstools` block of a fit file beside our own covariances, as a golden file: `tests/interop/check_gstools.py` loads the
+//! Golden file with the `gstools` block of fit files and the covariances of this crate: `tests/interop/check_gstools.py` loads the
 //! blocks in GSTools and compares. Refresh: `SASTRUGI_REFRESH=1 cargo test --release -p sastrugi-texture gstools`.
 
 use crate::covariance::{Covariance, Form};
@@ -6,7 +6,7 @@ use crate::fit::report::gstools;
 use sastrugi_schemas::fit::FitFile;
 use serde_json::{Value, json};
 
-/// Models with parameters of unlike size, and all kinds that the block has words for.
+/// Every kind of model that the block can express, with parameters of different sizes.
 const CASES: [(&str, &[(&str, f64)]); 7] = [
     ("exponential", &[("sigma_m", 0.12), ("range_m", 0.28)]),
     ("gaussian", &[("sigma_m", 3.0), ("range_m", 20.0)]),

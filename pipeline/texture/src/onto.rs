@@ -1,17 +1,17 @@
-//! A periodic texture laid onto a base terrain, its amplitude modulated by the base's slope or by a raster.
+//! Adds a periodic texture to a base terrain, its amplitude optionally modulated by the base's slope or by a raster.
 
 use sastrugi_numeric::{Grid, Surface};
 use sastrugi_schemas::ParameterError;
 
-/// Relative difference of cell sizes that counts as none.
+/// Relative difference below which two cell sizes count as equal.
 const CELL_TOLERANCE: f64 = 1e-6;
 
-/// A texture that does not fit its base.
+/// Why a texture cannot be added to its base.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum OntoError {
     /// Sampling a texture between its cells would smooth it and change its covariance.
     #[error(
-        "the texture's cells of {texture_m:?} m are not the base's of {base_m:?} m; make the texture at the base's cell size"
+        "cell sizes differ: texture {texture_m:?} m, base {base_m:?} m; generate the texture at the base's cell size"
     )]
     Cells {
         /// Cell size of the texture, m.
@@ -19,8 +19,10 @@ pub enum OntoError {
         /// Cell size of the base, m.
         base_m: [f64; 2],
     },
-    /// A raster of factors must say something of every cell of the base.
-    #[error("the raster of amplitudes has no value, or one below 0, at x = {x} m, y = {y} m; it must cover the base")]
+    /// A raster of factors needs a value at every cell of the base.
+    #[error(
+        "the amplitude raster has no value or a negative one at x = {x} m, y = {y} m; it must cover the base with values of 0 or above"
+    )]
     Amplitude {
         /// East, m.
         x: f64,
@@ -29,7 +31,20 @@ pub enum OntoError {
     },
 }
 
-/// Factor of the texture by the base's slope: straight lines between given slopes, the outer values beyond them.
+/// Texture amplitude as a function of the base's slope: linear between the given slopes, constant beyond the outermost.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_texture::{SlopeFactors, modulated_onto};
+///
+/// // Texture on level ground only: none from 40 degrees on. The base rises eastwards at 45 degrees.
+/// let factors = SlopeFactors { slope_deg: vec![0.0, 40.0], factor: vec![1.0, 0.0] };
+/// factors.check().unwrap();
+/// let base = Grid::new(Geometry::square(1, 4, 1.0), vec![0.0, 1.0, 2.0, 3.0]);
+/// let tile = Grid::filled(Geometry::square(1, 1, 1.0), 9.0);
+/// let sum = modulated_onto(&base, &tile, Some(&factors.over(&base))).unwrap();
+/// assert_eq!(sum.values, base.values);
+/// ```
 #[derive(Clone, Debug, PartialEq)]
 pub struct SlopeFactors {
     /// Slopes, degrees, ascending.
@@ -42,19 +57,19 @@ impl SlopeFactors {
     /// Checks the table.
     ///
     /// # Errors
-    /// Lists of different lengths or without values; slopes that do not ascend; a factor below 0.
+    /// Empty lists or lists of different lengths; slopes that do not ascend; a factor below 0.
     pub fn check(&self) -> Result<(), ParameterError> {
         let (slopes, factors) = (&self.slope_deg, &self.factor);
         if slopes.is_empty() || slopes.len() != factors.len() {
             let message =
-                format!("holds {} slopes and {} factors; it takes as many of each", slopes.len(), factors.len());
+                format!("has {} slopes and {} factors; give one factor per slope", slopes.len(), factors.len());
             return Err(ParameterError::new("modulate", message));
         }
         if !slopes.iter().all(|s| s.is_finite()) || slopes.windows(2).any(|pair| pair[0] >= pair[1]) {
-            return Err(ParameterError::new("modulate.slope_deg", "must hold finite slopes in ascending order"));
+            return Err(ParameterError::new("modulate.slope_deg", "must be finite slopes in ascending order"));
         }
         if !factors.iter().all(|f| f.is_finite() && *f >= 0.0) {
-            return Err(ParameterError::new("modulate.factor", "must hold finite factors, 0 or above"));
+            return Err(ParameterError::new("modulate.factor", "must be finite factors, 0 or above"));
         }
         Ok(())
     }
@@ -71,7 +86,7 @@ impl SlopeFactors {
         }
     }
 
-    /// Factor of every cell of a base, by its slope: central differences, one-sided at edges and beside cells without data.
+    /// Factor at every cell of a base, from its slope: central differences, one-sided at edges and next to no-data cells.
     pub fn over(&self, base: &Grid) -> Grid {
         let [dx, dy] = base.geometry.cell;
         let (rows, cols) = (base.rows(), base.cols());
@@ -96,10 +111,10 @@ impl SlopeFactors {
     }
 }
 
-/// A raster of factors on the cells of a base: bilinear, the nearest value at its rim.
+/// Resamples a raster of factors to the cells of a base: bilinear, nearest value at the raster's rim.
 ///
 /// # Errors
-/// A cell of the base with data but without a factor of 0 or above.
+/// A cell of the base that has data but no factor of 0 or above.
 pub fn amplitude(base: &Grid, raster: &Grid) -> Result<Grid, OntoError> {
     let g = base.geometry;
     let factor = |k: usize| {
@@ -114,7 +129,7 @@ pub fn amplitude(base: &Grid, raster: &Grid) -> Result<Grid, OntoError> {
     Ok(Grid::new(g, (0..g.len()).map(factor).collect::<Result<_, _>>()?))
 }
 
-/// Whether a texture with cells of one size can lie on a base with cells of another, east-west and north-south, m.
+/// Checks that texture and base have the same cell size (east-west and north-south, m).
 ///
 /// # Errors
 /// Cell sizes that differ.
@@ -125,8 +140,20 @@ pub fn check_cells(base_m: [f64; 2], texture_m: [f64; 2]) -> Result<(), OntoErro
     Ok(())
 }
 
-/// Base plus texture, cell by cell on the base's own cells. The texture is repeated as often as the base needs from the
-/// south-west corner on, which is seamless for a periodic one. Cells of the base without data stay without.
+/// Base plus texture, cell by cell on the base's grid. The texture is tiled from the south-west corner until it covers the
+/// base, which is seamless if the texture is periodic. No-data cells of the base stay no data.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// // A tile of one row and two columns on a base of two rows and three columns.
+/// let tile = Grid::new(Geometry::square(1, 2, 0.5), vec![0.25, -0.25]);
+/// let base = Grid::filled(Geometry::square(2, 3, 0.5), 10.0);
+/// let sum = sastrugi_texture::onto(&base, &tile).unwrap();
+/// assert_eq!(sum.row(0), [10.25, 9.75, 10.25]);
+/// // Texture of other cells would have to be interpolated, which would smooth it.
+/// assert!(sastrugi_texture::onto(&Grid::filled(Geometry::square(2, 3, 1.0), 10.0), &tile).is_err());
+/// ```
 ///
 /// # Errors
 /// Cell sizes that differ.
@@ -134,7 +161,7 @@ pub fn onto(base: &Grid, texture: &Grid) -> Result<Grid, OntoError> {
     modulated_onto(base, texture, None)
 }
 
-/// As [`onto()`], the texture multiplied by a factor for each cell of the base.
+/// As [`onto()`], with the texture multiplied by a factor at each cell of the base.
 ///
 /// # Errors
 /// Cell sizes that differ.
@@ -174,7 +201,7 @@ mod tests {
         assert_eq!(sum.at(0, 1), 15.0);
     }
 
-    /// A plane of 45 degrees and a flat: factors by slope; a raster of factors at half the resolution.
+    /// A 45-degree plane next to level ground: factors by slope, and a raster of factors at half the resolution.
     #[test]
     fn val_amplitudes() {
         let g = Geometry::square(4, 8, 1.0);
@@ -199,8 +226,52 @@ mod tests {
         );
     }
 
+    /// A raster of factors `x + 10 y` on cells of 2 m and a base on cells of 1 m: bilinear interpolation reproduces it between the raster's
+    /// outer centres (1 to 7 m); beyond them the value of the cell is used. Swapped axes would give `y + 10 x`.
     #[test]
-    fn val_other_cells_are_refused() {
+    fn val_amplitudes_are_resampled() {
+        let coarse = Geometry { rows: 4, cols: 5, cell: [2.0; 2], origin: [0.0; 2] };
+        let raster = Grid::new(coarse, (0..20).map(|k| coarse.x(k % 5) + 10.0 * coarse.y(k / 5)).collect());
+        let mut base = Grid::filled(Geometry { rows: 8, cols: 10, cell: [1.0; 2], origin: [0.0; 2] }, 0.0);
+        let factors = amplitude(&base, &raster).unwrap();
+        for (row, col) in (1..7).flat_map(|r| (1..9).map(move |c| (r, c))) {
+            let expected = base.geometry.x(col) + 10.0 * base.geometry.y(row);
+            assert!((factors.at(row, col) - expected).abs() < 1e-12, "{row} {col}: {}", factors.at(row, col));
+        }
+        // South-western and north-eastern corners: cells at (1, 1) and (9, 7) m.
+        assert_eq!((factors.at(7, 0), factors.at(0, 9)), (11.0, 79.0));
+        // A negative factor is refused, except where the base has no data.
+        let mut negative = raster.clone();
+        negative.values[0] = -1.0;
+        assert!(matches!(amplitude(&base, &negative), Err(OntoError::Amplitude { x: 0.5, y: 7.5 })));
+        for (row, col) in (0..2).flat_map(|r| (0..3).map(move |c| (r, c))) {
+            base.values[row * 10 + col] = f64::NAN;
+        }
+        let gaps = amplitude(&base, &negative).unwrap();
+        assert!(gaps.at(0, 0).is_nan() && gaps.at(0, 3) > 0.0);
+    }
+
+    /// Planes of slope 1 eastwards and 1 northwards on cells of 1 m by 2 m: both are 45 degrees, and the factor is constant beyond the table.
+    #[test]
+    fn val_factors_follow_the_slope_in_both_directions() {
+        let g = Geometry { rows: 4, cols: 5, cell: [1.0, 2.0], origin: [0.0; 2] };
+        let plane =
+            |east: f64, north: f64| Grid::new(g, (0..20).map(|k| east * g.x(k % 5) + north * g.y(k / 5)).collect());
+        let factors = SlopeFactors { slope_deg: vec![30.0, 60.0], factor: vec![1.0, 3.0] };
+        for (east, north, expected) in
+            [(1.0, 0.0, 2.0), (0.0, 1.0, 2.0), (0.0, -1.0, 2.0), (0.1, 0.0, 1.0), (3.0, 3.0, 3.0)]
+        {
+            let over = factors.over(&plane(east, north));
+            assert!(over.values.iter().all(|f| (f - expected).abs() < 1e-12), "{east} {north}: {:?}", over.values);
+        }
+        // A cell without neighbours with data is level.
+        let mut alone = plane(3.0, 3.0).map(|_| f64::NAN);
+        alone.values[7] = 5.0;
+        assert_eq!(factors.over(&alone).values[7], 1.0);
+    }
+
+    #[test]
+    fn val_different_cell_sizes_are_refused() {
         let tile = Grid::filled(Geometry::square(2, 2, 0.1), 0.0);
         let base = Grid::filled(Geometry::square(4, 4, 0.2), 0.0);
         let message = onto(&base, &tile).unwrap_err().to_string();

@@ -1,5 +1,5 @@
-//! What is shown of a fit beside its file: which cells were used, how much the covariance scatters over the site, and a
-//! texture treated as the measured surface was. None of it decides a parameter.
+//! Diagnostics of a fit for display: which cells were used, how much the covariance scatters over the site, and the residual
+//! of a texture detrended and trimmed like the measured surface. None of this affects a fitted parameter.
 
 use crate::covariance::masked_covariance;
 use crate::fit::residual::residual;
@@ -14,21 +14,21 @@ use sastrugi_statistics::normal;
 
 /// Code of a cell that entered the covariance.
 pub const USED: u8 = 0;
-/// Code of a cell beyond the trimming threshold, or taken for an object.
+/// Code of a trimmed cell or an object.
 pub const TRIMMED: u8 = 1;
 /// Code of a cell whose window has too little data.
 pub const BESIDE: u8 = 2;
 /// Code of a cell without data.
 pub const NO_DATA: u8 = 255;
 
-/// Fewest tiles that tell how a site scatters.
+/// Fewest tiles for a jackknife.
 const TILES_MIN: usize = 9;
-/// Most tiles along a side.
+/// Most tiles along one side.
 const TILES_ALONG: usize = 8;
-/// Level of the band.
+/// Confidence level of the band.
 const LEVEL: f64 = 0.95;
 
-/// What became of each cell of the DEM that was fitted; `residual` is that of [`FitOutcome::rasters`].
+/// How each cell of the fitted DEM was used, as one of the codes above; `residual` is that of [`FitOutcome::rasters`].
 pub fn uses(dem: &Grid, residual: &Grid, outcome: &FitOutcome) -> Grid<u8> {
     let trusted = outcome.survey.trusted(0..dem.rows(), 0..dem.cols());
     let code = |k: usize| match (dem.values[k].is_finite(), residual.values[k].is_finite()) {
@@ -40,8 +40,9 @@ pub fn uses(dem: &Grid, residual: &Grid, outcome: &FitOutcome) -> Grid<u8> {
     Grid::new(dem.geometry, (0..dem.values.len()).map(code).collect())
 }
 
-/// A 95 % band about the empirical covariance of each bin, m2: standard errors by a delete-one jackknife over tiles of the
-/// residual at least two largest lags wide (Efron and Stein, 1981), which need no model. Empty with fewer than 9 tiles.
+/// A 95 % band around the empirical covariance of each bin, m2. Standard errors come from a delete-one jackknife (Efron and
+/// Stein, 1981) over tiles of the residual, each at least twice the largest lag wide; no model is needed. Empty with fewer
+/// than 9 tiles.
 pub fn covariance_band(residual: &Grid, outcome: &FitOutcome) -> Vec<[f64; 2]> {
     let max_lag = outcome.survey.covariance.max_lag;
     let shape = [residual.rows(), residual.cols()];
@@ -73,8 +74,8 @@ fn jackknife_error(parts: &[(f64, f64)]) -> f64 {
     ((parts.len() - 1) as f64 * sums::variance(&without)).sqrt()
 }
 
-/// A texture as the fit would see it: less its moving average over the fit's window, and without the share of it that the
-/// fit trimmed. `None` when the fit does not say its window, or the texture is below two windows wide.
+/// The residual of a texture, as the fit would compute it: the moving average over the fit's window is subtracted and the
+/// same share of cells is trimmed. `None` if the fit states no window or the texture is less than two windows wide.
 pub fn texture_residual(texture: &Grid, fit: &FitFile) -> Option<Grid> {
     let [window_x, window_y] = fit.window_m?;
     let [size_x, size_y] = texture.geometry.size();
@@ -88,7 +89,7 @@ pub fn texture_residual(texture: &Grid, fit: &FitFile) -> Option<Grid> {
     Some(Grid::new(texture.geometry, residual))
 }
 
-/// The settings of a fit; those of a file that does not say are the default ones, with its level of trimming.
+/// The settings of a fit; for a file without settings, the defaults with the file's trimming level.
 fn settings_of(fit: &FitFile) -> Option<FitSettings> {
     let stated: Option<FitParameters> = serde_json::from_value(fit.settings.clone()).ok();
     let trim = fit.trim.map_or(FitParameters::default().trim, |t| t.level);
@@ -104,7 +105,7 @@ mod tests {
     use serde_json::json;
     use std::sync::LazyLock;
 
-    /// A texture of known covariance with holes, and its fit with two candidates.
+    /// A texture of known covariance with holes, and its fit with two candidate models.
     static FITTED: LazyLock<(Grid, Grid, FitOutcome)> = LazyLock::new(|| {
         let truth = FitFile {
             model: "exponential".into(),
@@ -125,7 +126,7 @@ mod tests {
     });
 
     #[test]
-    fn prop_what_is_shown_agrees_with_the_fit() {
+    fn prop_diagnostics_agree_with_the_fit() {
         let (dem, residual, outcome) = &*FITTED;
         let fit = &outcome.fit;
         let codes = uses(dem, residual, outcome);
@@ -138,7 +139,7 @@ mod tests {
             outcome.survey.measured - outcome.survey.trusted_count + outcome.survey.detrended - outcome.survey.kept
         );
 
-        // The first candidate is the fit.
+        // The first candidate is the chosen model.
         assert_eq!(fit.candidates.len(), 2);
         assert_eq!(fit.candidates[0].model_m2, fit.model_m2);
         let others = fit.candidates[1].model_m2.iter().zip(&fit.model_m2);
@@ -152,7 +153,7 @@ mod tests {
         }
     }
 
-    /// The standard error of a mean of n values, each its own part, is the usual one.
+    /// With one value per part, the jackknife gives the usual standard error of the mean.
     #[test]
     fn val_jackknife_of_a_mean() {
         let parts = [1.0, 2.0, 4.0, 9.0].map(|v| (v, 1.0));

@@ -1,12 +1,12 @@
 //! Table `candidates`.
 
 super::table! {
-    /// One row per covariance model that a fit tried.
+    /// One row per covariance model that was a candidate in a fit.
     "candidates" CandidateRow {
         keys {
             /// Id of the fit.
             fit_id: String,
-            /// Place by AICc, from 1: the first is the fit.
+            /// Rank by AICc, from 1; the first is the fitted model.
             rank: i64,
         }
         /// Covariance model.
@@ -17,7 +17,7 @@ super::table! {
         free: i64 ["1"],
         /// Generalised sum of squares.
         chi2: Option<f64> ["1"],
-        /// Akaike's corrected criterion above the least of all candidates.
+        /// Akaike's corrected criterion (AICc) minus the smallest of all candidates.
         aicc_above_best: Option<f64> ["1"],
     }
 }

@@ -1,41 +1,41 @@
-//! Table `dem_fits`: what `sastrugi fit A B C --table` writes.
+//! Table `dem_fits`, written by `sastrugi fit A B C --table`.
 
 use super::{Cell, CellType, Column, FitRow, Record, Table};
 use serde_json::{Value, json};
 
 super::table! {
-    /// Columns of `dem_fits` that `fits` does not have.
+    /// Columns of `dem_fits` that are not in `fits`.
     "dem_fits" BesideFit {
-        /// The subtracted DEM (`--minus`) was moved this far east; null without a shift.
+        /// Shift of the subtracted DEM (`--minus`) to the east; null without a shift.
         shift_east_m: f64 ["m"],
-        /// The subtracted DEM was moved this far north; null without a shift.
+        /// Shift of the subtracted DEM to the north; null without a shift.
         shift_north_m: f64 ["m"],
-        /// The subtracted DEM was raised by this at the centre of the DEM.
+        /// Raise of the subtracted DEM at the centre of the DEM.
         raise_m: f64 ["m"],
         /// NMAD of the difference before co-registration.
         nmad_before_m: f64 ["m"],
         /// NMAD of the difference after co-registration.
         nmad_after_m: f64 ["m"],
-        /// Whether the shift gained something; null where it was not examined.
+        /// Whether the shift improved the fit; null if not tested.
         gained: Option<bool> [""],
-        /// What the fit is good for, in a sentence or two.
+        /// The verdict on the fit, in one or two sentences.
         verdict: Option<String> [""],
-        /// Root mean square of a texture from the fit over that of the residual, both detrended and trimmed.
+        /// RMS of a texture from the fit over that of the residual, both detrended and trimmed.
         carried_rms_share: f64 ["1"],
     }
 }
 
-/// One row per DEM fitted with the same settings: the file, the columns of `fits`, the co-registration where a DEM was
-/// subtracted, what the fit is good for, and what went wrong.
+/// One row per DEM fitted with the same settings: the file, the columns of `fits`, the co-registration if a DEM was subtracted, the
+/// verdict, and the error if the fit failed.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DemFitRow {
-    /// DEM as it was named in the call.
+    /// DEM, as named in the call.
     pub file: String,
-    /// The fit; without one its figures are unknown.
+    /// The fit; its values are unknown if it failed.
     pub fit: FitRow,
-    /// Co-registration, verdict and what a texture carries; a co-registration is known without a fit too.
+    /// Co-registration, verdict and RMS share of a texture; the co-registration is known even if the fit failed.
     pub beside: BesideFit,
-    /// Why there is no fit.
+    /// Error, if the fit failed.
     pub error: Option<String>,
 }
 
@@ -47,7 +47,7 @@ const FILE: Column = Column {
     column_type: <String as CellType>::TYPE,
     key: true,
     unit: "",
-    description: "DEM as it was named in the call.",
+    description: "DEM, as named in the call.",
 };
 
 const ERROR: Column = Column {
@@ -55,7 +55,7 @@ const ERROR: Column = Column {
     column_type: <Option<String> as CellType>::TYPE,
     key: false,
     unit: "",
-    description: "Why there is no fit; null where there is one.",
+    description: "Error, if the DEM could not be fitted; otherwise null.",
 };
 
 const COLUMNS: [Column; FITS.len() + BESIDE.len() + 2] = {
@@ -77,7 +77,7 @@ const COLUMNS: [Column; FITS.len() + BESIDE.len() + 2] = {
 impl Record for DemFitRow {
     const TABLE: Table = Table {
         name: "dem_fits",
-        description: "One row per DEM fitted by one call of `fit`: file, columns of `fits`, co-registration, why there is no fit.",
+        description: "One row per DEM in a call of `fit`: file, columns of `fits`, co-registration, and error if the fit failed.",
         columns: &COLUMNS,
         file_per: None,
     };

@@ -8,7 +8,7 @@ super::table! {
             terrain_id: String,
             /// Id of the run on that terrain.
             run_id: String,
-            /// Number of the event in order of time, from 0.
+            /// Number of the event, in order of time, from 0.
             event: i64,
         }
         /// Time since the start of the run.
@@ -16,9 +16,9 @@ super::table! {
         /// `start`, `wait` (the first step of a wait), `dodge` (the first step of one), `lost`, `rearranged`, `squeezed`, `replanned`,
         /// `stuck`, `arrived` (a member at its last target), `timeout` or `end`.
         kind: String [""],
-        /// Member that it happened to; null for the team as a whole.
+        /// Member concerned; null for the whole team.
         member: Option<i64> [""],
-        /// One sentence.
+        /// Description, one sentence.
         text: String [""],
     }
 }

@@ -25,19 +25,19 @@ super::table! {
         heading_deg: f64 ["deg"],
         /// Speed in plan.
         speed_m_s: f64 ["m/s"],
-        /// Slot that the member holds; null when it is lost.
+        /// Slot of the member; null if it is lost.
         slot: Option<i64> [""],
-        /// Target that it makes for, easting.
+        /// Current target, easting.
         target_x_m: f64 ["m"],
-        /// Target that it makes for, northing.
+        /// Current target, northing.
         target_y_m: f64 ["m"],
-        /// Distance behind the predecessor beyond the slot's; null for the leader.
+        /// Distance behind the predecessor minus that of the slot; null for the leader.
         depth_error_m: f64 ["m"],
-        /// Distance to the right of the predecessor beyond the slot's; null for the leader.
+        /// Distance to the right of the predecessor minus that of the slot; null for the leader.
         width_error_m: f64 ["m"],
         /// `moving`, `waiting`, `arrived` or `lost`.
         state: String [""],
-        /// `train`, `validation` or `test` (`[study] split`); null where the study does not split its terrains, or leaves this one out.
+        /// `train`, `validation` or `test` (`[study] split`); null if the study has no splits or leaves this terrain out.
         split: Option<String> [""],
     }
 }

@@ -1,7 +1,7 @@
 //! Table `likelihood_profile`.
 
 super::table! {
-    /// One row per range at which a fit was held, everything else fitted anew: how the likelihood falls away.
+    /// One row per fixed range of a fit, with all other parameters refitted: the profile likelihood.
     "likelihood_profile" LikelihoodProfileRow {
         keys {
             /// Id of the fit.
@@ -9,9 +9,9 @@ super::table! {
             /// Number of the point, from 0.
             point: i64,
         }
-        /// Range held.
+        /// Fixed range.
         range_m: f64 ["m"],
-        /// Rise of the generalised sum of squares above its minimum; 3.84 is the edge of a 95 % interval if the model is right.
+        /// Rise of the generalised sum of squares above its minimum; 3.84 is the limit of a 95 % interval if the model is right.
         chi2_rise: f64 ["1"],
     }
 }

@@ -1,7 +1,7 @@
 //! Table `missions`.
 
 super::table! {
-    /// One row per mission driven.
+    /// One row per mission.
     "missions" MissionRow {
         keys {
             /// Id of the terrain.
@@ -11,13 +11,13 @@ super::table! {
         }
         /// Label of the terrain.
         group: Option<String> [""],
-        /// What differs from the study's plain run: the swept parameters of terrain and traverse, as `surface.wheel_friction
-        /// = 0.7`; null for the plain run.
+        /// Swept parameters of terrain and traverse that differ from the study's plain run, such as `surface.wheel_friction = 0.7`; null
+        /// for the plain run.
         variant: Option<String> [""],
-        /// `train`, `validation` or `test` (`[study] split`); null where the study parts no terrains, or not this one.
+        /// `train`, `validation` or `test` (`[study] split`); null if the study has no splits or leaves this terrain out.
         split: Option<String> [""],
-        /// Missions with the same `pair_id` lead from the same start to the same goal, on one terrain or (with `pairing =
-        /// "common"`) on terrains that share their random draws.
+        /// Missions with the same `pair_id` have the same start and goal, on one terrain or (with `pairing = "common"`) on terrains that
+        /// share their random draws.
         pair_id: String [""],
         /// Id of the traverse stage.
         traverse_id: String [""],
@@ -33,7 +33,7 @@ super::table! {
         goal_y_m: f64 ["m"],
         /// Direction from start to goal, counterclockwise from east.
         heading_deg: f64 ["deg"],
-        /// Random draws of start and heading that were needed.
+        /// Number of random draws of start and heading until one was accepted.
         draws: i64 ["1"],
         /// `success`, `tipped`, `stuck`, `out_of_bounds` or `timeout`.
         outcome: String [""],
@@ -41,10 +41,9 @@ super::table! {
         time_s: f64 ["s"],
         /// Length of the path driven, in plan, from the recorded samples.
         path_length_m: f64 ["m"],
-        /// Distance along the mission's line from start to outcome: the largest that a sample reached, at most the line's
-        /// length.
+        /// Distance along the mission's line from start to outcome: the largest of all samples, at most the line's length.
         progress_m: f64 ["m"],
-        /// Straight distance from the first to the last sample over path length; null unless successful.
+        /// Straight distance from the first to the last sample over path length; null unless the mission succeeded.
         efficiency: f64 ["1"],
         /// Root mean square of the vertical acceleration, from the recorded heights differentiated twice.
         rms_vertical_acceleration_m_s2: f64 ["m/s2"],
@@ -60,7 +59,7 @@ super::table! {
         max_pitch_deg: f64 ["deg"],
         /// Largest absolute roll.
         max_roll_deg: f64 ["deg"],
-        /// Length of what the vehicle was to follow: the straight line, or the polyline of a routed mission or a trail.
+        /// Length of the mission's line: the straight line, or the polyline of a route or trail.
         line_length_m: f64 ["m"],
         /// Root mean square of the distance from that line.
         rms_cross_track_m: f64 ["m"],
@@ -77,9 +76,9 @@ super::table! {
         /// Standard deviation of the heights along the mission's line after a centred moving average over the vehicle's
         /// wheelbase is removed.
         line_band_rms_m: f64 ["m"],
-        /// Starts driven of this mission: the drawn one, which all other columns describe, and perturbed ones.
+        /// Number of starts of this mission: the drawn one, which all other columns describe, and perturbed ones.
         replicates: i64 ["1"],
-        /// Share of those starts from which the goal was reached.
+        /// Share of these starts from which the goal was reached.
         success_probability: f64 ["1"],
         /// Recorded samples.
         samples: i64 ["1"],

@@ -1,4 +1,4 @@
-//! Parquet tables of a release: one file per table, rows as plain structs, units and descriptions beside each column.
+//! Parquet tables of a release: rows as plain structs, with unit and description of each column.
 //!
 //! A row type is declared once by the macro `table!`; the column list, the reading order and the cells follow from it.
 
@@ -84,7 +84,7 @@ pub enum ColumnType {
     F64List,
 }
 
-/// One column: part of the contract with readers.
+/// One column; part of the public contract.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Column {
     /// Name, snake case, unit at the end.
@@ -95,16 +95,16 @@ pub struct Column {
     pub key: bool,
     /// Unit (`m`, `m/s2`, `deg`, `1` for pure numbers, empty for words).
     pub unit: &'static str,
-    /// What it is.
+    /// Description.
     pub description: &'static str,
 }
 
-/// One table: part of the contract with readers.
+/// One table; part of the public contract.
 #[derive(Clone, Copy, Debug, Serialize)]
 pub struct Table {
     /// Folder name under `tables/`.
     pub name: &'static str,
-    /// What a row is.
+    /// Description of a row.
     pub description: &'static str,
     /// Columns in order.
     pub columns: &'static [Column],
@@ -161,6 +161,15 @@ pub const ALL: [&Table; 31] = [
 ];
 
 /// The table of that name.
+///
+/// ```
+/// use sastrugi_schemas::tables::by_name;
+///
+/// let missions = by_name("missions").unwrap();
+/// let time = &missions.columns[missions.position("time_s").unwrap()];
+/// assert_eq!((missions.key_count(), time.unit), (2, "s"));
+/// assert!(by_name("mission").is_none());
+/// ```
 pub fn by_name(name: &str) -> Option<&'static Table> {
     ALL.into_iter().find(|t| t.name == name)
 }
@@ -175,7 +184,7 @@ pub enum Cell {
     Bool(bool),
     /// Integer.
     I64(i64),
-    /// Float. NaN is stored as null: a figure is known or it is not.
+    /// Float. NaN is stored as null: a value is known or unknown.
     F64(f64),
     /// Text.
     Text(String),
@@ -185,7 +194,7 @@ pub enum Cell {
     F64List(Vec<f64>),
 }
 
-/// The order of two rows by their keys, which stand in the same columns.
+/// Compares two rows by their keys, which are in the same columns.
 pub fn compare_keys(a: &[Cell], b: &[Cell]) -> Ordering {
     let pairs = a.iter().zip(b).map(|(a, b)| match (a, b) {
         (Cell::Text(a), Cell::Text(b)) => a.cmp(b),
@@ -197,7 +206,20 @@ pub fn compare_keys(a: &[Cell], b: &[Cell]) -> Ordering {
     pairs.fold(Ordering::Equal, Ordering::then)
 }
 
-/// Rows of several files of a table, each sorted, in the order of their keys.
+/// Sorts the rows of several files of a table, each of them sorted, by their keys.
+///
+/// ```
+/// use sastrugi_schemas::tables::{ParameterRow, in_order};
+///
+/// let row = |traverse_id: &str, parameter: &str| ParameterRow {
+///     traverse_id: traverse_id.to_owned(),
+///     parameter: parameter.to_owned(),
+///     value: "1".to_owned(),
+///     source: None,
+/// };
+/// let sorted = in_order(vec![row("b", "x"), row("a", "y"), row("a", "x")]);
+/// assert_eq!(sorted, [row("a", "x"), row("a", "y"), row("b", "x")]);
+/// ```
 pub fn in_order<R: Record>(rows: Vec<R>) -> Vec<R> {
     let keys = |row: &R| {
         let mut cells = row.cells();
@@ -220,11 +242,11 @@ pub trait Record: Clone + Send {
         let value = |(column, cell): (&Column, Cell)| (column.name.to_owned(), json!(cell));
         Self::TABLE.columns.iter().zip(self.cells()).map(value).collect::<Map<String, Value>>().into()
     }
-    /// A row from its values in column order; `None` when a value has the wrong type or a key is null.
+    /// A row from its values in column order; `None` if a value has the wrong type or a key is null.
     fn from_cells(cells: Vec<Cell>) -> Option<Self>;
 }
 
-/// How a field type is stored.
+/// Storage of a field type.
 pub trait CellType: Sized {
     /// Storage type.
     const TYPE: ColumnType;
@@ -302,7 +324,7 @@ impl<T: CellType> CellType for Option<T> {
     }
 }
 
-/// The name of a column, where one is given.
+/// The name of a column, if given.
 macro_rules! name_of {
     () => {
         None
@@ -374,7 +396,7 @@ pub(crate) use table;
 mod tests {
     use super::*;
 
-    /// Keys pass through the records of the work area as JSON.
+    /// Keys survive a round trip through JSON, the format of records in the work area.
     #[test]
     fn val_cells_pass_through_json() {
         let text = |word: &str| Cell::Text(word.to_owned());
@@ -393,5 +415,98 @@ mod tests {
         let text = serde_json::to_string(&cells).unwrap();
         assert_eq!(text, "[null,true,9223372036854775807,-1,1.0,-0.25,\"\",\"12\",\"null\",[0.5]]");
         assert_eq!(serde_json::from_str::<Vec<Cell>>(&text).unwrap(), cells);
+    }
+
+    /// Names are found once, keys stand first and are words or whole numbers, and every column is described.
+    #[test]
+    fn val_tables_keep_their_contract() {
+        let mut names: Vec<&str> = ALL.iter().map(|table| table.name).collect();
+        names.sort_unstable();
+        names.dedup();
+        assert_eq!(names.len(), ALL.len());
+        for table in ALL {
+            assert_eq!(by_name(table.name).map(|found| found.description), Some(table.description));
+            assert!(table.key_count() > 0, "{}", table.name);
+            assert!(table.columns[table.key_count()..].iter().all(|column| !column.key), "{}: keys first", table.name);
+            assert!(table.file_per.is_none_or(|key| table.position(key) == Some(0)), "{}", table.name);
+            for (k, column) in table.columns.iter().enumerate() {
+                let name = format!("{}.{}", table.name, column.name);
+                assert_eq!(table.position(column.name), Some(k), "{name} is there twice");
+                assert!(column.description.ends_with(['.', ')']), "{name}: {}", column.description);
+                let is_word = matches!(column.column_type, ColumnType::Text | ColumnType::Bool);
+                assert!(!is_word || column.unit.is_empty(), "{name}: {}", column.unit);
+                if column.key {
+                    assert!(matches!(column.column_type, ColumnType::Text | ColumnType::I64), "{name}");
+                }
+            }
+        }
+    }
+
+    /// The end of a name tells the unit; the longest end counts.
+    #[test]
+    fn val_names_end_in_their_units() {
+        let ends = [
+            ("_cycles_m", "1/m"),
+            ("_per_m", "1/m"),
+            ("_n_m", "N m"),
+            ("_deg_s", "deg/s"),
+            ("_m_s2", "m/s2"),
+            ("_m2", "m2"),
+            ("_deg", "deg"),
+            ("_hz", "Hz"),
+            ("_m", "m"),
+        ];
+        let mut checked = 0;
+        for (table, column) in ALL.iter().flat_map(|table| table.columns.iter().map(move |column| (table, column))) {
+            if let Some((_, unit)) = ends.iter().find(|(end, _)| !column.key && column.name.ends_with(end)) {
+                assert_eq!(column.unit, *unit, "{}.{}", table.name, column.name);
+                checked += 1;
+            }
+        }
+        assert!(checked > 200, "{checked}");
+    }
+
+    fn parameter(traverse_id: &str, parameter: &str) -> ParameterRow {
+        let [traverse_id, parameter] = [traverse_id, parameter].map(str::to_owned);
+        ParameterRow { traverse_id, parameter, value: "1".to_owned(), source: None }
+    }
+
+    #[test]
+    fn val_rows_become_cells_and_return() {
+        let row = ParameterRow { source: Some("a paper".to_owned()), ..parameter("t", "p") };
+        let cells = row.cells();
+        assert_eq!(cells, ["t", "p", "1", "a paper"].map(|word| Cell::Text(word.to_owned())));
+        assert_eq!(ParameterRow::from_cells(cells.clone()).as_ref(), Some(&row));
+        assert_eq!(ParameterRow::from_cells(cells[..3].to_vec()), None);
+        // Of these only the source may be null.
+        for (k, null_is_read) in [(0, false), (1, false), (2, false), (3, true)] {
+            let mut cells = cells.clone();
+            cells[k] = Cell::Null;
+            assert_eq!(ParameterRow::from_cells(cells).is_some(), null_is_read, "{k}");
+        }
+        let mut wrong = cells.clone();
+        wrong[2] = Cell::I64(1);
+        assert_eq!(ParameterRow::from_cells(wrong), None);
+        // Integers and floats are not taken for each other.
+        assert_eq!((f64::from_cell(Cell::I64(1)), i64::from_cell(Cell::F64(1.0))), (None, None));
+        assert_eq!([1.5, f64::NAN].map(|value| value.to_cell()), [Cell::F64(1.5), Cell::Null]);
+        assert_eq!([Some(2_i64), None].map(|value| value.to_cell()), [Cell::I64(2), Cell::Null]);
+        assert_eq!(Option::<f64>::from_cell(Cell::Null), Some(None));
+        assert!(f64::from_cell(Cell::Null).is_some_and(f64::is_nan));
+    }
+
+    /// The first key counts before the second; rows with equal keys keep their order.
+    #[test]
+    fn val_rows_are_sorted_by_their_keys() {
+        let named = |a: &str, b: &str, value: &str| ParameterRow { value: value.to_owned(), ..parameter(a, b) };
+        let rows = vec![named("b", "a", "1"), named("a", "b", "2"), named("a", "a", "3"), named("a", "b", "4")];
+        let values: Vec<String> = in_order(rows).into_iter().map(|row| row.value).collect();
+        assert_eq!(values, ["3", "2", "4", "1"]);
+        let text = |word: &str| Cell::Text(word.to_owned());
+        assert_eq!(compare_keys(&[Cell::I64(9), text("a")], &[Cell::I64(10), text("a")]), Ordering::Less);
+        assert_eq!(compare_keys(&[text("10"), text("b")], &[text("9"), text("a")]), Ordering::Less);
+        assert_eq!(compare_keys(&[Cell::F64(-1.0)], &[Cell::F64(-2.0)]), Ordering::Greater);
+        assert_eq!(compare_keys(&[Cell::Bool(false)], &[Cell::Bool(true)]), Ordering::Less);
+        assert_eq!(compare_keys(&[text("a")], &[text("a")]), Ordering::Equal);
     }
 }

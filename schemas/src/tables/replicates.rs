@@ -1,7 +1,7 @@
 //! Table `replicates`.
 
 super::table! {
-    /// One row per start driven of a mission with several of them; the first is the drawn start.
+    /// One row per start of a mission with several starts; the first is the drawn one.
     "replicates" ReplicateRow {
         keys {
             /// Id of the terrain.
@@ -13,13 +13,13 @@ super::table! {
         }
         /// Label of the terrain.
         group: Option<String> [""],
-        /// What differs from the study's plain run, as in `missions`.
+        /// Swept parameters that differ from the study's plain run, as in `missions`.
         variant: Option<String> [""],
         /// Start point, easting.
         start_x_m: f64 ["m"],
         /// Start point, northing.
         start_y_m: f64 ["m"],
-        /// Direction in which the vehicle stands at the start, counterclockwise from east.
+        /// Heading of the vehicle at the start, counterclockwise from east.
         start_heading_deg: f64 ["deg"],
         /// `success`, `tipped`, `stuck`, `out_of_bounds` or `timeout`.
         outcome: String [""],

@@ -8,7 +8,7 @@ super::table! {
             terrain_id: String,
             /// Id of the route on that terrain.
             route_id: String,
-            /// `searched`: the path as the search found it; `smoothed`: the route.
+            /// `searched`: the path found by the search; `smoothed`: the route.
             form: String,
             /// Number of the point, from 0.
             point: i64,

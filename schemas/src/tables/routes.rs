@@ -1,19 +1,19 @@
 //! Table `routes`.
 
 super::table! {
-    /// One row per route that was planned.
+    /// One row per planned route.
     "routes" RouteRow {
         keys {
             /// Id of the terrain.
             terrain_id: String,
-            /// Id of the route on that terrain: that of the route stage and the number of the pair, `<id>-0001`.
+            /// Id of the route on that terrain: id of the route stage and number of the pair, `<id>-0001`.
             route_id: String,
         }
         /// Label of the terrain.
         group: Option<String> [""],
-        /// What differs from the study's plain route: the swept parameters of the terrain and of the stage; null for the plain one.
+        /// Swept parameters of terrain and stage that differ from the study's plain route; null for the plain route.
         variant: Option<String> [""],
-        /// Routes with the same `pair_id` lead from the same start to the same goal.
+        /// Routes with the same `pair_id` have the same start and goal.
         pair_id: String [""],
         /// Id of the route stage.
         stage_id: String [""],
@@ -23,15 +23,15 @@ super::table! {
         neighbours: i64 ["1"],
         /// Height-difference threshold of the roadmap's vertices; null without one (NoHDT), and for other methods.
         threshold_m: f64 ["m"],
-        /// What travel costs: `slope`, `energy`, `class`, `band_rms` or `raster`.
+        /// Cost function: `slope`, `energy`, `class`, `band_rms` or `raster`.
         cost: String [""],
-        /// Vehicle whose limits of slope hold; null where the study states them.
+        /// Vehicle whose slope limits apply; null if the study states the limits.
         vehicle: Option<String> [""],
-        /// Steepest slope that may be climbed.
+        /// Largest slope uphill that is allowed.
         max_up_deg: f64 ["deg"],
-        /// Steepest slope that may be descended.
+        /// Largest slope downhill that is allowed.
         max_down_deg: f64 ["deg"],
-        /// Width of the team that the route makes room for; null without one.
+        /// Width of the team for which the route leaves room; null without a team.
         width_m: f64 ["m"],
         /// Start point, easting.
         start_x_m: f64 ["m"],
@@ -43,25 +43,25 @@ super::table! {
         goal_y_m: f64 ["m"],
         /// Straight horizontal distance from start to goal.
         straight_m: f64 ["m"],
-        /// `found`, `no_path`, or `budget` where an anytime search used up its expansions before it found a path.
+        /// `found`, `no_path`, or `budget` if an anytime search used up its expansions before finding a path.
         outcome: String [""],
         /// Cells of the terrain that may be entered.
         free_cells: i64 ["1"],
-        /// Vertices searched: of the roadmap, or the free cells.
+        /// Number of vertices of the search graph: those of the roadmap, or the free cells.
         vertices: i64 ["1"],
         /// Directed edges between them.
         edges: i64 ["1"],
-        /// Vertices among them that were added to connect what the ground connects.
+        /// Number of vertices added to restore connections that exist on the ground.
         repaired: i64 ["1"],
-        /// Vertices whose edges the search looked at.
+        /// Number of vertices expanded by the search.
         expansions: i64 ["1"],
-        /// Cost of the path as the search counts it, in metres of level ground.
+        /// Cost of the path in the search, in metres of level ground.
         search_cost_m: f64 ["m"],
-        /// Upper bound of that cost over the least one: 1 where it is the least, null where none is known (Theta*).
+        /// Upper bound of that cost over the optimal cost: 1 if it is optimal, null if no bound is known (Theta*).
         cost_bound: f64 ["1"],
-        /// Cost of the same path along quarter cells, with the room beside it: comparable between methods.
+        /// Cost of the same path in steps of quarter cells, including lateral clearance; comparable between methods.
         path_cost_m: f64 ["m"],
-        /// Cost of the smoothed path along quarter cells.
+        /// Cost of the smoothed path in steps of quarter cells.
         smoothed_cost_m: f64 ["m"],
         /// Points of the path.
         path_points: i64 ["1"],

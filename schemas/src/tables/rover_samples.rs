@@ -4,7 +4,7 @@ super::table! {
     /// One row per sampled instant of a rover.
     "rover_samples" RoverSampleRow file per terrain_id {
         keys {
-            /// Id of the terrain, whose world the rover drives on.
+            /// Id of the terrain on whose world the rover drives.
             terrain_id: String,
             /// Id of the rover on that terrain.
             rover_id: String,
@@ -21,23 +21,23 @@ super::table! {
         x_m: f64 ["m"],
         /// Northing.
         y_m: f64 ["m"],
-        /// Height of the plane of the wheels' contacts at the centre.
+        /// Height of the plane through the wheel contacts at the centre.
         z_m: f64 ["m"],
         /// Heading, counterclockwise from east.
         heading_deg: f64 ["deg"],
-        /// Left side up.
+        /// Roll, left side up positive.
         roll_deg: f64 ["deg"],
-        /// Nose down.
+        /// Pitch, nose down positive.
         pitch_deg: f64 ["deg"],
-        /// What the navigator is at.
+        /// State of the navigator.
         state: String [""],
-        /// Areas that it sees, from left to right: 1 for a hazard, 0 for none.
+        /// Areas in view, from left to right: 1 for a hazard, 0 for none.
         hazards: String [""],
-        /// Easting that it believes to have.
+        /// Easting estimated by the rover.
         believed_x_m: f64 ["m"],
-        /// Northing that it believes to have.
+        /// Northing estimated by the rover.
         believed_y_m: f64 ["m"],
-        /// `train`, `validation` or `test` (`[study] split`); null where the study does not split its terrains, or leaves this one out.
+        /// `train`, `validation` or `test` (`[study] split`); null if the study has no splits or leaves this terrain out.
         split: Option<String> [""],
     }
 }

@@ -1,19 +1,19 @@
 //! Table `rovers`.
 
 super::table! {
-    /// One row per rover that made its own way.
+    /// One row per rover.
     "rovers" RoverRow {
         keys {
-            /// Id of the terrain, whose world the rover drove on.
+            /// Id of the terrain on whose world the rover drove.
             terrain_id: String,
-            /// Id of the rover on that terrain: that of the rover stage and its number, `<id>-0001`.
+            /// Id of the rover on that terrain: id of the rover stage and number of the rover, `<id>-0001`.
             rover_id: String,
         }
         /// Label of the terrain.
         group: Option<String> [""],
-        /// What differs from the study's plain trial: the swept parameters of terrain and rover; null for the plain one.
+        /// Swept parameters of terrain and rover that differ from the study's plain trial; null for the plain trial.
         variant: Option<String> [""],
-        /// `train`, `validation` or `test` (`[study] split`); null where the study does not split its terrains, or leaves this one out.
+        /// `train`, `validation` or `test` (`[study] split`); null if the study has no splits or leaves this terrain out.
         split: Option<String> [""],
         /// Id of the rover stage.
         stage_id: String [""],
@@ -31,22 +31,22 @@ super::table! {
         goal_y_m: f64 ["m"],
         /// Distance from start to goal.
         straight_m: f64 ["m"],
-        /// `reached`, `lost` (it believed to be at the goal), `no_way` (it knew of none), `distance_limit`, `cycle_limit`, or `off_ground`.
+        /// `reached`, `lost` (it wrongly believed to be at the goal), `no_way` (it knew no way on), `distance_limit`, `cycle_limit`, or `off_ground`.
         outcome: String [""],
-        /// Distance driven, back included.
+        /// Distance driven, including reverse.
         distance_m: f64 ["m"],
-        /// Distance to the goal at the end.
+        /// Remaining distance to the goal at the end.
         residual_m: f64 ["m"],
         /// `straight_m` over `distance_m` + `residual_m`.
         efficiency: f64 ["1"],
-        /// The same had it stopped after half of the distance limit.
+        /// The efficiency if the rover had stopped after half of the distance limit.
         efficiency_half_limit: f64 ["1"],
-        /// Farthest that it may drive.
+        /// Maximum distance allowed.
         distance_limit_m: f64 ["m"],
-        /// Shortest way to the goal for a rover that knows the whole map; null where there is none. `straight_m` over it is the efficiency that the
-        /// ground allows.
+        /// Length of the shortest path to the goal for a rover that knows the complete map; null if there is none. `straight_m` over this length is
+        /// the highest efficiency that the ground allows.
         oracle_m: f64 ["m"],
-        /// `found`, or `none` where no way exists that keeps the wheels clear of rocks above the clearance and off steep sand.
+        /// `found`, or `none` if no path keeps the wheels clear of rocks above the clearance and off steep sand.
         oracle: String [""],
         /// Time driving and turning.
         time_s: f64 ["s"],
@@ -56,15 +56,15 @@ super::table! {
         turns: i64 ["1"],
         /// Sum of all turns.
         turned_deg: f64 ["deg"],
-        /// Drives back.
+        /// Number of reverse drives.
         reversals: i64 ["1"],
         /// Cycles with a hazard in view.
         hazards: i64 ["1"],
-        /// Rocks above the clearance that came under the rover.
+        /// Number of rocks above the clearance that came under the rover.
         contacts: i64 ["1"],
-        /// Of those, the ones under its centre line.
+        /// Number of those under its centre line.
         centre_contacts: i64 ["1"],
-        /// Clearance that contacts are judged by.
+        /// Clearance above which a rock counts as a contact.
         clearance_m: f64 ["m"],
         /// Largest tilt.
         max_tilt_deg: f64 ["deg"],
@@ -76,9 +76,9 @@ super::table! {
         rms_pitch_rate_deg_s: f64 ["deg/s"],
         /// Root mean square of the derivative of the roll angle, at 1 Hz.
         rms_roll_rate_deg_s: f64 ["deg/s"],
-        /// Why it went no farther, in words; null for rovers that reached the goal.
+        /// Why the rover stopped; null if it reached the goal.
         note: Option<String> [""],
-        /// MCAP recording in the release; null where it was not recorded.
+        /// MCAP recording in the release; null if not recorded.
         path: Option<String> [""],
     }
 }

@@ -1,7 +1,7 @@
 //! Table `samples`.
 //!
-//! Forces and the controller's state are quantised as in the topics `/wheels` and `/command`: finer than any sensor's noise,
-//! and short to compress.
+//! Forces and the controller's state are quantised as in the topics `/wheels` and `/command`: more finely than the noise of any
+//! sensor, and easy to compress.
 
 super::table! {
     /// One row per recorded instant of a mission: base_link in the map frame, the commands, the wheels. A list has one value
@@ -53,7 +53,7 @@ super::table! {
         command_speed_m_s: f64 ["m/s"],
         /// Commanded yaw rate.
         command_yaw_rate_deg_s: f64 ["deg/s"],
-        /// Roughness class code under base_link (0 low, 1 semi, 2 high); null outside of the map.
+        /// Roughness class code under base_link (0 low, 1 semi, 2 high); null outside the map.
         class: Option<i64> [""],
         /// Distance from the mission line, left positive, in steps of 1/1024.
         cross_track_m: f64 ["m"],
@@ -61,15 +61,15 @@ super::table! {
         heading_error_deg: f64 ["deg"],
         /// Distance to the goal, in steps of 1/1024.
         distance_to_goal_m: f64 ["m"],
-        /// Size of the force of the ground on the chassis, in steps of 1/4.
+        /// Magnitude of the ground force on the chassis, in steps of 1/4.
         chassis_force_n: f64 ["N"],
-        /// Force of the ground on each wheel along the contact normal, 0 without contact, in steps of 1/4.
+        /// Ground force on each wheel along the contact normal, 0 without contact, in steps of 1/4.
         wheel_normal_force_n: Vec<f32> ["N"],
-        /// Force of the ground on each wheel along its rolling direction, in steps of 1/4.
+        /// Ground force on each wheel along its rolling direction, in steps of 1/4.
         wheel_longitudinal_force_n: Vec<f32> ["N"],
-        /// Force of the ground on each wheel across its rolling direction, left positive, in steps of 1/4.
+        /// Ground force on each wheel across its rolling direction, left positive, in steps of 1/4.
         wheel_lateral_force_n: Vec<f32> ["N"],
-        /// Slip ratio of each wheel: rim speed less ground speed over the larger of the two, in steps of 1/4096.
+        /// Slip ratio of each wheel: rim speed minus ground speed, over the larger of the two, in steps of 1/4096.
         wheel_slip_ratio: Vec<f32> ["1"],
         /// Spin of each wheel, in steps of 1/1024.
         wheel_spin_rad_s: Vec<f32> ["rad/s"],
@@ -83,9 +83,9 @@ super::table! {
         wheel_contact_y_m: Vec<f64> ["m"],
         /// Height of each wheel's contact point, in steps of 1/1024; null without contact.
         wheel_contact_z_m: Vec<f64> ["m"],
-        /// How the mission ends: `success`, `tipped`, `stuck`, `out_of_bounds` or `timeout`.
+        /// Outcome of the mission: `success`, `tipped`, `stuck`, `out_of_bounds` or `timeout`.
         outcome: String [""],
-        /// `train`, `validation` or `test` (`[study] split`); null where the study does not split its terrains, or leaves this one out.
+        /// `train`, `validation` or `test` (`[study] split`); null if the study has no splits or leaves this terrain out.
         split: Option<String> [""],
     }
 }

@@ -6,7 +6,7 @@ super::table! {
         keys {
             /// Id of the surface (table `surfaces`).
             surface_id: String,
-            /// `all` for rings in every direction, `x` east-west, `y` north-south.
+            /// `all` for rings over all directions, `x` east-west, `y` north-south.
             direction: String,
             /// Number of the lag, from 0.
             bin: i64,

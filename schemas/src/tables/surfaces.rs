@@ -1,18 +1,18 @@
 //! Table `surfaces`.
 
 super::table! {
-    /// One row per described surface, above its least-squares plane: every heightfield (dem, terrain, texture), the
-    /// residual of every fit, and every texture detrended and trimmed as that residual was (figures of ISO 25178-2).
+    /// One row per surface, relative to its least-squares plane: every heightfield (dem, terrain, texture), the residual of
+    /// every fit, and every texture detrended and trimmed like that residual (parameters of ISO 25178-2).
     "surfaces" SurfaceRow {
         keys {
             /// Id of the heightfield, of the fit for its residual, or `<texture>.residual`.
             surface_id: String,
         }
-        /// `dem`, `terrain` or `texture`; `fit` for the residual of a measured DEM; `texture_residual` for a texture detrended and trimmed as the DEM of its fit was.
+        /// `dem`, `terrain` or `texture`; `fit` for the residual of a measured DEM; `texture_residual` for a texture detrended and trimmed like the DEM of its fit.
         stage: String [""],
-        /// The fit whose window and trimming it went through; null for a heightfield as it is.
+        /// The fit whose window and trimming were applied; null for an unmodified heightfield.
         fit_id: Option<String> [""],
-        /// Cell size east-west: slopes and extremes depend on it.
+        /// Cell size east-west; slopes and extremes depend on it.
         cell_x_m: f64 ["m"],
         /// Cell size north-south.
         cell_y_m: f64 ["m"],
@@ -40,11 +40,11 @@ super::table! {
         rms_slope_x: f64 ["1"],
         /// Root mean square slope north-south.
         rms_slope_y: f64 ["1"],
-        /// Autocorrelation length Sal: the shortest distance at which the autocorrelation falls to 0.2; null where it does not.
+        /// Autocorrelation length Sal: the shortest distance at which the autocorrelation falls to 0.2; null if it does not.
         sal_m: f64 ["m"],
-        /// Texture aspect ratio Str: that distance over the longest one; 1 for a texture without direction, null where it does not fall in every direction.
+        /// Texture aspect ratio Str: that distance over the longest one; 1 for an isotropic texture, null if the autocorrelation does not fall in every direction.
         aspect_ratio: f64 ["1"],
-        /// Texture direction Std: along ridges and furrows, clockwise from north, in [0, 180); without meaning where the aspect ratio is near 1.
+        /// Texture direction Std: along ridges and furrows, clockwise from north, in [0, 180); meaningless if the aspect ratio is near 1.
         direction_deg: f64 ["deg"],
         /// Hurst exponent from the structure function along x and y.
         hurst_exponent: f64 ["1"],

@@ -9,16 +9,15 @@ super::table! {
         }
         /// Label for statistics.
         group: Option<String> [""],
-        /// What differs from other terrains of the group: the swept parameters, as `z_scale_percent = 1.0`; null for plain
-        /// terrains.
+        /// Swept parameters that differ from other terrains of the group, such as `z_scale_percent = 1.0`; null for plain terrains.
         variant: Option<String> [""],
-        /// `train`, `validation` or `test` (`[study] split`); null where the study parts no terrains, or not this one.
+        /// `train`, `validation` or `test` (`[study] split`); null if the study has no splits or leaves this terrain out.
         split: Option<String> [""],
-        /// `terrain`, `dem` or `texture`: the stage that made it.
+        /// `terrain`, `dem` or `texture`: the stage that produced it.
         stage: String [""],
         /// Generator, or the file format of a measured DEM.
         kind: String [""],
-        /// Full checked parameters as JSON.
+        /// All parameters after checking, as JSON.
         params: String [""],
         /// Rows (north to south).
         rows: i64 ["1"],
@@ -34,7 +33,7 @@ super::table! {
         height_min_m: f64 ["m"],
         /// Highest height.
         height_max_m: f64 ["m"],
-        /// Highest less lowest height.
+        /// Highest minus lowest height.
         relief_m: f64 ["m"],
         /// Standard deviation of the heights about their mean.
         rms_height_m: f64 ["m"],
@@ -48,17 +47,17 @@ super::table! {
         band_rms_m: f64 ["m"],
         /// Window of that moving average.
         band_window_m: f64 ["m"],
-        /// Share of low roughness, without the border.
+        /// Share of low roughness, excluding the border.
         share_low: f64 ["1"],
-        /// Share of semi roughness, without the border.
+        /// Share of semi roughness, excluding the border.
         share_semi: f64 ["1"],
-        /// Share of high roughness, without the border.
+        /// Share of high roughness, excluding the border.
         share_high: f64 ["1"],
-        /// Border left out of the shares.
+        /// Border excluded from the shares.
         share_border_m: f64 ["m"],
         /// Slope of the radially averaged 2-D power spectral density in log-log axes.
         psd_slope: f64 ["1"],
-        /// Random stream words.
+        /// Label of the random stream.
         stream: Option<String> [""],
         /// Heightfield in the release.
         path: String [""],

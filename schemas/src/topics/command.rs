@@ -7,7 +7,7 @@ use super::{Topic, field};
 pub const TOPIC: Topic = Topic {
     name: "/command",
     schema: "sastrugi.Command",
-    description: "command and state of the controller, at the sampling rate; all but the speed in steps of 1/1024",
+    description: "command and state of the controller, at the sampling rate; all values except the speed in steps of 1/1024",
     fields: &[
         field("speed_m_s", Float, "m/s", "commanded forward speed"),
         field("yaw_rate_rad_s", Float, "rad/s", "commanded yaw rate"),

@@ -6,6 +6,6 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/events",
     schema: "foxglove.Log",
-    description: "what happened: start and outcome, with the kind of event as `name`",
+    description: "events of the mission: start and outcome, with the kind of event as `name`",
     fields: &[],
 };

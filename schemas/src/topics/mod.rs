@@ -1,6 +1,6 @@
-//! MCAP topics of a release and the recordings of a mission, of a team and of a rover that fill them.
+//! MCAP topics of a release, and the recordings of missions, teams and rovers that fill them.
 //!
-//! ROS 2 flavour: see [`ros2`]. Viewer flavour: Foxglove's public protobuf messages where there is one, own protobuf messages (package `sastrugi`)
+//! ROS 2 flavour: see [`ros2`]. Viewer flavour: Foxglove's public protobuf messages where they exist, own protobuf messages (package `sastrugi`)
 //! for the rest. Each own message starts with field 1, `timestamp` (google.protobuf.Timestamp); the listed fields
 //! follow as numbers 2, 3 ... A field is appended, never renumbered, renamed or removed.
 
@@ -46,14 +46,14 @@ pub use team::{
 
 use serde::Serialize;
 
-/// One topic: part of the contract with readers.
+/// One topic; part of the public contract.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize)]
 pub struct Topic {
-    /// Name, as `/vehicle/state`; with [`MEMBER`] in it, a topic of every member of a team.
+    /// Name, such as `/vehicle/state`; if it contains [`MEMBER`], every member of a team has this topic.
     pub name: &'static str,
-    /// Full name of its message, as `foxglove.SceneUpdate` or `sastrugi.VehicleState`.
+    /// Full name of its message, such as `foxglove.SceneUpdate` or `sastrugi.VehicleState`.
     pub schema: &'static str,
-    /// What a message is, and when one is written.
+    /// Content of a message, and when it is written.
     pub description: &'static str,
     /// Fields of an own message; empty for a public one.
     pub fields: &'static [Field],
@@ -61,6 +61,13 @@ pub struct Topic {
 
 impl Topic {
     /// Its name for a member of a team.
+    ///
+    /// ```
+    /// use sastrugi_schemas::topics::ros2::{MEMBER_ODOM, TEAM_EVENTS};
+    ///
+    /// assert_eq!(MEMBER_ODOM.of_member("member_2"), "/member_2/odom");
+    /// assert_eq!(TEAM_EVENTS.of_member("member_2"), "/events");
+    /// ```
     pub fn of_member(&self, member: &str) -> String {
         self.name.replace(MEMBER, member)
     }
@@ -75,7 +82,7 @@ pub struct Field {
     pub kind: FieldKind,
     /// Unit (`m`, `rad/s`, `1` for pure numbers, empty for words).
     pub unit: &'static str,
-    /// What it is.
+    /// Description.
     pub description: &'static str,
 }
 
@@ -97,7 +104,7 @@ pub enum FieldKind {
     Texts,
 }
 
-/// What stands for a member's name in the name of a topic.
+/// Placeholder for a member's name in the name of a topic.
 pub const MEMBER: &str = "{member}";
 
 /// All topics of a mission in the viewer flavour, in the order of their channels.
@@ -143,7 +150,51 @@ pub const ROVER_VIEWER: [&Topic; 10] = [
     &rover_events::TOPIC,
 ];
 
-/// A field; keeps the lists of the topics readable.
+/// Constructor that keeps the field lists of topics short.
 const fn field(name: &'static str, kind: FieldKind, unit: &'static str, description: &'static str) -> Field {
     Field { name, kind, unit, description }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::ros2::{ROS2, ROVER_ROS2, TEAM_ROS2};
+    use super::*;
+    use std::collections::{BTreeMap, BTreeSet};
+
+    /// Names once in each recording; own messages have fields, public ones none; messages of one name have the same fields everywhere.
+    #[test]
+    fn val_topics_keep_their_contract() {
+        let mut own: BTreeMap<&str, &[Field]> = BTreeMap::new();
+        for topics in [&VIEWER[..], &ROS2, &TEAM_VIEWER, &TEAM_ROS2, &ROVER_VIEWER, &ROVER_ROS2] {
+            let names: BTreeSet<&str> = topics.iter().map(|topic| topic.name).collect();
+            assert_eq!(names.len(), topics.len(), "{names:?}");
+            for topic in topics {
+                assert!(topic.name.starts_with('/') && !topic.description.is_empty(), "{}", topic.name);
+                let is_own = topic.schema.starts_with("sastrugi.");
+                assert_eq!(is_own, !topic.fields.is_empty(), "{} {}", topic.name, topic.schema);
+                let fields: BTreeSet<&str> = topic.fields.iter().map(|field| field.name).collect();
+                assert_eq!(fields.len(), topic.fields.len(), "{}: {fields:?}", topic.name);
+                if is_own {
+                    assert_eq!(*own.entry(topic.schema).or_insert(topic.fields), topic.fields, "{}", topic.schema);
+                }
+            }
+        }
+        assert!(own.len() > 3, "{:?}", own.keys());
+        // ROS 2 messages are public.
+        for topic in [&ROS2[..], &TEAM_ROS2, &ROVER_ROS2].concat() {
+            assert!(topic.schema.contains("/msg/"), "{}", topic.schema);
+        }
+    }
+
+    #[test]
+    fn val_names_of_events() {
+        use EventKind::{OutOfBounds, Stuck, Success, Timeout, Tipped};
+        for event in [Success, Tipped, Stuck, OutOfBounds, Timeout] {
+            assert_eq!(EventKind::outcome(event.name()), Some(event));
+        }
+        assert_eq!((EventKind::outcome("start"), EventKind::outcome("")), (None, None));
+        for kind in TeamEventKind::ALL {
+            assert_eq!(serde_json::to_value(kind).unwrap(), kind.name());
+        }
+    }
 }

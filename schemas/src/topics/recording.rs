@@ -1,5 +1,5 @@
-//! What one mission leaves behind: the only form in which a simulated run passes from the vehicle model to tables and
-//! MCAP files. Times count from the mission's start. Frames: map (x east, y north, z up), base_link (x forward, y left,
+//! The recording of a mission: the only form in which a simulated run passes from the vehicle model to tables and MCAP
+//! files. Times count from the mission's start. Frames: map (x east, y north, z up), base_link (x forward, y left,
 //! z up).
 
 use serde::{Deserialize, Serialize};
@@ -7,28 +7,28 @@ use serde::{Deserialize, Serialize};
 /// A recorded mission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Recording {
-    /// The vehicle as drawn.
+    /// Outline of the vehicle.
     pub vehicle: VehicleOutline,
     /// Rate of `states`, `wheels` and `commands`, Hz.
     pub sample_rate_hz: f64,
     /// Rate of `imu`, Hz.
     pub imu_rate_hz: f64,
-    /// Pose and motion of base_link, at `sample_rate_hz` from time 0 on.
+    /// Pose and motion of base_link, at `sample_rate_hz` from time 0.
     pub states: Vec<StateSample>,
-    /// Inertial measurements, at `imu_rate_hz` from time 0 on.
+    /// Inertial measurements, at `imu_rate_hz` from time 0.
     pub imu: Vec<ImuSample>,
     /// Wheels, at `sample_rate_hz`.
     pub wheels: Vec<WheelSample>,
     /// Commands and controller state, at `sample_rate_hz`.
     pub commands: Vec<CommandSample>,
-    /// What happened, in order of time; the last one is the outcome.
+    /// Events in order of time; the last one is the outcome.
     pub events: Vec<Event>,
 }
 
 /// Outline of a vehicle for viewers.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct VehicleOutline {
-    /// Name, as `husky_a200`.
+    /// Name, such as `husky_a200`.
     pub name: String,
     /// Size of the chassis box along x, y, z, m.
     pub chassis_size_m: [f64; 3],
@@ -38,10 +38,10 @@ pub struct VehicleOutline {
     pub wheels: Vec<WheelOutline>,
 }
 
-/// One wheel as drawn.
+/// Outline of one wheel.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct WheelOutline {
-    /// Frame name, as `front_left_wheel`.
+    /// Frame name, such as `front_left_wheel`.
     pub name: String,
     /// Hub in base_link with all joints of the suspension at zero, m.
     pub hub_m: [f64; 3],
@@ -51,14 +51,14 @@ pub struct WheelOutline {
     pub width_m: f64,
 }
 
-/// Pose and motion of base_link, as simulated in steps of 2^-20 m (and of a quaternion's unit) and 2^-16 m/s or rad/s.
+/// Pose and motion of base_link, quantised to 2^-20 m (and quaternion units) and 2^-16 m/s or rad/s.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct StateSample {
     /// Time, s.
     pub time_s: f64,
     /// Position in the map frame, m.
     pub position_m: [f64; 3],
-    /// Orientation quaternion (map from base_link) `[x, y, z, w]`, of unit length to those steps.
+    /// Orientation quaternion (map from base_link) `[x, y, z, w]`, of unit length within these steps.
     pub orientation: [f64; 4],
     /// Velocity in the map frame, m/s.
     pub velocity_m_s: [f64; 3],
@@ -86,7 +86,7 @@ pub struct WheelSample {
     pub time_s: f64,
     /// Wheels in the order of [`VehicleOutline::wheels`].
     pub wheels: Vec<WheelState>,
-    /// Size of the force of the ground on the chassis, N.
+    /// Magnitude of the ground force on the chassis, N.
     pub chassis_force_n: f64,
 }
 
@@ -105,13 +105,13 @@ pub struct WheelState {
     pub longitudinal_force_n: f64,
     /// Ground force across the rolling direction (left positive), N.
     pub lateral_force_n: f64,
-    /// Longitudinal slip ratio (rim speed less ground speed over the larger of the two), in [-1, 1] for forward driving.
+    /// Longitudinal slip ratio (rim speed minus ground speed, over the larger of the two), in [-1, 1] for forward driving.
     pub slip_ratio: f64,
     /// Contact point in the map frame, m; meaningless without contact.
     pub contact_m: [f64; 3],
     /// Steering angle about the body's z axis, rad (left positive).
     pub steering_rad: f64,
-    /// Hub in base_link, m: where the suspension has it.
+    /// Hub in base_link as displaced by the suspension, m.
     pub hub_m: [f64; 3],
 }
 
@@ -132,22 +132,22 @@ pub struct CommandSample {
     pub distance_to_goal_m: f64,
 }
 
-/// Something that happened.
+/// An event.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Event {
     /// Time, s.
     pub time_s: f64,
-    /// What.
+    /// Kind.
     pub kind: EventKind,
-    /// One sentence with the figures.
+    /// One sentence with the numbers.
     pub text: String,
 }
 
-/// Kinds of events; every kind but `Start` ends a mission.
+/// Kinds of events; every kind except `Start` ends a mission.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum EventKind {
-    /// The clock starts, the vehicle at rest.
+    /// The clock starts, with the vehicle at rest.
     Start,
     /// The goal was reached.
     Success,
@@ -155,14 +155,14 @@ pub enum EventKind {
     Tipped,
     /// Too little motion for too long.
     Stuck,
-    /// The vehicle left the terrain or stands on cells without data.
+    /// The vehicle left the terrain or is on cells without data.
     OutOfBounds,
-    /// Out of time.
+    /// The time limit was reached.
     Timeout,
 }
 
 impl EventKind {
-    /// The ends of missions by name; `None` for other words.
+    /// The outcome of that name; `None` for other words.
     pub fn outcome(name: &str) -> Option<Self> {
         let ends = [Self::Success, Self::Tipped, Self::Stuck, Self::OutOfBounds, Self::Timeout];
         ends.into_iter().find(|end| end.name() == name)

@@ -1,5 +1,5 @@
-//! What one drive of a rover leaves behind for MCAP files. Times count from its start. Frames: map (x east, y north, z up), base_link (x
-//! forward, y left, z up) at the centre of the plane of the wheels' contacts.
+//! The recording of a rover's drive, for MCAP files. Times count from its start. Frames: map (x east, y north, z up), base_link (x
+//! forward, y left, z up) at the centre of the plane through the wheel contacts.
 
 use super::StateSample;
 use serde::{Deserialize, Serialize};
@@ -7,17 +7,17 @@ use serde::{Deserialize, Serialize};
 /// A recorded drive of a rover.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct RoverRecording {
-    /// Axles ahead of and behind the centre, m.
+    /// Distance of the axles ahead of and behind the centre, m.
     pub axle_m: f64,
-    /// Wheels beside the centre line, m.
+    /// Distance of the wheels from the centre line, m.
     pub track_m: f64,
-    /// Pose and motion of base_link, at [`RoverRecording::RATE_HZ`] from time 0 on.
+    /// Pose and motion of base_link, at [`RoverRecording::RATE_HZ`] from time 0.
     pub states: Vec<StateSample>,
-    /// What the rover saw and did, cycle by cycle.
+    /// View and actions of the rover, by cycle.
     pub cycles: Vec<RoverCycle>,
-    /// Planned ways, each from its time on; none for navigators without plans.
+    /// Planned paths, each valid from its time; none for navigators without a planner.
     pub plans: Vec<RoverPlan>,
-    /// What happened, in order of time; the last one is the outcome.
+    /// Events in order of time; the last one is the outcome.
     pub events: Vec<RoverEvent>,
 }
 
@@ -26,7 +26,7 @@ impl RoverRecording {
     pub const RATE_HZ: f64 = 1.0;
 }
 
-/// One cycle, as it was when the rover had looked and decided.
+/// One cycle, after the rover has sensed and decided.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoverCycle {
     /// Time, s.
@@ -37,36 +37,36 @@ pub struct RoverCycle {
     pub position_m: [f64; 3],
     /// Heading, counterclockwise from east, rad.
     pub heading_rad: f64,
-    /// Position that the rover believes to have, m.
+    /// Position estimated by the rover, m.
     pub believed_m: [f64; 2],
-    /// Heading that the rover believes to have, rad.
+    /// Heading estimated by the rover, rad.
     pub believed_heading_rad: f64,
-    /// Left side up and nose down, rad.
+    /// Roll (left side up positive) and pitch (nose down positive), rad.
     pub roll_pitch_rad: [f64; 2],
-    /// What the navigator is at.
+    /// State of the navigator.
     pub state: String,
-    /// Turn to the left and drive ahead of this cycle, as carried out: rad, m.
+    /// Executed turn (left positive, rad) and drive (ahead positive, m) of this cycle.
     pub moved: [f64; 2],
-    /// Their times, s.
+    /// Durations of turn and drive, s.
     pub durations_s: [f64; 2],
-    /// Driven before, m.
+    /// Distance driven before, m.
     pub distance_m: f64,
     /// Distance to the goal, m.
     pub goal_distance_m: f64,
-    /// Rocks above the clearance met so far.
+    /// Number of rocks above the clearance met so far.
     pub contacts: u32,
-    /// Areas that it sees, from left to right.
+    /// Areas in view, from left to right.
     pub areas: Vec<SeenArea>,
     /// Ranges, column by column from the left.
     pub rays: Vec<SeenRay>,
 }
 
-/// An area that a rover sees.
+/// An area in the rover's view.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeenArea {
     /// Corners in order around it, on the plane of the body, in the map frame, m.
     pub corners_m: [[f64; 3]; 4],
-    /// Whether it holds a hazard.
+    /// Whether it contains a hazard.
     pub hazard: bool,
 }
 
@@ -75,7 +75,7 @@ pub struct SeenArea {
 pub struct SeenRay {
     /// Origin in the map frame, m.
     pub from_m: [f64; 3],
-    /// Where it met the ground, or where it was given up, m.
+    /// Where it met the ground, or where it was cut off, m.
     pub to_m: [f64; 3],
     /// Whether it met the ground.
     pub hit: bool,
@@ -83,27 +83,27 @@ pub struct SeenRay {
     pub hazard: bool,
 }
 
-/// The way that a rover plans to take from a time on.
+/// A path planned by a rover, valid from its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoverPlan {
     /// Time, s.
     pub time_s: f64,
-    /// Way points in the map frame, m; the height is that of the rover.
+    /// Waypoints in the map frame, m; the height is that of the rover.
     pub points_m: Vec<[f64; 3]>,
 }
 
-/// Something that happened to a rover.
+/// An event of a rover.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct RoverEvent {
     /// Time, s.
     pub time_s: f64,
-    /// What.
+    /// Kind.
     pub kind: RoverEventKind,
     /// One sentence with the numbers.
     pub text: String,
 }
 
-/// Kinds of events of a rover; those from `Reached` on end a drive.
+/// Kinds of events of a rover; `Reached` and the following kinds end a drive.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum RoverEventKind {
@@ -113,21 +113,21 @@ pub enum RoverEventKind {
     Hazard,
     /// First turn in place after a drive.
     Turn,
-    /// A drive back.
+    /// A reverse drive.
     Reversal,
     /// A rock above the clearance came under the rover.
     Contact,
-    /// At the goal.
+    /// The goal was reached.
     Reached,
-    /// It believed to be at the goal, and was not.
+    /// The rover wrongly believed to be at the goal.
     Lost,
-    /// It knew of no way on.
+    /// The rover knew no way on.
     NoWay,
-    /// It drove as far as it may.
+    /// The distance limit was reached.
     DistanceLimit,
-    /// It took as many cycles as it may.
+    /// The cycle limit was reached.
     CycleLimit,
-    /// It looked or went beyond the ground that is known.
+    /// The rover looked or drove beyond the known ground.
     OffGround,
 }
 

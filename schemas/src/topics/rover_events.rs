@@ -6,6 +6,6 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/events",
     schema: "foxglove.Log",
-    description: "start, hazards that come into view, first turns, drives back, contacts and the end; the name of the event in `name`",
+    description: "start, hazards coming into view, first turns, reverse drives, contacts and the end, with the kind of event as `name`",
     fields: &[],
 };

@@ -6,6 +6,6 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/vehicle/path",
     schema: "foxglove.PosesInFrame",
-    description: "the whole path that the rover drove, a pose every 10 s and the last, in one message at the start",
+    description: "the complete path of the rover, one pose every 10 s and the last one, in one message at the start",
     fields: &[],
 };

@@ -6,6 +6,6 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/vehicle/plan",
     schema: "foxglove.PosesInFrame",
-    description: "the way that a rover with a planner plans to take, from where it believes to be; whenever that changes",
+    description: "the path planned by a rover with a planner, from its estimated position; whenever it changes",
     fields: &[],
 };

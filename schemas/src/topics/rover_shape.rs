@@ -6,6 +6,6 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/vehicle/shape",
     schema: "foxglove.SceneUpdate",
-    description: "body and wheels of the rover in base_link, start and goal in map, one message at the start",
+    description: "body and wheels of the rover in base_link; start and goal in map; one message at the start",
     fields: &[],
 };

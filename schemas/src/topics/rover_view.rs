@@ -6,6 +6,6 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/sensor/view",
     schema: "foxglove.SceneUpdate",
-    description: "what the rover sees, in map: areas and rays in the colour of their hazard (red: a hazard, green: none, grey: a ray that met nothing); once a cycle",
+    description: "the rover's view, in map: areas and rays coloured by hazard (red: a hazard, green: none, grey: a ray that met nothing); once per cycle",
     fields: &[],
 };

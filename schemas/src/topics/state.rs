@@ -7,7 +7,7 @@ use super::{Topic, field};
 pub const TOPIC: Topic = Topic {
     name: "/vehicle/state",
     schema: "sastrugi.VehicleState",
-    description: "pose and motion of base_link, at the sampling rate; the numbers of table `samples`",
+    description: "pose and motion of base_link, at the sampling rate; same values as in the table `samples`",
     fields: &[
         field("x_m", Double, "m", "position in the map frame, east"),
         field("y_m", Double, "m", "position in the map frame, north"),

@@ -1,6 +1,6 @@
-//! What one run of a team leaves behind: the only form in which it passes from the planner to MCAP files. Times count from the
+//! The recording of a team's run: the only form in which it passes from the planner to MCAP files. Times count from the
 //! run's start. Frames: map (x east, y north, z up) and one per member (x forward along its heading, y left, z up; no roll or
-//! pitch), at the point of the ground that it stands on.
+//! pitch), at its ground point.
 
 use serde::{Deserialize, Serialize};
 
@@ -9,25 +9,25 @@ use serde::{Deserialize, Serialize};
 pub struct TeamRecording {
     /// Rate of the states, Hz.
     pub sample_rate_hz: f64,
-    /// Members in the order of their numbers; all have their states at the same times.
+    /// Members in the order of their numbers; all have states at the same times.
     pub members: Vec<Member>,
-    /// Planned routes, in order of time: one, or those of a team that plans on its way; may be empty.
+    /// Planned routes in order of time: one, or several if the team replans; may be empty.
     pub routes: Vec<PlannedRoute>,
-    /// Path of the search before it was smoothed, m; may be empty.
+    /// Path of the search before smoothing, m; may be empty.
     pub search_path_m: Vec<[f64; 3]>,
     /// Vertices of the roadmap, m; may be empty.
     pub vertices_m: Vec<[f64; 3]>,
     /// Bounding boxes of the formation, in order of time; may be empty.
     pub boxes: Vec<FormationBox>,
-    /// Rings of the obstacles' corners in the map frame, m, without the first corner again as the last.
+    /// Rings of the obstacles' corners in the map frame, m, without repeating the first corner.
     pub obstacles: Vec<Vec<[f64; 2]>>,
-    /// Discs that cross the team's way, with their states at the times of the members'.
+    /// Moving obstacles (discs), with states at the same times as the members.
     pub moving: Vec<MovingDisc>,
-    /// What happened, in order of time.
+    /// Events in order of time.
     pub events: Vec<TeamEvent>,
 }
 
-/// The route that a team makes for from a time on.
+/// A planned route, valid from its time.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedRoute {
     /// Time since the start, s.
@@ -41,15 +41,15 @@ pub struct PlannedRoute {
 pub struct Member {
     /// Number, from 1.
     pub number: i64,
-    /// Name of its frame and of its topics, as `member_1`: letters, digits and underscores.
+    /// Name of its frame and topics, such as `member_1`: letters, digits and underscores.
     pub name: String,
     /// Radius, m.
     pub radius_m: f64,
-    /// States, at [`TeamRecording::sample_rate_hz`] from time 0 on.
+    /// States, at [`TeamRecording::sample_rate_hz`] from time 0.
     pub states: Vec<MemberState>,
 }
 
-/// Where a member is, how it moves, and how well it keeps its place.
+/// Position, motion and formation errors of a member.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MemberState {
     /// Time, s.
@@ -60,37 +60,37 @@ pub struct MemberState {
     pub heading_rad: f64,
     /// Velocity in the map frame, m/s.
     pub velocity_m_s: [f64; 3],
-    /// Slot that the member holds, from 1; `None` when it is lost.
+    /// Slot of the member, from 1; `None` if it is lost.
     pub slot: Option<i64>,
-    /// Distance behind the predecessor less the slot's, m; `None` without a predecessor.
+    /// Distance behind the predecessor minus that of the slot, m; `None` without a predecessor.
     pub depth_error_m: Option<f64>,
-    /// Distance to the right of the predecessor less the slot's, m; `None` without a predecessor.
+    /// Distance to the right of the predecessor minus that of the slot, m; `None` without a predecessor.
     pub width_error_m: Option<f64>,
-    /// Distance in plan to the target that it makes for, m.
+    /// Distance in plan to the current target, m.
     pub target_distance_m: f64,
 }
 
-/// Bounding box of a formation from a time on.
+/// Bounding box of a formation, valid from its time.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct FormationBox {
     /// Time, s.
     pub time_s: f64,
     /// Corners in the map frame, in order around the box, m.
     pub corners_m: [[f64; 3]; 4],
-    /// True where there is too little room for the formation, even compressed.
+    /// True if there is too little room for the formation, even compressed.
     pub squeezed: bool,
 }
 
-/// A disc that moves on its own.
+/// A moving obstacle: a disc.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct MovingDisc {
     /// Radius, m.
     pub radius_m: f64,
-    /// Where it is.
+    /// States.
     pub states: Vec<DiscState>,
 }
 
-/// Where a moving disc is.
+/// Position of a moving disc.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct DiscState {
     /// Time, s.
@@ -99,14 +99,14 @@ pub struct DiscState {
     pub position_m: [f64; 3],
 }
 
-/// Something that happened to a team.
+/// An event of a team.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct TeamEvent {
     /// Time, s.
     pub time_s: f64,
-    /// What.
+    /// Kind.
     pub kind: TeamEventKind,
-    /// Number of the member that it happened to; `None` for the team as a whole.
+    /// Number of the member concerned; `None` for the whole team.
     pub member: Option<i64>,
     /// One sentence with the numbers.
     pub text: String,
@@ -124,17 +124,17 @@ pub enum TeamEventKind {
     Dodge,
     /// A member is lost and becomes an obstacle.
     Lost,
-    /// Members took over slots.
+    /// Members changed slots.
     Rearranged,
     /// Too little room for the formation, even compressed.
     Squeezed,
-    /// No way on.
+    /// A member is stuck.
     Stuck,
-    /// At the last target.
+    /// A member reached its last target.
     Arrived,
-    /// A new route was found on the way.
+    /// A new route was planned.
     Replanned,
-    /// Out of time.
+    /// The time limit was reached.
     Timeout,
     /// The run is over.
     End,

@@ -6,6 +6,6 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/events",
     schema: "foxglove.Log",
-    description: "what happened to the team or, with its name at the head of the message, to a member; the kind of event as `name`",
+    description: "events of the team or of a member, whose name then begins the message, with the kind of event as `name`",
     fields: &[],
 };

@@ -6,7 +6,7 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/team/graph",
     schema: "foxglove.SceneUpdate",
-    description: "waypoints of the route, path of the search before it was smoothed, and vertices of the roadmap (evenly spaced ones in \
-                  their order where there are more than 16384), in steps of 1/1024 m; one message at the run's start",
+    description: "waypoints of the route, path of the search before smoothing, and vertices of the roadmap (evenly spaced in \
+                  their order if there are more than 16384), in steps of 1/1024 m; one message at the run's start",
     fields: &[],
 };

@@ -6,6 +6,6 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/vehicle/path",
     schema: "foxglove.PosesInFrame",
-    description: "the whole path driven, two poses per second, in one message at the mission's start",
+    description: "the complete path driven, two poses per second, in one message at the mission's start",
     fields: &[],
 };

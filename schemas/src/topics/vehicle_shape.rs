@@ -6,7 +6,7 @@ use super::Topic;
 pub const TOPIC: Topic = Topic {
     name: "/vehicle/shape",
     schema: "foxglove.SceneUpdate",
-    description: "chassis box and wheels as drawn, moving with their frames; spheres at start and goal; one message at \
+    description: "outline of chassis and wheels, moving with their frames; spheres at start and goal; one message at \
                   the mission's start",
     fields: &[],
 };

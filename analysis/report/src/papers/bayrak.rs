@@ -1,4 +1,4 @@
-//! Printed figures of A. G. Bayrak's thesis (2008): Tables 5.1 to 5.5.
+//! Published values of A. G. Bayrak's thesis (2008): Tables 5.1 to 5.5.
 
 use crate::data::Data;
 use sastrugi_schemas::tables::RouteRow;
@@ -6,7 +6,7 @@ use serde::Deserialize;
 
 const BAYRAK: &str = include_str!("bayrak.json");
 
-/// The figures. Lengths are in map units, one cell.
+/// The values. Lengths are in map units, one cell.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Thesis {
@@ -18,7 +18,7 @@ pub struct Thesis {
     pub title: String,
     /// Distance between neighbouring slots of its formations.
     pub spacing: f64,
-    /// Its maps, by the label that our group of the same kind has.
+    /// Its maps, by the label of our group of the same kind.
     pub maps: Vec<PublishedMap>,
     /// Errors of its teams.
     pub formations: Vec<PublishedTeam>,
@@ -66,7 +66,7 @@ pub struct PublishedTeam {
     pub width_errors: Vec<f64>,
 }
 
-/// The thesis, where a group of the release's routes or teams is labelled as one of its maps.
+/// The thesis, if a group of the release's routes or teams has the label of one of its maps.
 pub fn applicable(data: &Data) -> Option<Thesis> {
     let thesis: Thesis = serde_json::from_str(BAYRAK).ok()?;
     let routes = data.routes.iter().filter_map(|r| r.group.as_deref());
@@ -74,7 +74,7 @@ pub fn applicable(data: &Data) -> Option<Thesis> {
     labels.any(|label| thesis.map(label).is_some()).then_some(thesis)
 }
 
-/// Name of the thesis for the method of a route: four neighbours, costs of slopes; `None` for one that it does not have.
+/// The thesis' name for the method of a route (four neighbours, slope cost); `None` for methods that it does not have.
 pub fn method(route: &RouteRow) -> Option<&'static str> {
     let plain = route.neighbours == 4 && route.cost == "slope" && route.variant.is_none();
     match route.method.as_str() {
@@ -87,18 +87,18 @@ pub fn method(route: &RouteRow) -> Option<&'static str> {
     }
 }
 
-/// A label without its size: `very rough 500` is of the kind `very rough`.
+/// A label without its size: `very rough 500` has the kind `very rough`.
 pub fn kind(label: &str) -> &str {
     label.trim_end_matches(|c: char| c.is_ascii_digit() || c == ' ')
 }
 
 impl Thesis {
-    /// The map of that label.
+    /// The map with a label.
     pub fn map(&self, label: &str) -> Option<&PublishedMap> {
         self.maps.iter().find(|m| m.group == label)
     }
 
-    /// Smallest and largest share of vertices without threshold on maps of that kind, %.
+    /// Smallest and largest share of vertices without threshold on maps of the same kind, %.
     pub fn share_band(&self, label: &str) -> Option<(f64, f64)> {
         self.map(label)?;
         let share = |m: &PublishedMap| Some(100.0 * m.route("nohdt")?.vertices as f64 / m.cells as f64);
@@ -109,7 +109,7 @@ impl Thesis {
 }
 
 impl PublishedMap {
-    /// The route of that method.
+    /// The route of a method.
     pub fn route(&self, method: &str) -> Option<&PublishedRoute> {
         self.methods.iter().find(|r| r.method == method)
     }
@@ -119,9 +119,9 @@ impl PublishedMap {
 mod tests {
     use super::*;
 
-    /// Ten maps with four methods, twelve teams with three followers; shares and extremes as section 5.2 and Table 5.5 have them.
+    /// Ten maps with four methods, twelve teams with three followers; shares and extremes as in section 5.2 and Table 5.5.
     #[test]
-    fn val_the_thesis_is_whole() {
+    fn val_the_thesis_is_complete() {
         let thesis: Thesis = serde_json::from_str(BAYRAK).unwrap();
         assert_eq!((thesis.maps.len(), thesis.formations.len()), (10, 12));
         assert!(thesis.maps.iter().all(|m| m.methods.len() == 4 && m.route("grid").unwrap().vertices == m.cells));
@@ -140,7 +140,7 @@ mod tests {
                 |m: &PublishedMap| m.route(method).unwrap().smoothed_cost / m.route("grid").unwrap().smoothed_cost;
             thesis.maps.iter().map(ratio).fold(0.0, f64::max)
         };
-        // The digits of the text: HDT 2 is at most 2.1 % dearer than the grid, NoHDT up to 34 %.
+        // From the text: HDT 2 costs at most 2.1 % more than the grid, NoHDT up to 34 % more.
         assert!((worst("hdt2") - 1.0202).abs() < 1e-3 && (worst("nohdt") - 1.3441).abs() < 1e-3);
     }
 }

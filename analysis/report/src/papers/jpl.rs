@@ -1,10 +1,10 @@
-//! Printed figures of the rover trials of the JPL synthetic terrain environment (section 4).
+//! Published values of the rover trials of the JPL synthetic terrain environment (section 4).
 
 use serde::Deserialize;
 
 const JPL: &str = include_str!("jpl.json");
 
-/// The figures.
+/// The trials.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Trials {
@@ -20,7 +20,7 @@ pub struct Trials {
 pub struct PublishedTrial {
     /// Navigator, as in the table `rovers`.
     pub navigator: String,
-    /// Words.
+    /// Name on the page.
     pub name: String,
     /// Share of the ground under rocks.
     pub coverage: f64,
@@ -28,19 +28,19 @@ pub struct PublishedTrial {
     pub straight_m: f64,
     /// Rovers on the circle.
     pub rovers: usize,
-    /// What is printed.
+    /// Published values.
     pub values: Vec<PublishedValue>,
 }
 
-/// One printed figure.
+/// One published value.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct PublishedValue {
-    /// Name of the figure of a world.
+    /// Name of the quantity of a world.
     pub figure: String,
-    /// Value: a pure number, or metres where the name ends so.
+    /// Value: a pure number, or metres if the name ends in `_m`.
     pub value: f64,
-    /// Half of its last digit.
+    /// Half a unit of its last digit.
     pub rounding: f64,
     /// Where it is printed.
     pub origin: String,
@@ -52,7 +52,7 @@ pub fn trials() -> Option<Trials> {
 }
 
 impl Trials {
-    /// The trial of that navigator, share of rocks and distance, give or take 1 %.
+    /// The trial of a navigator, with share of rocks and distance within 1 %.
     pub fn of(&self, navigator: &str, coverage: f64, straight_m: f64) -> Option<&PublishedTrial> {
         let near = |a: f64, b: f64| (a - b).abs() <= 0.01 * b;
         self.trials
@@ -62,7 +62,7 @@ impl Trials {
 }
 
 impl PublishedTrial {
-    /// The printed value of a figure.
+    /// The published value of a quantity.
     pub fn value(&self, figure: &str) -> Option<f64> {
         self.values.iter().find(|v| v.figure == figure).map(|v| v.value)
     }
@@ -72,9 +72,9 @@ impl PublishedTrial {
 mod tests {
     use super::*;
 
-    /// What is printed agrees with itself: 25 m over 280, 89.3 and 902.5 m, 40 m over 44.9 m.
+    /// Published values are consistent: 25 m over 280, 89.3 and 902.5 m, 40 m over 44.9 m.
     #[test]
-    fn val_printed_figures_agree() {
+    fn val_published_values_are_consistent() {
         let all = trials().unwrap();
         for trial in &all.trials {
             let of = |figure: &str| trial.values.iter().find(|v| v.figure == figure).unwrap();

@@ -1,4 +1,4 @@
-//! Published figures as data, for comparison beside ours. They are never used to tune anything.
+//! Published values as data, for comparison with ours. They are never used for tuning.
 
 pub mod bayrak;
 pub mod jpl;
@@ -7,7 +7,7 @@ use crate::data::Data;
 use serde::Deserialize;
 use std::collections::BTreeMap;
 
-/// Figures of one publication, by group.
+/// Values of one publication, by group.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Paper {
@@ -15,45 +15,45 @@ pub struct Paper {
     pub authors: String,
     /// Title.
     pub title: String,
-    /// Labels of its groups, as numbers.
+    /// Labels of its groups, which are numbers.
     pub groups: Vec<f64>,
     /// Terrains in each group.
     pub terrains_per_group: usize,
     /// Missions on each terrain.
     pub missions_per_terrain: usize,
-    /// Its drawings, by the name of the figure of this report that shows the same.
+    /// Its figures, by the id of the figure in this report that shows the same.
     pub figures: BTreeMap<String, String>,
-    /// A figure for each group.
+    /// Values for each group.
     pub values: Vec<Published>,
     /// A change from each group to the next.
     pub steps: Vec<Published>,
 }
 
-/// One published figure.
+/// One published quantity.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Published {
-    /// What it is: a column of the tables `missions` (median over successful missions) or `terrains` (median over terrains),
+    /// Quantity: a column of the table `missions` (median over successful missions) or `terrains` (median over terrains),
     /// or `success` (median over terrains, %), `success_percent` (of all missions), `time_outliers` (a count).
     pub figure: String,
-    /// Words.
+    /// Name on the page.
     pub name: String,
     /// Unit.
     pub unit: String,
     /// By group, or from group to group.
     pub values: Vec<f64>,
-    /// How far the true figure may lie from each printed one: half its last digit, more where it was derived.
+    /// Rounding error of each printed value: half a unit of its last digit, more if the value was derived.
     pub rounding: Vec<f64>,
-    /// True for a change in per cent of where it starts.
+    /// True for a change in per cent of the first value.
     #[serde(default)]
     pub relative: bool,
-    /// Where it is printed, and how it was derived where it is not.
+    /// Where it is printed, or how it was derived.
     pub origin: String,
 }
 
 const MAJHOR: &str = include_str!("majhor.json");
 
-/// The paper whose groups the release holds; `None` when there is none.
+/// The paper whose groups the release has; `None` if there is none.
 pub fn applicable(data: &Data) -> Option<Paper> {
     let paper: Paper = serde_json::from_str(MAJHOR).ok()?;
     let names: Vec<String> = data.terrain_groups().into_iter().map(|g| g.name).collect();
@@ -61,14 +61,14 @@ pub fn applicable(data: &Data) -> Option<Paper> {
     paper.groups.iter().all(held).then_some(paper)
 }
 
-/// True when the label is that number.
+/// True when the label is the number `group`.
 pub fn same(label: &str, group: f64) -> bool {
     label.trim().parse::<f64>().is_ok_and(|v| (v - group).abs() < 1e-9)
 }
 
 impl Paper {
-    /// Where the paper's figures lie beside our medians, given by label. Where it prints changes alone: our median of its first
-    /// group plus the changes up to each other group; that first group itself has no mark.
+    /// The paper's values to be marked next to our medians, which are given by label. If the paper prints only changes: our median of
+    /// its first group plus the changes up to each other group; the first group has no mark.
     pub fn marks(&self, figure: &str, ours: &[(&str, f64)]) -> Vec<Option<f64>> {
         let group = |label: &str| self.groups.iter().position(|g| same(label, *g));
         if let Some(printed) = self.values.iter().find(|p| p.figure == figure) {
@@ -83,25 +83,25 @@ impl Paper {
         ours.iter().map(|o| mark(o.0)).collect()
     }
 
-    /// True for a figure of which the paper prints changes alone.
+    /// True for a quantity of which the paper prints only changes.
     pub fn prints_changes_only(&self, figure: &str) -> bool {
         !self.values.iter().any(|p| p.figure == figure) && self.steps.iter().any(|p| p.figure == figure)
     }
 }
 
-/// Title of a figure: that of the paper's drawing where the release holds the paper's groups.
+/// Title of a figure; it names the paper's figure if the release has the paper's groups.
 pub fn title(data: &Data, id: &str, plain: &str) -> String {
     let of_paper = |paper: Paper| {
         let drawing = paper.figures.get(id)?;
-        Some(format!("{plain} {drawing} of {}, redrawn.", paper.authors))
+        Some(format!("{plain} {drawing} of {}, redrawn from our data.", paper.authors))
     };
     applicable(data).and_then(of_paper).unwrap_or_else(|| plain.to_owned())
 }
 
-/// What the mark of the paper means, for a legend.
+/// Meaning of the paper's mark, for a legend.
 pub fn mark_in_words(paper: &Paper, figure: &str) -> String {
     if paper.prints_changes_only(figure) {
-        "paper: its steps from our first median".into()
+        "paper: its changes from our first median".into()
     } else {
         "paper's median".into()
     }

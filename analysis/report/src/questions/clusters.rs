@@ -1,5 +1,5 @@
-//! What is drawn anew when an interval is made: whole terrains, because missions on one terrain resemble each other; where
-//! groups share their random draws (common pairs), whole blocks of paired terrains, because those resemble each other too.
+//! Clusters that a bootstrap resamples: whole terrains, because missions on one terrain are correlated; if groups share their
+//! random draws (common pairs), whole blocks of paired terrains, because these are correlated too.
 
 use crate::data::{Data, Group};
 use sastrugi_numeric::{Stream, Streams, sums};
@@ -9,24 +9,24 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Bootstrap samples behind an interval.
 pub const REPLICATES: usize = 1000;
-/// Fewest of them: of very many missions a sample takes long, and this many still tell the ends of a band.
+/// Fewest bootstrap samples: with very many missions a sample takes long, and this many still determine the ends of a band.
 const REPLICATES_MIN: usize = 250;
-/// Values that the samples of an interval hold in all, beyond which there are fewer of them.
+/// Total number of resampled values of an interval, above which fewer samples are drawn.
 const DRAWN_MAX: usize = 10_000_000;
 /// Nominal coverage of an interval of an estimate.
 pub const LEVEL: f64 = 0.95;
 /// Coverage of a sampling band, 5 to 95 %.
 pub const BAND: f64 = 0.9;
 
-/// The stream of a bootstrap: named by what is drawn (a group) and by the figure.
+/// The random stream of a bootstrap, named by the item that is resampled (a group) and by the quantity.
 pub fn stream(data: &Data, item: &str, figure: &str) -> Stream {
     Streams::for_item(data.study.seed, "report", item).stream(figure)
 }
 
-/// Median of a group's values, given with their terrains, and its sampling band.
+/// Median of a group's values, which are given with their terrains, and its sampling band.
 pub fn band(data: &Data, group: &str, figure: &str, values: &[(&str, f64)]) -> Option<Interval> {
     let mut values: Vec<(&str, f64)> = values.iter().copied().filter(|v| v.1.is_finite()).collect();
-    // Redraws keep the order, and the median of sorted values is quick.
+    // Resampling keeps the order, and the median of sorted values is fast.
     values.sort_by(|a, b| a.1.total_cmp(&b.1));
     let clusters = Clusters::new(&[values]);
     clusters.interval(&mut stream(data, group, figure), BAND, |pooled| sums::median(&pooled[0]))
@@ -56,7 +56,7 @@ impl<'a> Pairing<'a> {
         Self::among(&data.mission_groups())
     }
 
-    /// The pairing of groups: blocks where groups share pairs, terrains elsewhere.
+    /// The pairing of groups: blocks if groups share pairs, otherwise terrains.
     pub fn among(groups: &[Group<'a, MissionRow>]) -> Self {
         let missions = groups.iter().flat_map(|g| g.rows.iter().copied());
         let entry = |m: &'a MissionRow| (m.terrain_id.as_str(), block(&m.pair_id));
@@ -81,12 +81,12 @@ pub fn numbered<T: Copy>(items: &[(&str, T)]) -> (usize, Vec<(usize, T)>) {
     (numbers.len(), items.iter().map(|(name, item)| (numbers[name], *item)).collect())
 }
 
-/// Items of several groups by cluster. Groups that have a cluster in common are drawn together.
+/// Items of several groups by cluster. Groups that have a cluster in common are resampled together.
 #[derive(Clone, Debug)]
 pub struct Clusters<T> {
     /// Clusters in each independent sample.
     samples: Vec<usize>,
-    /// For each group its sample, and its items with their cluster of that sample, in the order in which they were given.
+    /// For each group, its sample, and its items with their cluster in that sample, in the order given.
     groups: Vec<(usize, Vec<(usize, T)>)>,
 }
 
@@ -105,7 +105,7 @@ impl<T: Copy> Clusters<T> {
         Self { samples: samples.iter().map(BTreeSet::len).collect(), groups }
     }
 
-    /// The items of every group when these clusters are drawn, each as often as its cluster, in the order of all.
+    /// The items of every group when these clusters are drawn, each as often as its cluster, in their original order.
     pub fn pooled(&self, drawn: &[Vec<usize>]) -> Vec<Vec<T>> {
         let times = |(drawn, n): (&Vec<usize>, &usize)| {
             let mut times = vec![0; *n];
@@ -131,7 +131,7 @@ impl<T: Copy> Clusters<T> {
     }
 }
 
-/// What intervals draw anew, in words.
+/// The clusters that intervals resample, in words.
 pub fn in_words(pairing: &Pairing) -> &'static str {
     if pairing.is_common() { "blocks of paired terrains" } else { "terrains" }
 }
@@ -146,9 +146,9 @@ mod tests {
         assert_eq!(block("alone"), "alone");
     }
 
-    /// Groups with a common cluster are drawn together: the difference of equal groups has no scatter. Apart it has.
+    /// Groups with common clusters are resampled together, so the difference of equal groups has no scatter; independent groups do.
     #[test]
-    fn val_common_clusters_are_drawn_together() {
+    fn val_common_clusters_are_resampled_together() {
         let group = |names: &'static str| names.split(' ').zip((0..9).map(f64::from)).collect::<Vec<_>>();
         let (a, b) = (group("a b c d e f g h i"), group("j k l m n o p q r"));
         let difference = |v: &[Vec<f64>]| v[1].iter().sum::<f64>() - v[0].iter().sum::<f64>();

@@ -10,13 +10,13 @@ use sastrugi_schemas::tables::{HeightDistributionRow, PsdRow, TerrainRow};
 /// Height of a chart, px.
 pub const HEIGHT: f64 = 280.0;
 
-/// Share of an end of a slope's band by which a spectrum may miss it.
+/// Factor by which a spectrum may miss either end of a slope's band.
 const END_MAX: f64 = 1.5;
 
 /// A curve.
 #[derive(Clone, Debug)]
 pub struct Curve {
-    /// Name in the legend; none for one of many.
+    /// Name in the legend; `None` for one of many.
     pub name: Option<String>,
     /// Line.
     pub stroke: Stroke,
@@ -41,20 +41,20 @@ pub struct Slope {
     band: [f64; 2],
 }
 
-/// Points of a spectrum. Beyond a band limit, and in rings without a mode where a surface varies, densities are rounding noise: ten
-/// decades are enough.
+/// Points of a spectrum, over ten decades at most. Beyond a band limit, and in rings without a mode in which the surface varies, densities
+/// are rounding noise.
 pub fn spectrum(rows: &[&PsdRow]) -> Vec<(f64, f64)> {
     let least = 1e-10 * rows.iter().map(|r| r.psd_m4).fold(0.0, f64::max);
     rows.iter().filter(|r| r.psd_m4 >= least).map(|r| (r.frequency_cycles_m, r.psd_m4)).collect()
 }
 
-/// Points of a histogram: the middle of each bin that holds cells.
+/// Points of a histogram: the middle of each bin that has cells.
 pub fn histogram(rows: &[&HeightDistributionRow]) -> Vec<(f64, f64)> {
     let middle = |r: &&HeightDistributionRow| (0.5 * (r.low_m + r.high_m), r.density_per_m);
     rows.iter().map(middle).filter(|p| p.1 > 0.0).collect()
 }
 
-/// Ranges that hold all curves.
+/// Ranges that contain all curves.
 pub fn ranges<'a>(curves: impl IntoIterator<Item = &'a Curve>) -> Ranges {
     let none = (f64::INFINITY, f64::NEG_INFINITY);
     let widen = |(low, high): (f64, f64), v: f64| (low.min(v), high.max(v));
@@ -69,15 +69,15 @@ pub fn slope_band(terrain: &TerrainRow) -> [f64; 2] {
     [4.0 / side_m, 0.25 / terrain.cell_x_m.max(terrain.cell_y_m)]
 }
 
-/// True where the curves cover the band of a fitted slope, but for the ends that their bins leave free: beyond, densities are rounding
-/// noise, which a slope was fitted to as well.
+/// True if the curves cover the band of a fitted slope, up to the ends that their bins leave free. If they do not, densities beyond them are
+/// rounding noise, to which the slope was fitted as well.
 pub fn covers(band: [f64; 2], curves: &[Curve]) -> bool {
     let ends =
         |of: fn(f64, f64) -> f64, start: f64| curves.iter().flat_map(|c| c.points.iter()).map(|p| p.0).fold(start, of);
     ends(f64::min, f64::INFINITY) <= END_MAX * band[0] && ends(f64::max, 0.0) >= band[1] / END_MAX
 }
 
-/// A fitted slope laid through the middle of the curves in its band; `None` when either is unknown.
+/// A fitted slope through the middle of the curves in its band; `None` if either is unknown.
 pub fn slope(slope: f64, band: [f64; 2], curves: &[Curve]) -> Option<Slope> {
     let points = curves.iter().flat_map(|c| c.points.iter()).filter(|p| p.0 >= band[0] && p.0 <= band[1]);
     let logs: Vec<(f64, f64)> = points.map(|p| (libm::log(p.0), libm::log(p.1))).collect();
@@ -127,7 +127,7 @@ pub fn log_log(id: &str, curves: &[Curve], x_title: &str, y_title: &str) -> Plot
     plot
 }
 
-/// Draws the curves inside of a clip that stays open.
+/// Draws the curves inside a clip that stays open.
 fn draw(plot: &mut Plot, id: &str, curves: &[Curve]) {
     plot.clip(&format!("{id}-clip"));
     for curve in curves {

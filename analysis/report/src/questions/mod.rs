@@ -1,4 +1,4 @@
-//! The questions a report answers. Adding one is a folder and a line in [`ALL`].
+//! The questions that a report answers. Adding one takes a folder and a line in [`ALL`].
 
 mod clusters;
 pub mod comparison;
@@ -40,7 +40,7 @@ pub struct Question {
     pub name: &'static str,
     /// Heading.
     pub title: &'static str,
-    /// Its answer; no block when the release says nothing about it.
+    /// Its answer; without blocks if the release has no data for it.
     pub answer: fn(&Data) -> Result<Vec<Block>, ReportError>,
 }
 
@@ -69,7 +69,7 @@ pub const ALL: [Question; 20] = [
 ];
 
 impl Question {
-    /// The section of the page; `None` when there is nothing to say.
+    /// The section of the page; `None` if there is no answer.
     pub fn section(&self, data: &Data) -> Result<Option<Section>, ReportError> {
         let mut blocks = (self.answer)(data)?;
         blocks.retain(|block| !block.is_empty());

@@ -1,14 +1,14 @@
-//! How a mission can end, and how each end is drawn: by colour, line and mark, so that colour alone never tells.
+//! Outcomes of a mission, and how each is drawn: by colour, line and mark, so that nothing depends on colour alone.
 
 use crate::render::svg::{OUTCOMES, Paint, Stroke, Symbol};
 use sastrugi_schemas::tables::MissionRow;
 
-/// One way to end.
+/// One outcome.
 #[derive(Clone, Copy, Debug)]
 pub struct Outcome {
-    /// Word in the table `missions`.
+    /// Value in the table `missions`.
     pub word: &'static str,
-    /// Words for readers.
+    /// Name on the page.
     pub name: &'static str,
     /// Mark where the mission ended.
     pub symbol: Symbol,
@@ -20,7 +20,7 @@ const fn outcome(word: &'static str, name: &'static str, symbol: Symbol, dash: &
     Outcome { word, name, symbol, dash }
 }
 
-/// All outcomes, the last for words that a newer program may write.
+/// All outcomes; the last is for values that a newer program may write.
 pub const ALL: [Outcome; 6] = [
     outcome("success", "success", Symbol::Disc, ""),
     outcome("stuck", "stuck", Symbol::Square, "2 3"),
@@ -47,7 +47,7 @@ pub fn counts<'a>(missions: impl IntoIterator<Item = &'a MissionRow>) -> [usize;
     counts
 }
 
-/// Track of an outcome on a map: the colours of maps do not follow the theme.
+/// Track of an outcome on a map. Colours on maps do not follow the theme.
 pub fn track(index: usize) -> Stroke {
     Stroke::new(Paint::Fixed(OUTCOMES[index]), 1.7).dashed(ALL[index].dash)
 }

@@ -11,10 +11,10 @@ use crate::render::{colour, number as set, picture, thin};
 use sastrugi_numeric::{Grid, sums};
 use sastrugi_schemas::Cell;
 
-/// Width of a map among several, px.
+/// Width of a map that stands next to others, px.
 pub const MAP_WIDTH: f64 = 320.0;
 
-/// How a relief is drawn, the same for all maps that are compared.
+/// How a relief is drawn; the same for all maps that are compared.
 #[derive(Clone, Copy, Debug)]
 pub struct Style {
     /// Heights at either end of the colours, m.
@@ -25,31 +25,31 @@ pub struct Style {
     pub pixels: usize,
 }
 
-/// The words around a map.
+/// The text around a map.
 #[derive(Clone, Debug)]
 pub struct Words {
     /// Name of its files.
     pub id: String,
     /// Title.
     pub title: String,
-    /// What to mind.
+    /// Caption.
     pub caption: String,
 }
 
-/// How the factor is named in a caption; empty for none.
+/// The exaggeration in a caption; empty for none.
 pub fn exaggeration_words(exaggeration: f64) -> String {
     if exaggeration > 1.0 {
-        format!(" Slopes are exaggerated {} times.", set::fixed(exaggeration, 0))
+        format!(" Slopes are exaggerated {}-fold.", set::fixed(exaggeration, 0))
     } else {
         String::new()
     }
 }
 
-/// Share of its relief that the middle of a surface must have to be coloured alone.
+/// Smallest share of the relief between the 1st and 99th percentile for which the colours end at these percentiles.
 const MIDDLE_SHARE: f64 = 0.25;
 
-/// The ends of the colours of a surface: the 1st and 99th percentile of its heights, or the lowest and the highest where the percentiles
-/// lie within a quarter of that. What stands out of level ground covers few cells and is all there is to see. `None` without data.
+/// The ends of the colours of a surface: the 1st and 99th percentile of its heights, or its lowest and highest height where the percentiles
+/// span less than a quarter of the relief. On level ground, the few cells that stand out are all there is to see. `None` without data.
 fn colour_range(grid: &Grid) -> Option<(f64, f64)> {
     let (lowest, highest) = grid.range()?;
     let (low, high) = percentiles(grid)?;
@@ -65,7 +65,7 @@ pub fn percentiles(grid: &Grid) -> Option<(f64, f64)> {
     (low.is_finite() && high.is_finite()).then_some((low, high))
 }
 
-/// What a class map is, and with which disk it was closed.
+/// A class map and the disk with which it was closed, in words.
 pub fn class_map_words(data: &Data) -> String {
     let radius_m = data.study.roughness.closing_radius_m;
     if radius_m > 0.0 {
@@ -75,7 +75,7 @@ pub fn class_map_words(data: &Data) -> String {
     }
 }
 
-/// The heights between which the colours of all files lie: the widest of them. `None` without any data.
+/// The smallest range of heights that contains the colour ranges of all files. `None` without any data.
 pub fn middle_range(data: &Data, paths: &[&str]) -> Result<Option<(f64, f64)>, ReportError> {
     let mut range: Option<(f64, f64)> = None;
     for path in paths {
@@ -87,13 +87,13 @@ pub fn middle_range(data: &Data, paths: &[&str]) -> Result<Option<(f64, f64)>, R
     Ok(range)
 }
 
-/// Shaded relief of the file at `path`; `None` when the release has no such file or it holds no data.
+/// Shaded relief of the file at `path`; `None` when the release has no such file or the file has no data.
 pub fn relief(data: &Data, path: &str, style: Option<Style>, words: Words) -> Result<Option<Figure>, ReportError> {
     let Some(grid) = data.files.grid(path)? else { return Ok(None) };
     relief_of(&grid, path, style, words)
 }
 
-/// Shaded relief of a grid that was drawn from the file at `path`; `None` without data.
+/// Shaded relief of a grid that comes from the file at `path`; `None` without data.
 pub fn relief_of(grid: &Grid, path: &str, style: Option<Style>, words: Words) -> Result<Option<Figure>, ReportError> {
     let Some(own_range) = grid.range() else { return Ok(None) };
     let style = style.unwrap_or(Style { range_m: own_range, exaggeration: 1.0, pixels: 400 });
@@ -106,7 +106,7 @@ pub fn relief_of(grid: &Grid, path: &str, style: Option<Style>, words: Words) ->
     Ok(Some(figure(words, description, map, numbers(path, grid, own_range))))
 }
 
-/// Deviations of a grid coloured over `[-limit_m, limit_m]`; `absent` says what the grey cells are.
+/// Deviations of a grid, coloured over `[-limit_m, limit_m]`; `absent` names the grey cells.
 pub fn deviations(
     grid: &Grid,
     path: &str,
@@ -124,7 +124,7 @@ pub fn deviations(
     Ok(Some(figure(words, description, map, numbers(path, grid, own_range))))
 }
 
-/// A raster that stands beside heights, in plain colours over `range`; `title` is the quantity and its unit.
+/// A map that goes with heights, in plain colours over `range`; `title` is the quantity and its unit.
 pub fn values(
     grid: &Grid,
     path: &str,
@@ -143,7 +143,7 @@ pub fn values(
 /// A code of a raster, its colour and meaning.
 pub type Code = (u8, Rgb, &'static str);
 
-/// A raster of codes in their colours; the legend names those that occur, with their shares.
+/// A raster of codes in their colours; the legend lists the codes that occur, with their shares.
 pub fn codes(grid: &Grid<u8>, path: &str, codes: &[Code], words: Words) -> Result<Figure, ReportError> {
     let cells = |code: u8| grid.values.iter().filter(|c| **c == code).count();
     let present: Vec<Code> = codes.iter().copied().filter(|(code, _, _)| cells(*code) > 0).collect();
@@ -187,7 +187,7 @@ fn numbers(path: &str, grid: &Grid, range_m: (f64, f64)) -> Numbers {
     numbers_of(path, grid, range_m, "m")
 }
 
-/// Size of a raster, and its lowest and highest value in `unit`: empty where that is no metre.
+/// Size of a raster, and its lowest and highest value in `unit`, which is empty for anything but metres.
 fn numbers_of(path: &str, grid: &Grid, (low, high): (f64, f64), unit: &str) -> Numbers {
     let g = grid.geometry;
     let columns = [

@@ -1,18 +1,18 @@
-//! Queries of duckdb, run in the folder of the release, behind figures and tables: they give the numbers themselves, or the rows
-//! that these are computed from.
+//! DuckDB queries behind figures and tables, to be run in the folder of the release: they return the numbers themselves, or the rows
+//! from which they are computed.
 
 use crate::data::{Data, Group};
 use sastrugi_schemas::tables::TerrainRow;
 
-/// Columns of the table `missions` that groups are compared by.
+/// Columns of the table `missions` that are compared between groups.
 const COMPARED: &str = "terrain_id, mission_id, pair_id, outcome, progress_m, efficiency, time_s, rms_vertical_acceleration_m_s2, \
 rms_pitch_rate_deg_s, rms_roll_rate_deg_s, max_pitch_deg, max_roll_deg";
 
-/// Label of a mission, or of its terrain, or the generator of that.
+/// Label of a mission, or else of its terrain, or else the generator of the terrain.
 const LABEL: &str = "coalesce(\"group\", (select coalesce(terrains.\"group\", terrains.kind) from 'tables/terrains/*.parquet' as terrains \
 where terrains.terrain_id = missions.terrain_id))";
 
-/// Missions of the plain run, of one outcome or of all: the name of the group, then other columns.
+/// Missions of the plain run, of one outcome or of all: the name of the group, then `columns`.
 pub fn missions(data: &Data, columns: &str, outcome: Option<&str>) -> String {
     let plain = data.missions.iter().any(|m| m.variant.is_none()).then(|| "variant is null".to_owned());
     let rules: Vec<String> =
@@ -27,12 +27,12 @@ pub fn missions(data: &Data, columns: &str, outcome: Option<&str>) -> String {
     format!("select {label}{run}{name}, {columns} from 'tables/missions/*.parquet' as missions{rules}")
 }
 
-/// Everything that groups of missions are compared by.
+/// All columns that are compared between groups of missions.
 pub fn compared(data: &Data) -> String {
     missions(data, COMPARED, None)
 }
 
-/// The same of every variant.
+/// The same for every variant.
 pub fn variants() -> String {
     format!("select variant, \"group\", traverse_id, {COMPARED} from 'tables/missions/*.parquet'")
 }

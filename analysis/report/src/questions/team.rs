@@ -1,4 +1,4 @@
-//! Teams over time and on the ground, for the questions about formations and losses.
+//! Errors and tracks of teams, for the questions about formations and losses.
 
 use crate::ReportError;
 use crate::content::{Figure, Numbers, number};
@@ -22,11 +22,11 @@ pub const IN_RANGE: f64 = 0.2;
 pub const TOLERABLE: f64 = 0.4;
 /// Largest number of rows or columns of a relief.
 const PIXELS: usize = 420;
-/// Side of a picture of tracks over the spacing of the slots.
+/// Side of a picture of tracks, in spacings of the slots.
 const WINDOW_SPACINGS: f64 = 14.0;
 /// Height of a chart of errors, px.
 const HEIGHT: f64 = 250.0;
-/// Intervals of time in such a chart.
+/// Time intervals in such a chart.
 const BINS: usize = 60;
 
 /// A team at one instant.
@@ -42,7 +42,7 @@ pub struct Instant {
     pub worst_m: f64,
 }
 
-/// A run and its instants with followers.
+/// A run and its instants that have followers.
 pub struct Run<'a> {
     /// Its row.
     pub row: &'a FormationRow,
@@ -88,7 +88,7 @@ fn instants(samples: &[FormationSampleRow]) -> Vec<Instant> {
     at.into_values().map(instant).collect()
 }
 
-/// Errors of several runs in one interval of time: its middle, then mean, 5th and 95th percentile of depth and of width over the runs.
+/// Errors of several runs in one time interval: its middle, then mean, 5th and 95th percentile of depth and of width over the runs.
 struct Bin {
     time_s: f64,
     runs: usize,
@@ -96,7 +96,7 @@ struct Bin {
     width: [f64; 3],
 }
 
-/// Mean errors over time with their bands over runs; `series` are instants with their time from a common zero. `None` without any.
+/// Mean errors over time with bands over runs; `series` are instants with times from a common zero. `None` without instants.
 pub fn errors(id: String, words: [String; 2], series: &[Vec<Instant>], time: &str, query: String) -> Option<Figure> {
     let bins = bins(series);
     let high = bins.iter().flat_map(|b| [b.depth[2], b.width[2]]).fold(0.0, f64::max);
@@ -162,7 +162,7 @@ fn bins(series: &[Vec<Instant>]) -> Vec<Bin> {
         return Vec::new();
     }
     let step = (high - low) / BINS as f64;
-    // The last interval holds its upper end.
+    // The last interval includes its upper end.
     let bin_of = |t: f64| (((t - low) / step) as usize).min(BINS - 1);
     let mut depth = vec![Vec::new(); BINS];
     let mut width = vec![Vec::new(); BINS];
@@ -187,7 +187,7 @@ fn spread(values: &[f64]) -> [f64; 3] {
     [sums::mean(values), sums::quantile_sorted(&sorted, 0.05), sums::quantile_sorted(&sorted, 0.95)]
 }
 
-/// What a picture of tracks shows.
+/// Content of a picture of tracks.
 pub struct Scene<'a> {
     /// Name of its files.
     pub id: String,
@@ -195,15 +195,15 @@ pub struct Scene<'a> {
     pub title: String,
     /// Run.
     pub run: &'a FormationRow,
-    /// Time in the middle, s.
+    /// Time at which members are marked, s.
     pub time_s: f64,
-    /// Member in the middle; the first where it has no sample.
+    /// Member at the centre; the first one if it has no sample.
     pub member: i64,
-    /// What the marks are.
+    /// Meaning of the marks.
     pub marks: &'a str,
 }
 
-/// Tracks of a team about a place on the relief, members marked where they are at one time. `None` without relief or samples.
+/// Tracks of a team around a place on the relief, with members marked at one time. `None` without relief or samples.
 pub fn tracks(data: &Data, scene: Scene) -> Result<Option<Figure>, ReportError> {
     let Scene { id, title, run, time_s, member, marks } = scene;
     let all = data.files.formation_samples(&run.terrain_id)?;
@@ -239,7 +239,7 @@ pub fn tracks(data: &Data, scene: Scene) -> Result<Option<Figure>, ReportError> 
     map.svg.close();
     let condition = format!("terrain_id = {} and run_id = {}", quoted(&run.terrain_id), quoted(&run.run_id));
     let columns = ["member", "time_s", "x_m", "y_m", "slot", "depth_error_m", "width_error_m", "state"];
-    // The picture has all samples of the run; the numbers are those at its time.
+    // The picture has all samples of the run; the numbers are those at the marked time.
     let numbers =
         Numbers { gives: crate::content::Gives::Input, ..Numbers::select(&condition, now.iter().copied(), &columns) };
     Ok(Some(Figure {
@@ -268,7 +268,7 @@ fn nearest(samples: &[FormationSampleRow], time_s: f64) -> Option<&FormationSamp
     known.min_by(|a, b| (a.time_s - time_s).abs().total_cmp(&(b.time_s - time_s).abs()))
 }
 
-/// The part of a grid in a square about a point.
+/// The part of a grid in a square around a point.
 fn about(grid: &Grid, (x, y): (f64, f64), side_m: f64) -> Grid {
     let g = grid.geometry;
     let cells = |cell: f64, n: usize| ((side_m / cell) as usize).clamp(1, n);

@@ -1,17 +1,27 @@
-//! Axes: where a value lies on the page, and ticks at round numbers.
+//! Axes: positions of values on the page, and ticks at round numbers.
 
 use super::number;
 
 /// A tick: value and label.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Tick {
-    /// Where it stands.
+    /// Its value.
     pub value: f64,
-    /// What is printed beside it.
+    /// Its label.
     pub label: String,
 }
 
 /// Linear or logarithmic map of `[low, high]` onto `[from, to]` of the page.
+///
+/// ```
+/// use sastrugi_report::render::axis::Axis;
+///
+/// // Vertical axes end above where they start: the page counts downwards.
+/// let axis = Axis::linear(0.0, 10.0).over(300.0, 100.0);
+/// assert_eq!((axis.at(2.5), axis.at(f64::NAN), axis.clamped(12.0)), (Some(250.0), None, Some(100.0)));
+/// let labels: Vec<String> = axis.ticks(5).into_iter().map(|tick| tick.label).collect();
+/// assert_eq!(labels, ["0", "2", "4", "6", "8", "10"]);
+/// ```
 #[derive(Clone, Copy, Debug)]
 pub struct Axis {
     log: bool,
@@ -22,13 +32,13 @@ pub struct Axis {
 }
 
 impl Axis {
-    /// A linear axis over `[low, high]`; an empty or unknown range is widened so that the map stays finite.
+    /// A linear axis over `[low, high]`; an empty or invalid range is widened so that the map stays finite.
     pub fn linear(low: f64, high: f64) -> Self {
         let (low, high) = widened(low, high);
         Self { log: false, low, high, from: 0.0, to: 1.0 }
     }
 
-    /// A logarithmic axis over `[low, high]`, both positive; anything else becomes one decade about 1.
+    /// A logarithmic axis over `[low, high]`, both positive; anything else becomes one decade around 1.
     pub fn log(low: f64, high: f64) -> Self {
         let usable = low.is_finite() && high.is_finite() && low > 0.0 && high >= low;
         let (low, high) = match usable {
@@ -39,12 +49,12 @@ impl Axis {
         Self { log: true, low, high, from: 0.0, to: 1.0 }
     }
 
-    /// The same axis laid over `[from, to]` of the page.
+    /// The same axis, mapped onto `[from, to]` of the page.
     pub fn over(self, from: f64, to: f64) -> Self {
         Self { from, to, ..self }
     }
 
-    /// Place of a value on the page; `None` for a value the axis cannot show (not finite, not positive on a log axis).
+    /// Position of a value on the page; `None` for a value that the axis cannot show (not finite, not positive on a log axis).
     pub fn at(&self, value: f64) -> Option<f64> {
         let share = match self.log {
             true if value > 0.0 => {
@@ -56,7 +66,7 @@ impl Axis {
         share.is_finite().then_some(self.from + share * (self.to - self.from))
     }
 
-    /// Place of a value, moved to the nearer end of the axis when it lies outside.
+    /// Position of a value, clamped to the axis.
     pub fn clamped(&self, value: f64) -> Option<f64> {
         self.at(if value.is_nan() { value } else { value.clamp(self.low, self.high) })
     }
@@ -66,7 +76,7 @@ impl Axis {
         (self.low, self.high)
     }
 
-    /// At most about `most` ticks at round values inside of the axis.
+    /// At most about `most` ticks at round values within the axis.
     pub fn ticks(&self, most: usize) -> Vec<Tick> {
         if self.log { log_ticks(self.low, self.high, most) } else { linear_ticks(self.low, self.high, most) }
     }
@@ -85,7 +95,7 @@ fn widened(low: f64, high: f64) -> (f64, f64) {
     }
 }
 
-/// Exponent of the decade that holds a positive value.
+/// Exponent of the decade that contains a positive value.
 fn decade(value: f64) -> i32 {
     format!("{value:e}").rsplit_once('e').and_then(|(_, e)| e.parse().ok()).unwrap_or(0)
 }
@@ -114,7 +124,7 @@ fn linear_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     (first as i64..=last as i64).map(tick).collect()
 }
 
-/// Label of a linear tick whose step ends in the decade `exponent`.
+/// Label of a linear tick whose step has the exponent `exponent`.
 fn tick_label(value: f64, exponent: i32) -> String {
     match exponent {
         -5..=5 if value.abs() < 1e6 => number::fixed(value, usize::try_from(-exponent).unwrap_or(0)),
@@ -122,7 +132,7 @@ fn tick_label(value: f64, exponent: i32) -> String {
     }
 }
 
-/// Ticks at powers of ten, thinned where there are many, with 2 and 5 between where there are few.
+/// Ticks at powers of ten, thinned if there are many, with 2 and 5 in between if there are few.
 fn log_ticks(low: f64, high: f64, most: usize) -> Vec<Tick> {
     let (first, last) = (decade(low), decade(high));
     let stride = (last - first) / i32::try_from(most.max(1)).unwrap_or(i32::MAX) + 1;
@@ -164,6 +174,23 @@ mod tests {
         assert_eq!(labels(Axis::log(0.02, 30.0), 6), ["0.1", "1", "10"]);
         assert_eq!(labels(Axis::log(0.9, 8.0), 6), ["1", "2", "5"]);
         assert_eq!(labels(Axis::log(1e-12, 1e2), 5), ["10⁻¹²", "10⁻⁹", "10⁻⁶", "0.001", "1"]);
+    }
+
+    /// By hand: a quarter of the way on a linear axis, a decade of two on a logarithmic one; upside down where `from` exceeds `to`.
+    #[test]
+    fn val_places_on_the_page() {
+        let linear = Axis::linear(-2.0, 6.0).over(10.0, 90.0);
+        assert_eq!([-2.0, 0.0, 6.0, 8.0].map(|v| linear.at(v)), [Some(10.0), Some(30.0), Some(90.0), Some(110.0)]);
+        let falling = Axis::linear(-2.0, 6.0).over(90.0, 10.0);
+        assert_eq!(falling.at(0.0), Some(70.0));
+        assert_eq!([-9.0, 0.0, 9.0].map(|v| linear.clamped(v)), [Some(10.0), Some(30.0), Some(90.0)]);
+        assert_eq!(linear.clamped(f64::NAN), None);
+        let log = Axis::log(0.1, 10.0).over(0.0, 200.0);
+        for (value, place) in [(0.1, 0.0), (1.0, 100.0), (10.0, 200.0), (100.0, 300.0)] {
+            assert!((log.at(value).unwrap() - place).abs() < 1e-9, "{value}: {:?}", log.at(value));
+        }
+        assert_eq!([log.at(0.0), log.at(-1.0)], [None, None]);
+        assert!((log.clamped(1e9).unwrap() - 200.0).abs() < 1e-9);
     }
 
     #[test]

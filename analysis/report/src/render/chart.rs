@@ -4,11 +4,11 @@ use super::axis::{Axis, Tick};
 use super::svg::{Anchor, Paint, Stroke, Svg, Symbol, TEXT, fitted, text_width};
 use sastrugi_statistics::BoxPlot;
 
-/// Width of an ordinary figure, px: about that of a telephone, so that its text stays readable there.
+/// Width of an ordinary figure, px: about the width of a phone, so that its text stays readable there.
 pub const WIDTH: f64 = 400.0;
 /// Free space at the right of every frame, px.
 const RIGHT: f64 = 16.0;
-/// Room for ticks and title of a horizontal axis, px.
+/// Room for the ticks and the title of a horizontal axis, px.
 const BELOW: f64 = 44.0;
 /// Height of one row of a legend, px.
 const LEGEND_ROW: f64 = 20.0;
@@ -32,7 +32,7 @@ pub type Entry = (Mark, String);
 /// A frame with two axes.
 #[derive(Debug)]
 pub struct Plot {
-    /// What is drawn.
+    /// The drawing.
     pub svg: Svg,
     /// Horizontal axis.
     pub x: Axis,
@@ -43,7 +43,7 @@ pub struct Plot {
 }
 
 impl Plot {
-    /// An empty frame of that size (px, px) with grid, ticks, axis titles and legend.
+    /// An empty frame of the given size (px, px) with grid, ticks, axis titles and legend.
     pub fn new(
         (width, height): (f64, f64),
         (x, x_title): (Axis, &str),
@@ -54,7 +54,7 @@ impl Plot {
         Self::with_room((width, height), (x, x_title), (y, y_title), legend, room)
     }
 
-    /// The same with that much room (px) for the vertical axis, so that frames below each other share their left edge.
+    /// The same with `left` px for the vertical axis, so that frames below each other share their left edge.
     pub fn with_room(
         (width, height): (f64, f64),
         (x, x_title): (Axis, &str),
@@ -94,12 +94,12 @@ impl Plot {
         self.svg.text_upwards((13.0, self.corner.1 + 0.5 * self.size.1), Anchor::Middle, Paint::Ink, title);
     }
 
-    /// Points of the data on the page; those the axes cannot show are left out.
+    /// Positions of data points on the page; points that the axes cannot show are left out.
     pub fn place(&self, points: impl IntoIterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
         points.into_iter().filter_map(|(x, y)| Some((self.x.at(x)?, self.y.at(y)?))).collect()
     }
 
-    /// Begins drawing that is cut off at the frame; end it with `plot.svg.close()`. `name` is unique on the page.
+    /// Starts drawing clipped at the frame; end it with `plot.svg.close()`. `name` must be unique on the page.
     pub fn clip(&mut self, name: &str) {
         self.svg.clip(name, self.corner, self.size);
     }
@@ -117,7 +117,7 @@ impl Plot {
     }
 }
 
-/// Room that a vertical axis needs at the left of a frame of that height without its legend, px.
+/// Room that a vertical axis needs at the left of a frame, px; `height` is that of the frame without its legend.
 pub fn axis_room(y: &Axis, height: f64) -> f64 {
     let length = height - BELOW - 8.0;
     30.0 + y_ticks(&y.over(length, 0.0), length).iter().map(|t| text_width(&t.label, TEXT)).fold(0.0, f64::max)
@@ -139,7 +139,7 @@ pub struct RowLabel {
 /// A frame with one row per category and a horizontal axis.
 #[derive(Debug)]
 pub struct Rows {
-    /// What is drawn.
+    /// The drawing.
     pub svg: Svg,
     /// Horizontal axis.
     pub x: Axis,
@@ -192,18 +192,18 @@ impl Rows {
         }
     }
 
-    /// Middle of a row on the page.
+    /// Vertical centre of a row on the page.
     pub fn centre(&self, row: usize) -> f64 {
         self.top + (row as f64 + 0.5) * self.row_height
     }
 }
 
-/// What stands beside a box plot in its row.
+/// Additions to a box plot in its row.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Beside {
-    /// Interval of the median, where there is one.
+    /// Interval of the median, if there is one.
     pub interval: Option<(f64, f64)>,
-    /// A published median to be marked, where there is one.
+    /// A published median to be marked, if there is one.
     pub published: Option<f64>,
 }
 
@@ -278,7 +278,7 @@ fn draw_mark(svg: &mut Svg, mark: Mark, (x, y): (f64, f64)) {
     }
 }
 
-/// Place along the row, and row, of every entry.
+/// Position along the row, and row, of every entry.
 fn legend_places(entries: &[Entry], width: f64) -> Vec<(f64, usize)> {
     let (mut x, mut row) = (0.0, 0);
     let place = |(_, label): &Entry| {
@@ -321,6 +321,40 @@ mod tests {
             assert!(x + 30.0 + text_width(label, TEXT) <= WIDTH);
         }
         assert_eq!(legend_height(&[], WIDTH), 0.0);
+    }
+
+    /// The frame ends 16 px from the right, 44 px above the bottom, and 8 px below the top; larger values are further up.
+    #[test]
+    fn val_points_are_placed_in_the_frame() {
+        let axes = [Axis::linear(0.0, 10.0), Axis::linear(-1.0, 1.0)];
+        let plot = Plot::with_room((400.0, 300.0), (axes[0], "x"), (axes[1], "y"), &[], 50.0);
+        assert_eq!(plot.place([(0.0, -1.0), (10.0, 1.0), (5.0, 0.0)]), [(50.0, 256.0), (384.0, 8.0), (217.0, 132.0)]);
+        assert!(plot.place([(f64::NAN, 0.0), (1.0, f64::INFINITY)]).is_empty());
+        let log = Plot::with_room((400.0, 300.0), (Axis::log(1.0, 100.0), "x"), (axes[1], "y"), &[], 50.0);
+        assert!(log.place([(0.0, 0.0), (-1.0, 0.0)]).is_empty());
+        assert!((log.place([(10.0, 0.0)])[0].0 - 217.0).abs() < 1e-9);
+    }
+
+    /// Quartiles 2.5, 5 and 7.5 on an axis of 34.6 px a unit that starts at 38 px; the row's centre is at 31 px, the box 3 px above it.
+    #[test]
+    fn val_box_plots_are_drawn_at_their_quartiles() {
+        let label = RowLabel { name: "a".into(), detail: String::new() };
+        let mut rows = Rows::new(&[label], 46.0, (Axis::linear(0.0, 10.0), "x"), &[]);
+        assert_eq!((rows.x.at(0.0), rows.x.at(10.0), rows.centre(0)), (Some(38.0), Some(384.0), 31.0));
+        let before = rows.svg.finish("id", "t", "d");
+        let plot = BoxPlot::of(&[0.0, 2.5, 5.0, 7.5, 10.0]).unwrap();
+        let beside = Beside { interval: Some((2.5, 7.5)), published: Some(10.0) };
+        rows.box_plot(0, &plot, beside, Paint::Series(0));
+        let svg = rows.svg.finish("id", "t", "d");
+        let drawn = |shape: &str| svg.matches(shape).count() - before.matches(shape).count();
+        // Box and outline, median, both whiskers, and below them the median's interval.
+        assert_eq!(drawn("x=\"124.5\" y=\"17\" width=\"173\" height=\"22\""), 2, "{svg}");
+        assert_eq!(drawn("<line x1=\"211\" y1=\"17\" x2=\"211\" y2=\"39\""), 1);
+        assert_eq!(drawn("<line x1=\"38\" y1=\"28\" x2=\"124.5\" y2=\"28\""), 1);
+        assert_eq!(drawn("<line x1=\"297.5\" y1=\"28\" x2=\"384\" y2=\"28\""), 1);
+        assert_eq!(drawn("<line x1=\"124.5\" y1=\"45\" x2=\"297.5\" y2=\"45\""), 1);
+        // The published median is a diamond on a paler one at the end of the axis.
+        assert_eq!(drawn("<path d=\"M384.0 "), 2);
     }
 
     #[test]

@@ -1,15 +1,15 @@
 //! Colour maps and the palette.
 //!
-//! The maps are drawn in Oklab (B. Ottosson, A perceptual color space for image processing, 2020): lightness runs
-//! linearly along the map, so that equal steps of the value look equally large and the map still reads in grey and with
-//! any colour vision. The categorical colours follow M. Okabe and K. Ito, Color universal design, 2008.
+//! The maps are defined in Oklab (B. Ottosson, A perceptual color space for image processing, 2020): lightness is linear
+//! along the map, so that equal steps of the value look equally large and the map remains readable in grey and with any
+//! colour vision. The categorical colours follow M. Okabe and K. Ito, Color universal design, 2008.
 
 /// sRGB colour.
 pub type Rgb = [u8; 3];
 /// A colour map as 256 colours.
 pub type Map = [Rgb; 256];
 
-/// Place on the map (0..1), lightness, chroma, hue (degrees) of Oklab.
+/// Position on the map (0..1), then lightness, chroma and hue (degrees) in Oklab.
 type Stop = (f64, f64, f64, f64);
 
 /// Heights: deep blue, teal, green, sand, cream.
@@ -20,7 +20,7 @@ const HEIGHTS: [Stop; 5] = [
     (0.75, 0.78, 0.100, 95.0),
     (1.0, 0.94, 0.045, 80.0),
 ];
-/// Deviations: blue below, white at zero, rust above; as dark at either end.
+/// Deviations: blue below, white at zero, rust above; equally dark at both ends.
 const DEVIATIONS: [Stop; 5] = [
     (0.0, 0.38, 0.110, 255.0),
     (0.25, 0.67, 0.090, 250.0),
@@ -28,7 +28,7 @@ const DEVIATIONS: [Stop; 5] = [
     (0.75, 0.67, 0.100, 50.0),
     (1.0, 0.38, 0.105, 45.0),
 ];
-/// Where a raster has no data.
+/// Colour of cells without data.
 pub const NO_DATA: Rgb = [0xa9, 0xad, 0xb2];
 
 /// The map for heights.
@@ -41,7 +41,7 @@ pub fn deviations() -> Map {
     map(&DEVIATIONS)
 }
 
-/// Colour of a share in 0..1 of a map.
+/// Colour of a map at a share in 0..1.
 pub fn pick(map: &Map, share: f64) -> Rgb {
     map[(share.clamp(0.0, 1.0) * 255.0).round() as usize & 255]
 }

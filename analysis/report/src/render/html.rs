@@ -1,4 +1,4 @@
-//! The page: one file with its style, figures and tables inside, and no request to anywhere.
+//! The page: one file that contains its style, figures and tables and makes no network request.
 
 use super::number;
 use super::svg::escape;
@@ -7,21 +7,21 @@ use sastrugi_schemas::Cell;
 
 /// Style of the page.
 const STYLE: &str = include_str!("style.css");
-/// Rows of a figure's numbers that are repeated in the page.
+/// Most rows of a figure's numbers that are repeated in the page.
 const FIGURE_ROWS_MAX: usize = 60;
-/// Rows of a table that are printed in the page.
+/// Most rows of a table that are printed in the page.
 const TABLE_ROWS_MAX: usize = 1500;
 
-/// On a narrow screen a table with more columns than this becomes a list of cards, unless it has very many rows.
+/// On a narrow screen, a table with more columns than this becomes a list of cards, unless it has more than [`CARD_ROWS_MAX`] rows.
 const CARD_COLUMNS_MIN: usize = 3;
 const CARD_ROWS_MAX: usize = 100;
 
-/// Bytes of text beyond which a cell takes a line of its card for itself.
+/// Bytes of text above which a cell has a line of its card to itself.
 const CARD_TEXT: usize = 13;
-/// Bytes of text beyond which a cell may break its line.
+/// Bytes of text above which a cell may wrap.
 const LONG_TEXT: usize = 48;
 
-/// What stands above the sections.
+/// Head of the page, above the sections.
 #[derive(Clone, Debug)]
 pub struct Head {
     /// Title of the release.
@@ -30,11 +30,11 @@ pub struct Head {
     pub description: String,
     /// Facts in order: name, value.
     pub facts: Vec<(String, String)>,
-    /// Key figures: value, what it counts.
+    /// Key counts: value, and what is counted.
     pub figures: Vec<(String, String)>,
 }
 
-/// The whole page.
+/// The complete page.
 pub fn page(head: &Head, sections: &[Section]) -> String {
     let title = escape(&head.title);
     let links: String = sections.iter().map(|s| format!("<a href=\"#{}\">{}</a>", s.id, escape(s.name))).collect();
@@ -49,9 +49,9 @@ pub fn page(head: &Head, sections: &[Section]) -> String {
     )
 }
 
-const FOOTER: &str = "<footer><p>This page is complete in itself and asks nothing of the network. Beside it, \
-<code>figures/</code> holds every figure as SVG and <code>data/</code> the numbers behind it as JSON. The tables \
-of the release are under <code>tables/</code> as Parquet.</p></footer>\n";
+const FOOTER: &str = "<footer><p>This page is self-contained and needs no network. Next to it, <code>figures/</code> \
+has every figure as SVG and <code>data/</code> the numbers behind it as JSON. The tables of the release are in \
+<code>tables/</code> as Parquet.</p></footer>\n";
 
 fn head_parts(head: &Head) -> String {
     let description = if head.description.is_empty() { String::new() } else { paragraph("lead", &head.description) };
@@ -64,7 +64,7 @@ fn head_parts(head: &Head) -> String {
     format!("{description}<dl class=\"facts\">{facts}</dl>\n{figures}")
 }
 
-/// A value in the head of the page; a hash in the type of code.
+/// A value in the head of the page; a hash is set as code.
 fn fact(value: &str) -> String {
     let hash = value.len() == 64 && value.chars().all(|c| c.is_ascii_hexdigit());
     if hash { format!("<code>{value}</code>") } else { escape(value) }
@@ -84,13 +84,13 @@ fn block(block: &Block) -> String {
         Block::Figures(figures) => figure_grid(figures),
         Block::Table(t) => table_block(t),
         Block::FoldedTable(t) => {
-            let summary = format!("{} ({} rows)", t.caption, number::count(t.numbers.rows.len()));
+            let summary = format!("{} ({})", t.caption, number::counted(t.numbers.rows.len(), "row"));
             folded(&summary, &t.id, &table_block(t))
         }
     }
 }
 
-/// One sentence is shown, several are folded under their summary.
+/// A single sentence is shown; several are folded under their summary.
 fn warnings(summary: &str, sentences: &[String]) -> String {
     if let [only] = sentences {
         return paragraph("warning", only);
@@ -125,17 +125,17 @@ fn figure(figure: &Figure) -> String {
     )
 }
 
-/// Where numbers come from: the name of a file, a query one click away.
+/// Source of the numbers: the name of a file, or a folded query.
 fn source(numbers: &Numbers, id: &str) -> String {
     let query = format!("<code>{}</code>", escape(&numbers.query));
     match numbers.gives {
         Gives::File => format!(" <span>from {query}</span>"),
         Gives::Rows => folded("Query", id, &query),
-        Gives::Input => folded("Query of what it is computed from", id, &query),
+        Gives::Input => folded("Query for the input", id, &query),
     }
 }
 
-/// Folded content; on paper its words name the file that holds it.
+/// Folded content; in print, its summary names the file that contains it.
 fn folded(summary: &str, id: &str, content: &str) -> String {
     let (summary, id) = (escape(summary), escape(id));
     format!("<details><summary data-file=\"data/{id}.json\">{summary}</summary>\n{content}</details>\n")
@@ -169,14 +169,14 @@ fn table(numbers: &Numbers, caption: &str) -> String {
     )
 }
 
-/// True for a column that holds figures.
+/// True for a column of numbers.
 fn numeric(numbers: &Numbers, column: usize) -> bool {
     let mut cells = numbers.rows.iter().filter_map(|r| r.get(column));
     cells.find(|c| **c != Cell::Null).is_some_and(|c| matches!(c, Cell::F64(_) | Cell::I64(_)))
 }
 
-/// Decimals of a column: four digits of its largest figure, two of its smallest. `None` where that takes more than five
-/// digits, where the figures are very large or small, or where each has a unit of its own.
+/// Decimals of a column: four digits for its largest number, two for its smallest. `None` if that takes more than five
+/// digits, if the numbers are very large or small, or if their units differ.
 fn decimals(numbers: &Numbers, column: usize) -> Option<usize> {
     if numbers.mixed {
         return None;
@@ -206,7 +206,7 @@ fn heading(heading: &Heading, numeric: bool) -> String {
     format!("<th scope=\"col\"{class}>{name}{unit}</th>")
 }
 
-/// Name and unit of a column as the label of a figure in a card.
+/// Name and unit of a column, as the label of a number in a card.
 fn label(heading: &Heading) -> String {
     let unit = match number::unit(&heading.unit) {
         unit if unit.is_empty() => unit,
@@ -218,7 +218,7 @@ fn label(heading: &Heading) -> String {
 /// How the cells of a column are set.
 struct Format<'a> {
     decimals: Option<usize>,
-    /// Attribute that names the column; empty where rows are no cards.
+    /// Attribute that names the column; empty if rows are not cards.
     label: &'a str,
 }
 
@@ -258,6 +258,47 @@ fn list(values: impl Iterator<Item = f64>) -> String {
 mod tests {
     use super::*;
     use crate::content::number as figure;
+
+    /// A table of `rows` rows and `columns` columns.
+    fn numbers(rows: usize, columns: usize) -> Numbers {
+        let mut numbers = Numbers::new("", &vec![("n", "m2"); columns]);
+        (0..rows).for_each(|n| numbers.row(vec![Cell::I64(n as i64); columns]));
+        numbers
+    }
+
+    /// The page prints 1500 rows of a table and states how many there are.
+    #[test]
+    fn val_long_tables_are_cut_and_say_so() {
+        let [whole, cut] = [1500, 1501].map(|rows| table(&numbers(rows, 2), "caption"));
+        assert!(!whole.contains("first") && whole.contains("<caption>caption</caption>"));
+        assert!(cut.contains("<caption>caption (first 1500 of 1501 rows)</caption>"));
+        // The head is a row, too.
+        assert_eq!([&whole, &cut].map(|t| t.matches("<tr>").count()), [1501; 2]);
+        assert!(whole.contains(">1499<") && cut.contains(">1499<") && !cut.contains(">1500<"));
+    }
+
+    /// Four columns or more turn into cards with labels on a narrow screen, unless there are more than 100 rows.
+    #[test]
+    fn val_wide_tables_become_cards() {
+        let cards = |rows: usize, columns: usize| {
+            let table = table(&numbers(rows, columns), "c");
+            assert_eq!(table.contains("class=\"scroll cards\""), table.contains("data-label=\"n, m²\""));
+            table.contains("cards")
+        };
+        assert_eq!([cards(100, 4), cards(101, 4), cards(100, 3)], [true, false, false]);
+    }
+
+    #[test]
+    fn val_cells_are_set_by_their_type() {
+        let format = Format { decimals: Some(2), label: "" };
+        let of = |one: Cell| cell((&one, &format));
+        assert_eq!(of(Cell::Null), "<td class=\"n\">–</td>");
+        assert_eq!(of(Cell::F64(-0.25)), "<td class=\"n\">−0.25</td>");
+        assert_eq!(of(Cell::I64(-3)), "<td class=\"n\">-3</td>");
+        assert_eq!([of(Cell::Bool(true)), of(Cell::Bool(false))], ["<td>yes</td>", "<td>no</td>"]);
+        assert_eq!(of(Cell::Text("a<b".into())), "<td>a&lt;b</td>");
+        assert_eq!(of(Cell::F64List(vec![0.5, f64::NAN])), "<td>0.5, –</td>");
+    }
 
     #[test]
     fn val_decimals_of_a_column() {

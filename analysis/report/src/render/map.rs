@@ -7,31 +7,31 @@ use super::number;
 use super::picture::Picture;
 use super::svg::{Anchor, Paint, Stroke, Svg, TEXT};
 
-/// Tallest picture of a map over its width.
+/// Largest height of a map over its width.
 const TALLEST: f64 = 1.25;
 
 /// A map being drawn.
 #[derive(Debug)]
 pub struct Map {
-    /// What is drawn.
+    /// The drawing.
     pub svg: Svg,
     x: Axis,
     y: Axis,
     size: (f64, f64),
 }
 
-/// What explains the colours of a map.
+/// Key to the colours of a map.
 #[derive(Debug)]
 pub enum Key<'a> {
-    /// Colours from low to high, their ends, and what they mean with its unit.
+    /// Colours from low to high, their ends, and their meaning with its unit.
     Ramp {
         /// Colours in order.
         colours: &'a [Rgb],
         /// Values at either end.
         range: (f64, f64),
-        /// Quantity and unit, as `height, m`.
+        /// Quantity and unit, such as `height, m`.
         title: &'a str,
-        /// Where no data is shown: the colour and the words.
+        /// Colour and meaning of cells without data.
         absent: Option<(Rgb, &'a str)>,
     },
     /// Separate entries.
@@ -57,12 +57,12 @@ impl Map {
         map
     }
 
-    /// Place of a point of the ground on the page.
+    /// Position of a point of the ground on the page.
     pub fn at(&self, x_m: f64, y_m: f64) -> Option<(f64, f64)> {
         Some((self.x.at(x_m)?, self.y.at(y_m)?))
     }
 
-    /// Begins drawing that is cut off at the picture; end it with `map.svg.close()`. `name` is unique on the page.
+    /// Starts drawing clipped at the picture; end it with `map.svg.close()`. `name` must be unique on the page.
     pub fn clip(&mut self, name: &str) {
         self.svg.clip(name, (0.0, 0.0), self.size);
     }
@@ -135,7 +135,25 @@ mod tests {
         let map = Map::new(&picture, 300.0, &Key::Entries(&[]));
         assert_eq!(map.at(100.0, 50.0), Some((0.0, 150.0)));
         assert_eq!(map.at(110.0, 55.0), Some((300.0, 0.0)));
+        assert_eq!(map.at(102.5, 53.75), Some((75.0, 37.5)));
         assert_well_formed(&map.svg.finish("m", "t", "d"));
+    }
+
+    /// 30 px a metre: the longest of at most three round lengths below 45 % of the width is 4 m, 120 px.
+    #[test]
+    fn val_the_scale_bar_has_its_length() {
+        let picture = Picture { data_uri: "data:,".into(), size_m: [10.0, 5.0], origin_m: [0.0; 2], pixels: [2, 1] };
+        let svg = Map::new(&picture, 300.0, &Key::Entries(&[])).svg.finish("m", "t", "d");
+        assert!(svg.contains("<line x1=\"0.5\" y1=\"168\" x2=\"120\" y2=\"168\"") && svg.contains(">4 m<"), "{svg}");
+    }
+
+    /// A map taller than wide is at most 1.25 times as high as the page is wide, with the same scale in both directions.
+    #[test]
+    fn val_tall_maps_are_bounded() {
+        let picture = Picture { data_uri: "data:,".into(), size_m: [10.0, 50.0], origin_m: [0.0; 2], pixels: [2, 10] };
+        let map = Map::new(&picture, 400.0, &Key::Entries(&[]));
+        assert_eq!(map.at(0.0, 0.0), Some((0.0, 500.0)));
+        assert_eq!(map.at(10.0, 50.0), Some((100.0, 0.0)));
     }
 
     #[test]

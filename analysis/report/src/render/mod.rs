@@ -1,4 +1,4 @@
-//! Drawing: numbers, axes, colours, pictures, charts, maps and the page. Nothing here knows what it draws.
+//! Drawing: numbers, axes, colours, pictures, charts, maps and the page. Nothing here depends on what is drawn.
 
 pub mod axis;
 pub mod chart;

@@ -1,6 +1,6 @@
-//! Numbers as a reader sees them. A value that is not finite is printed as [`ABSENT`], never as `NaN`.
+//! Numbers as text. A value that is not finite is printed as [`ABSENT`], never as `NaN`.
 
-/// Stands where a figure is not known.
+/// Printed in place of an unknown number.
 pub const ABSENT: &str = "–";
 /// Group separator of large counts: narrow no-break space.
 const SEPARATOR: char = '\u{202f}';
@@ -18,7 +18,14 @@ pub fn fixed(value: f64, decimals: usize) -> String {
     }
 }
 
-/// `value` to `digits` significant digits, in powers of ten where it is very large or small.
+/// `value` to `digits` significant digits, with a power of ten if it is very large or small.
+///
+/// ```
+/// use sastrugi_report::render::number::{ABSENT, significant};
+///
+/// assert_eq!([0.05, -12.345, 1.2345e9].map(|v| significant(v, 3)), ["0.0500", "−12.3", "1.23 × 10⁹"]);
+/// assert_eq!(significant(f64::NAN, 3), ABSENT);
+/// ```
 pub fn significant(value: f64, digits: usize) -> String {
     if !value.is_finite() {
         return ABSENT.into();
@@ -36,7 +43,7 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// As [`significant`], without zeros at the end of a decimal fraction.
+/// As [`significant`], without trailing zeros of a decimal fraction.
 pub fn plain(value: f64, digits: usize) -> String {
     let text = significant(value, digits);
     if text.contains('.') && !text.contains(' ') {
@@ -46,7 +53,7 @@ pub fn plain(value: f64, digits: usize) -> String {
     }
 }
 
-/// A count with its thousands apart.
+/// A count with its thousands separated.
 pub fn count(n: impl TryInto<u64>) -> String {
     let Ok(n) = n.try_into() else { return ABSENT.into() };
     let digits = n.to_string();
@@ -109,7 +116,7 @@ pub fn power_of_ten(exponent: i32) -> String {
     format!("10{}", exponent.to_string().chars().map(raised).collect::<String>())
 }
 
-/// A unit of a column as it is set in text (`m/s2` becomes `m/s²`).
+/// A unit of a column as set in text (`m/s2` becomes `m/s²`).
 pub fn unit(unit: &str) -> String {
     match unit {
         "1" => String::new(),
@@ -122,7 +129,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_numbers_as_set() {
+    fn val_numbers_are_formatted() {
         assert_eq!(significant(0.838, 3), "0.838");
         assert_eq!(significant(-12.345, 3), "−12.3");
         assert_eq!(significant(1.234e-7, 3), "1.23 × 10⁻⁷");
@@ -139,10 +146,22 @@ mod tests {
         assert_eq!(bytes(8_123_456), "8.12 MB");
         assert_eq!(percent(0.875, 1), "87.5 %");
         assert_eq!(unit("m/s2"), "m/s²");
+        assert_eq!([unit("m4"), unit("deg"), unit("1")], ["m⁴", "°", ""]);
+    }
+
+    /// Ends of the ranges in which numbers are written without a power of ten, counts without a separator, sizes in one unit.
+    #[test]
+    fn val_formats_change_at_their_limits() {
+        assert_eq!([1e-4, 9.99e-5].map(|v| significant(v, 3)), ["0.000100", "9.99 × 10⁻⁵"]);
+        assert_eq!([999_999.0, 1e6].map(|v| significant(v, 6)), ["999999", "1.00000 × 10⁶"]);
+        assert_eq!([9_999_u64, 10_000].map(count), ["9999", "10\u{202f}000"]);
+        assert_eq!([999, 1_000, 999_000, 1_000_000].map(bytes), ["999 B", "1.00 kB", "999 kB", "1.00 MB"]);
+        assert_eq!(bytes(5_000_000_000_000_000), "5000 TB");
+        assert_eq!((with_unit(2.0, 2, "m"), with_unit(2.0, 2, "")), ("2.0 m".into(), "2.0".into()));
     }
 
     #[test]
-    fn prop_what_is_not_finite_is_absent() {
+    fn prop_non_finite_values_are_absent() {
         for v in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
             assert_eq!(significant(v, 3), ABSENT);
             assert_eq!(fixed(v, 2), ABSENT);

@@ -24,7 +24,7 @@ pub struct Picture {
 /// Shades of the relief under classes.
 const SHADES: usize = 63;
 
-/// Heights coloured over `range` and shaded, at most `most` pixels along a side.
+/// Heights coloured over `range` and shaded, with at most `most` pixels along a side.
 ///
 /// # Errors
 /// When the picture cannot be encoded.
@@ -59,7 +59,7 @@ pub fn deviations(grid: &Grid, limit: f64, most: usize) -> Result<Picture, Repor
     coloured(grid, &colour::deviations(), (-limit, limit), most)
 }
 
-/// Brightness as a camera shows it, with `white` as the brightness of white; what sees no ground is transparent.
+/// Brightness as a camera shows it, with `white` as the brightness of white; pixels that see no ground are transparent.
 ///
 /// # Errors
 /// When the picture cannot be encoded.
@@ -96,7 +96,7 @@ pub fn classes(
     Ok(placed(codes, data_uri(&png), [cols, rows]))
 }
 
-/// Ground in the colours of its codes (the first where there are none) under its relief, which is not exaggerated: rocks and sand.
+/// Ground in the colours of its codes (the first colour if there are no codes), shaded without exaggeration: rocks and sand.
 ///
 /// # Errors
 /// When the picture cannot be encoded.
@@ -119,7 +119,7 @@ pub fn ground(
     Ok(placed(heights, data_uri(&png), [thin_heights.cols(), thin_heights.rows()]))
 }
 
-/// Codes in their colours, by majority; a code without one as no data.
+/// Codes in their colours, by majority; codes without a colour are drawn as no data.
 pub fn codes(codes: &Grid<u8>, colours: &[(u8, Rgb)], most: usize) -> Result<Picture, ReportError> {
     let thin = thin::block_majority(codes, thin::step(codes.rows(), codes.cols(), most));
     let colour = |code: &u8| colours.iter().find(|(c, _)| c == code).map_or(colour::NO_DATA, |(_, colour)| *colour);
@@ -133,7 +133,7 @@ pub fn class_colour(class: RoughnessClass) -> Rgb {
     colour::towards(class.colour(), [255; 3], 0.42)
 }
 
-/// The colour of a legend from low to high.
+/// The colours of a legend from low to high.
 pub fn ramp(map: &Map, steps: usize) -> Vec<Rgb> {
     (0..steps).map(|i| colour::pick(map, (i as f64 + 0.5) / steps as f64)).collect()
 }
@@ -146,7 +146,7 @@ fn share(value: f64, (low, high): (f64, f64)) -> f64 {
     if high > low { (value - low) / (high - low) } else { 0.5 }
 }
 
-/// A colour under a brightness: level ground keeps it.
+/// A colour at a given shade; level ground keeps its colour.
 fn lit(colour: Rgb, shade: f64) -> Rgb {
     let level = std::f64::consts::FRAC_1_SQRT_2;
     match shade < level {
@@ -180,7 +180,7 @@ fn placed<T>(full: &Grid<T>, data_uri: String, pixels: [usize; 2]) -> Picture {
     Picture { data_uri, size_m: full.geometry.size(), origin_m: full.geometry.origin, pixels }
 }
 
-/// PNG (RGB, or indexed where a palette is given) as a data URI.
+/// PNG (RGB, or indexed if a palette is given).
 fn encode(cols: usize, rows: usize, bytes: &[u8], palette: Option<Vec<u8>>) -> Result<Vec<u8>, ReportError> {
     let colour = if palette.is_some() { png::ColorType::Indexed } else { png::ColorType::Rgb };
     encode_as(colour, [cols, rows], bytes, palette)
@@ -251,8 +251,34 @@ mod tests {
         assert!(palette.len() <= 3 * 256);
     }
 
+    /// Level ground has the colour of its height; slopes that face the light in the north-west are lighter, those that face away darker.
     #[test]
-    fn prop_large_grids_are_thinned_and_no_relief_is_no_problem() {
+    fn val_relief_is_lit_from_the_north_west() {
+        let g = Geometry::square(5, 5, 1.0);
+        let middle = |slope: f64| {
+            let grid = Grid::new(g, (0..25).map(|k| slope * (g.y(k / 5) - g.x(k % 5))).collect());
+            let (bytes, kind) = decoded(&relief(&grid, (-100.0, 100.0), 1.0, 512).unwrap());
+            assert_eq!((bytes.len(), kind), (75, png::ColorType::Rgb));
+            bytes[3 * 12..3 * 13].to_vec()
+        };
+        let level = middle(0.0);
+        assert_eq!(level, colour::heights()[128]);
+        // Heights rise towards the south-east where the slope is negative.
+        let [lighter, darker] = [middle(-0.4), middle(0.4)];
+        assert!((0..3).all(|c| lighter[c] > level[c] && level[c] > darker[c]), "{lighter:?} {level:?} {darker:?}");
+    }
+
+    /// Ends of the colours at the ends of the range, and beyond them.
+    #[test]
+    fn val_values_are_coloured_over_their_range() {
+        let grid = Grid::new(Geometry::square(1, 5, 1.0), vec![-9.0, 2.0, 3.0, 4.0, 9.0]);
+        let (bytes, _) = decoded(&values(&grid, (2.0, 4.0), 512).unwrap());
+        let map = colour::heights();
+        assert_eq!(bytes, [map[0], map[0], map[128], map[255], map[255]].concat());
+    }
+
+    #[test]
+    fn prop_large_grids_are_thinned_and_may_be_flat() {
         let grid = Grid::filled(Geometry::square(1100, 30, 0.5), 2.0);
         let picture = relief(&grid, (2.0, 2.0), 1.0, 512).unwrap();
         assert_eq!(picture.pixels, [10, 367]);

@@ -1,23 +1,23 @@
-//! Figures as PNG files, for documents and messages that take no SVG.
+//! Figures as PNG files, for documents and messages that do not accept SVG.
 //!
-//! The font is shipped, so that the same figure has the same bytes on any machine; characters outside it (other scripts than
-//! Latin, Greek and Cyrillic) are set as empty boxes.
+//! The font is bundled, so that the same figure has the same bytes on any machine; characters outside it (scripts other than
+//! Latin, Greek and Cyrillic) are drawn as empty boxes.
 
 use crate::ReportError;
 use resvg::{tiny_skia, usvg};
 use std::sync::Arc;
 
-/// DejaVu Sans, which the widths of `svg` are those of.
+/// DejaVu Sans, whose character widths `svg` uses.
 const FONT: &[u8] = include_bytes!("fonts/DejaVuSans.ttf");
 /// Its name.
 const FAMILY: &str = "DejaVu Sans";
-/// Pixels of the PNG for one of the figure: 192 dots per inch, sharp in print and on dense screens.
+/// Pixels of the PNG per pixel of the figure: 192 dots per inch, sharp in print and on high-density screens.
 const SCALE: f32 = 2.0;
 
-/// An SVG figure as the bytes of a PNG file, twice as many pixels wide and high as the figure says.
+/// An SVG figure as the bytes of a PNG file, with twice the width and height of the figure in pixels.
 ///
 /// # Errors
-/// [`ReportError::Raster`] when the text is no SVG, or the picture has no pixels or too many for the memory.
+/// [`ReportError::Raster`] when the text is not SVG, or the picture has no pixels or too many for the memory.
 pub fn png(svg: &str) -> Result<Vec<u8>, ReportError> {
     let refused = |why: String| ReportError::Raster(why);
     let tree = usvg::Tree::from_str(svg, &options()).map_err(|e| refused(e.to_string()))?;
@@ -28,7 +28,7 @@ pub fn png(svg: &str) -> Result<Vec<u8>, ReportError> {
     pixels.encode_png().map_err(|e| refused(e.to_string()))
 }
 
-/// Every font family of a figure is the shipped one.
+/// Options that replace every font family of a figure with the bundled one.
 fn options() -> usvg::Options<'static> {
     let mut fonts = usvg::fontdb::Database::new();
     fonts.load_font_data(FONT.to_vec());
@@ -58,7 +58,7 @@ mod tests {
     }
 
     #[test]
-    fn val_shapes_lie_where_the_figure_has_them() {
+    fn val_shapes_are_placed_as_in_the_figure() {
         let (width, height, pixels) = figure(|svg| svg.rect((10.0, 5.0), (20.0, 10.0), Paint::Fixed([1, 2, 3]), 1.0));
         assert_eq!((width, height), (120, 40));
         let at = |x: usize, y: usize| &pixels[4 * (y * 120 + x)..][..4];
@@ -66,9 +66,9 @@ mod tests {
         assert_eq!([at(19, 10), at(60, 29), at(20, 9), at(59, 30)], [[255; 4]; 4]);
     }
 
-    /// Text is drawn without any font of the machine, within the width that charts reckon with.
+    /// Text is drawn without any font of the machine.
     #[test]
-    fn val_text_is_drawn_with_the_shipped_font() {
+    fn val_text_is_drawn_with_the_bundled_font() {
         for text in ["σ = 0.05 m²", "Скала", "Ångström"] {
             let (_, _, pixels) = figure(|svg| svg.text((0.0, 15.0), Anchor::Start, Paint::Ink, text));
             let dark = |i: usize| pixels[4 * i] < 128;
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn val_what_is_no_figure_is_refused() {
+    fn val_invalid_figures_are_refused() {
         for bad in ["", "<svg", "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"0\" height=\"3\"/>"] {
             assert!(matches!(png(bad), Err(ReportError::Raster(_))), "{bad}");
         }

@@ -1,13 +1,12 @@
-//! A small SVG writer. Every shape carries its colour twice: as a presentation attribute (so that a figure file looks right
-//! in any program) and as a class (so that the page can follow the reader's light or dark theme).
+//! A small SVG writer. Every shape has its colour twice: as a presentation attribute (so that a figure file looks right in
+//! any program) and as a class (so that the page can follow the reader's light or dark theme).
 
 use super::colour::{Rgb, hex};
 use std::fmt::Write;
 
 /// Size of ordinary text in figures, px.
 pub const TEXT: f64 = 12.5;
-/// Widths of characters over the text size in DejaVu Sans, the widest of the fonts that `system-ui` stands for, in classes that are
-/// rounded up.
+/// Widths of characters over the text size in DejaVu Sans, the widest of the usual `system-ui` fonts, in classes that are rounded up.
 const WIDTHS: [(&str, f64); 7] = [
     ("ijlIJ' ,.·/:;\\|", 0.34),
     ("frt-()[]!¹²³⁰⁴⁵⁶⁷⁸⁹", 0.42),
@@ -117,7 +116,7 @@ impl Stroke {
     }
 }
 
-/// Where a text is tied to its point.
+/// Alignment of a text at its point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Anchor {
     /// The text starts there.
@@ -128,7 +127,7 @@ pub enum Anchor {
     End,
 }
 
-/// Shapes of marks: told apart without colour.
+/// Shapes of marks, distinguishable without colour.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Symbol {
     /// Filled disc.
@@ -156,7 +155,7 @@ pub struct Svg {
 }
 
 impl Svg {
-    /// An empty figure of that size, px.
+    /// An empty figure of the given size, px.
     pub fn new(width: f64, height: f64) -> Self {
         Self { width, height, body: String::new() }
     }
@@ -217,7 +216,7 @@ impl Svg {
         }
     }
 
-    /// Filled polygon that shows what is below it.
+    /// Translucent polygon.
     pub fn area(&mut self, points: &[(f64, f64)], fill: Paint, opaque: f64) {
         if points.len() > 2 {
             let (fill, opacity) = (fill.attributes("fill"), opacity("fill-opacity", opaque));
@@ -225,7 +224,7 @@ impl Svg {
         }
     }
 
-    /// Another figure with its upper left corner there.
+    /// Another figure with its upper left corner at `corner`.
     pub fn inset(&mut self, corner: (f64, f64), other: &Svg) {
         let [x, y] = [corner.0, corner.1].map(px);
         self.push(format!("<g transform=\"translate({x} {y})\">\n{}</g>", other.body));
@@ -289,7 +288,7 @@ impl Svg {
         ));
     }
 
-    /// Everything until [`Svg::close`] is cut off at the rectangle. `name` is unique on the page.
+    /// Clips everything until [`Svg::close`] at the rectangle. `name` must be unique on the page.
     pub fn clip(&mut self, name: &str, corner: (f64, f64), size: (f64, f64)) {
         let (name, [x, y, w, h]) = (escape(name), [corner.0, corner.1, size.0, size.1].map(px));
         self.push(format!(
@@ -302,7 +301,7 @@ impl Svg {
         self.push("</g>".into());
     }
 
-    /// The finished element, with its accessible name. `id` is unique on the page.
+    /// The finished element, with its accessible name. `id` must be unique on the page.
     pub fn finish(&self, id: &str, title: &str, description: &str) -> String {
         let [w, h] = [self.width, self.height].map(px);
         let (id, title, description) = (escape(id), escape(title), escape(description));
@@ -321,17 +320,17 @@ impl Svg {
     }
 }
 
-/// Width of a text on the page, on the wide side, px.
+/// Width of a text on the page, rounded up, px.
 pub fn text_width(text: &str, size: f64) -> f64 {
     size * text.chars().map(character_width).sum::<f64>()
 }
 
-/// Width over the text size, on the wide side.
+/// Width over the text size, rounded up.
 fn character_width(c: char) -> f64 {
     WIDTHS.iter().find(|(characters, _)| characters.contains(c)).map_or(OTHER, |(_, width)| *width)
 }
 
-/// The text cut to a width, with an ellipsis where something was cut.
+/// The text cut to a width, with an ellipsis if anything was cut.
 pub fn fitted(text: &str, width: f64, size: f64) -> String {
     if text_width(text, size) <= width {
         return text.into();
@@ -403,7 +402,7 @@ mod tests {
     }
 
     #[test]
-    fn prop_no_shape_prints_what_is_not_finite() {
+    fn prop_no_shape_prints_non_finite_numbers() {
         let mut svg = Svg::new(f64::NAN, f64::INFINITY);
         let bad = (f64::NAN, f64::NEG_INFINITY);
         let stroke = Stroke::new(Paint::Series(9), f64::NAN).dashed("3 2").faint(f64::NAN);
@@ -436,7 +435,7 @@ mod tests {
         let dejavu =
             [('m', 1995.0), ('w', 1675.0), ('e', 1260.0), ('0', 1303.0), (' ', 651.0), ('+', 1716.0), ('W', 2025.0)];
         assert!(dejavu.iter().all(|&(c, units)| character_width(c) >= units / 2048.0));
-        // Not so wide that labels are cut in vain: by that table "meadow + snow" has 104.06 px at 12.5 px.
+        // Not so wide that labels are cut needlessly: by that table, "meadow + snow" has 104.06 px at 12.5 px.
         let width = text_width("meadow + snow", TEXT);
         assert!((104.06..108.0).contains(&width), "{width}");
         assert_eq!(fitted("meadow + snow", width, TEXT), "meadow + snow");

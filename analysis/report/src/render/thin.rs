@@ -1,8 +1,8 @@
-//! Decimation for display: fewer cells, fewer points of a line.
+//! Decimation for display: fewer cells of a raster, fewer points of a line.
 
 use sastrugi_numeric::{Geometry, Grid};
 
-/// Cells per block side so that neither side has more than `most` blocks.
+/// Cells per side of a block, so that neither side of the grid has more than `most` blocks.
 pub fn step(rows: usize, cols: usize, most: usize) -> usize {
     rows.max(cols).div_ceil(most.max(1)).max(1)
 }
@@ -15,7 +15,7 @@ pub fn block_mean(grid: &Grid, step: usize) -> Grid {
     })
 }
 
-/// The commonest code in each block; the higher one where two are equally common.
+/// The most common code in each block; of equally common codes, the higher one.
 pub fn block_majority(grid: &Grid<u8>, step: usize) -> Grid<u8> {
     blocks(grid, step, |cells| {
         let mut sorted = cells.to_vec();
@@ -41,7 +41,7 @@ fn blocks<T: Copy>(grid: &Grid<T>, step: usize, reduce: impl Fn(&[T]) -> T) -> G
     Grid { geometry: Geometry { rows, cols, cell, origin: g.origin }, values }
 }
 
-/// The middle part of a grid, at most `size_m` east-west and north-south.
+/// The central part of a grid, at most `size_m` east-west and north-south.
 pub fn centre(grid: &Grid, size_m: [f64; 2]) -> Grid {
     let g = grid.geometry;
     let cells = |size: f64, cell: f64, n: usize| ((size / cell + 1e-6) as usize).clamp(1, n);
@@ -49,8 +49,8 @@ pub fn centre(grid: &Grid, size_m: [f64; 2]) -> Grid {
     grid.window((g.rows - rows) / 2, (g.cols - cols) / 2, rows, cols)
 }
 
-/// The grid repeated `times` in either direction, thinned so that neither side has many more than `most` cells. Blocks are
-/// of a size that divides the grid where there is one, so that none straddles a seam.
+/// The grid repeated `times` in both directions, thinned so that neither side has many more than `most` cells. The block size
+/// divides the grid if possible, so that no block straddles a seam.
 pub fn tiled(grid: &Grid, times: usize, most: usize) -> Grid {
     let g = grid.geometry;
     let needed = step(times * g.rows, times * g.cols, most);
@@ -62,7 +62,7 @@ pub fn tiled(grid: &Grid, times: usize, most: usize) -> Grid {
     Grid::new(Geometry { rows, cols, ..tile.geometry }, values.collect())
 }
 
-/// Points of a line, given in order of x on the page, with one point per `width` of the page: the mean of each run.
+/// Points of a line, given in order of x on the page, reduced to one point per `width` of the page: the mean of each run.
 pub fn line(points: &[(f64, f64)], width: f64) -> Vec<(f64, f64)> {
     let column = |p: &(f64, f64)| (p.0 / width).floor();
     let mean = |run: &[(f64, f64)]| {
@@ -72,7 +72,7 @@ pub fn line(points: &[(f64, f64)], width: f64) -> Vec<(f64, f64)> {
     points.chunk_by(|a, b| column(a) == column(b)).map(mean).collect()
 }
 
-/// Every so-many-th item, so that no more than `most` remain, always with the last.
+/// Every n-th item, so that at most `most` remain, always including the last.
 pub fn every<T: Clone>(items: &[T], most: usize) -> Vec<T> {
     let step = items.len().div_ceil(most.max(2) - 1).max(1);
     let mut kept: Vec<T> = items.iter().step_by(step).cloned().collect();
@@ -96,8 +96,13 @@ mod tests {
         assert_eq!(thin.values, [4.0, 5.0, 6.5, 10.5, 12.5, 14.0]);
         let codes = Grid::new(Geometry::square(2, 2, 1.0), vec![0, 2, 2, 1]);
         assert_eq!(block_majority(&codes, 2).values, [2]);
+        // Of two equally common codes, the higher one; a block without data stays without.
+        let ties = Grid::new(Geometry::square(2, 4, 1.0), vec![1, 3, 0, 0, 3, 1, 0, 2]);
+        assert_eq!(block_majority(&ties, 2).values, [3, 0]);
+        assert!(block_mean(&Grid::filled(Geometry::square(2, 2, 1.0), f64::NAN), 2).values[0].is_nan());
         assert_eq!(step(1009, 700, 512), 2);
         assert_eq!(step(100, 100, 512), 1);
+        assert_eq!([step(512, 1, 512), step(1, 513, 512), step(1024, 1, 512), step(1025, 1, 512)], [1, 2, 2, 3]);
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! A release that was never made: three groups of terrains with missions, a measured DEM with two fits, a texture.
+//! A synthetic release in memory: three groups of terrains with missions, a measured DEM with two fits, a texture.
 
 mod navigation;
 pub mod rovers;
@@ -56,7 +56,7 @@ pub fn empty() -> Data {
     Data {
         study: Study {
             name: "made-up".into(),
-            title: "A release that was never made".into(),
+            title: "A synthetic release".into(),
             seed: 7,
             date: "2026-11-21".into(),
             license: "CC-BY-4.0".into(),
@@ -97,7 +97,7 @@ pub fn empty() -> Data {
     }
 }
 
-/// A log of which nothing is known.
+/// A log without any known value.
 pub fn log() -> LogRow {
     LogRow {
         log_id: String::new(),
@@ -238,7 +238,7 @@ fn stream(item: &str) -> Stream {
     Streams::for_item(7, "report-test", item).stream("shape")
 }
 
-/// Plane waves in random directions, amplitudes falling with frequency.
+/// Plane waves in random directions, with amplitudes that decrease with frequency.
 fn waves(geometry: Geometry, item: &str, amplitude_m: f64, hurst: f64) -> Grid {
     let mut s = stream(item);
     let extent = geometry.size()[0];
@@ -254,7 +254,7 @@ fn waves(geometry: Geometry, item: &str, amplitude_m: f64, hurst: f64) -> Grid {
     Grid::new(geometry, values.map(|(x, y)| height(x, y)).collect())
 }
 
-/// A heightfield of which nothing but its heights is known.
+/// The row of a heightfield, with only the values that follow from its heights.
 pub fn row(id: &str, stage: &str, path: &str, grid: &Grid) -> TerrainRow {
     let (low, high) = grid.range().unwrap();
     TerrainRow {
@@ -562,7 +562,7 @@ fn measured(data: &mut Data, shelf: &mut Shelf) {
     data.heights.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
 }
 
-/// Two more models, a profile, and covariances by direction.
+/// Two more candidate models, a profile likelihood, and covariances by direction.
 fn candidates(data: &mut Data, fit_id: &str, sigma_m: f64, range_m: f64) {
     for (rank, model, worse, factor) in
         [(1, "exponential", 0.0, 1.0), (2, "matern", 1.8, 1.1), (3, "gaussian", 96.4, 0.6)]
@@ -609,7 +609,7 @@ fn candidates(data: &mut Data, fit_id: &str, sigma_m: f64, range_m: f64) {
     }
 }
 
-/// Figures, structure function and profile spectra of a surface.
+/// Parameters, structure function and profile spectra of a surface.
 fn surface(data: &mut Data, id: &str, stage: &str, fit_id: Option<&str>, sq_m: f64) {
     data.surfaces.push(SurfaceRow {
         surface_id: id.into(),

@@ -1,4 +1,4 @@
-//! Structure of whole reports: nothing here compares with a stored page.
+//! Structure of complete reports; nothing here compares with a stored page.
 
 pub mod made_up;
 mod navigation;
@@ -17,7 +17,7 @@ use sastrugi_schemas::tables::{LogRow, MissionRow, TerrainRow};
 use std::collections::BTreeMap;
 use std::path::Path;
 
-/// Every file of a report by its path, and what `render` said about it.
+/// Every file of a report by its path, and the summary.
 fn report(data: &Data) -> (BTreeMap<String, String>, Summary) {
     let folder = tempfile::tempdir().unwrap();
     let summary = write(data, folder.path(), &|_| ()).unwrap();
@@ -37,7 +37,7 @@ fn assert_sound(files: &BTreeMap<String, String>) {
         }
         let words = text.replace("data:image/png;base64,", "");
         let outside = words.replace("http://www.w3.org/2000/svg", "");
-        assert!(!outside.contains("http://") && !outside.contains("https://"), "{name} asks the network");
+        assert!(!outside.contains("http://") && !outside.contains("https://"), "{name} needs the network");
         let forbidden = if name.ends_with(".json") { &["@import"][..] } else { &["<script", "@import", "url(//"] };
         assert!(!forbidden.iter().any(|word| text.contains(word)), "{name}");
         for bad in [">NaN", "\"NaN", "NaN<", " NaN", "inf\"", ">inf", " inf "] {
@@ -84,14 +84,14 @@ fn prop_a_full_report_is_sound() {
     for table in ["intervals-of-jacksboro", "candidates-of-jacksboro", "figures-of-texture", "surfaces"] {
         assert!(files.contains_key(&format!("data/{table}.json")), "{table}");
     }
-    // Three surfaces in one frame, each by its own name.
+    // Three surfaces in one frame, each with its own name.
     let heights = &files["figures/heights-texture.svg"];
-    assert!(["measured residual", "synthetic, residual", "as made"].iter().all(|name| heights.contains(name)));
+    assert!(["measured residual", "synthetic, residual", "as synthesised"].iter().all(|name| heights.contains(name)));
     assert_eq!(summary.bytes, files.values().map(|t| t.len() as u64).sum::<u64>());
     assert!(page.contains("Settings differ"));
 }
 
-/// What a plain query asks of a table are columns of that table.
+/// Conditions of plain queries use only columns of their table.
 #[test]
 fn prop_conditions_name_columns_of_their_table() {
     let (files, _) = report(&made_up::full(3, 48));
@@ -120,7 +120,7 @@ fn prop_conditions_name_columns_of_their_table() {
     assert!(checked > 20, "{checked} columns");
 }
 
-/// A query without the queries inside of it.
+/// A query without its subqueries.
 fn without_inner(query: &str) -> String {
     let Some(start) = query.find("(select") else { return query.to_owned() };
     let mut depth = 0;
@@ -159,7 +159,7 @@ fn prop_an_empty_release_has_a_page_without_empty_boxes() {
     assert!(!files["index.html"].contains("<section"));
 }
 
-/// Every part that may be absent is taken away alone: the page adapts.
+/// Each optional part is removed in turn; the page adapts.
 #[test]
 fn prop_any_part_may_be_absent() {
     type Take = (&'static str, fn(&mut Data));
@@ -223,7 +223,7 @@ fn prop_hostile_words_stay_words() {
 }
 
 #[test]
-fn prop_unknown_figures_are_absent_not_nan() {
+fn prop_unknown_numbers_are_absent_not_nan() {
     let mut data = made_up::full(2, 24);
     for t in &mut data.terrains {
         (t.rms_slope, t.relief_m, t.height_min_m, t.psd_slope) = (f64::NAN, f64::INFINITY, f64::NAN, f64::NEG_INFINITY);
@@ -247,10 +247,10 @@ fn prop_unknown_figures_are_absent_not_nan() {
     assert_sound(&report(&data).0);
 }
 
-/// What is compared by colour is alike: another cell, other heights or a relief of another order stand apart.
+/// Groups share colours only if they are alike: another cell size, other heights or a relief of another magnitude get their own colours.
 #[test]
-fn val_groups_share_colours_where_they_are_alike() {
-    // Ends of the colours of each group, as its figure prints them.
+fn val_similar_groups_share_colours() {
+    // Ends of the colours of each group, as printed in its figure.
     let ends = |change: fn(&mut Data, &mut made_up::Shelf)| {
         let (mut data, mut shelf) = made_up::parts(1, 40);
         change(&mut data, &mut shelf);
@@ -268,7 +268,7 @@ fn val_groups_share_colours_where_they_are_alike() {
     for apart in [
         ends(|data, shelf| lifted(data, shelf, "d2.60-0000", [1.0, 300.0])),
         ends(|data, shelf| lifted(data, shelf, "d2.60-0000", [20.0, 0.0])),
-        // Alike to the second, not to the first.
+        // Similar to the second group, but not to the first.
         ends(|data, shelf| {
             lifted(data, shelf, "d2.45-0000", [2.5, 0.0]);
             lifted(data, shelf, "d2.60-0000", [6.5, 0.0]);
@@ -291,7 +291,7 @@ fn lifted(data: &mut Data, shelf: &mut made_up::Shelf, id: &str, [factor, shift_
     }
 }
 
-/// A terrain without shares for want of room says so in the text and in place of its bars; one without for want of data does not.
+/// A terrain that is too small for shares is named in the text and in place of its bars; one that lacks data is not.
 #[test]
 fn val_surfaces_too_small_for_shares_are_named() {
     let mut data = made_up::full(1, 24);
@@ -301,7 +301,7 @@ fn val_surfaces_too_small_for_shares_are_named() {
     let (files, _) = report(&data);
     assert_sound(&files);
     let page = &files["index.html"];
-    assert!(page.contains("No shares of d2.60-0000: surface too small, nothing lies within a border of 26"));
+    assert!(page.contains("No class shares for d2.60-0000: surface too small, all cells lie in a border of 26"));
     assert!(page.contains("shares leave out a border of 5 to 26 m"));
     assert!(files["figures/class-shares.svg"].contains("surface too small"));
     data.terrains.iter_mut().for_each(|t| t.share_border_m = 5.0);
@@ -309,7 +309,7 @@ fn val_surfaces_too_small_for_shares_are_named() {
     assert!(!page.contains("surface too small") && page.contains("leave out a border of 5 m"));
 }
 
-/// Class maps name their disk.
+/// Captions of class maps state the radius of the closing.
 #[test]
 fn val_class_maps_name_the_radius() {
     let mut data = made_up::full(1, 24);
@@ -322,7 +322,7 @@ fn val_class_maps_name_the_radius() {
     assert!(said(&data).contains("class map, not closed, over"));
 }
 
-/// A map of each kind that differs over its terrain; holes are far below the 99 % of the ground without any.
+/// A map of each kind is drawn if it has more than one value; the colours of a relief include holes far below the other 99 % of the ground.
 #[test]
 fn val_maps_and_sparse_holes_are_drawn() {
     let (mut data, mut shelf) = made_up::parts(1, 40);
@@ -345,9 +345,9 @@ fn val_maps_and_sparse_holes_are_drawn() {
     assert!(files["figures/relief-d2.30-0000.svg"].contains(">−3.00<"));
 }
 
-/// A texture whose covariance the study states is of no fit.
+/// A texture whose covariance the study states has no fit.
 #[test]
-fn val_stated_covariances_are_no_fit() {
+fn val_stated_covariances_have_no_fit() {
     let mut data = made_up::full(1, 24);
     let base = data.terrains.iter().find(|t| t.stage == "terrain").unwrap().clone();
     let params = format!(r#"{{"fit": {{"model": "exponential"}}, "onto": "{}"}}"#, base.terrain_id);
@@ -380,8 +380,8 @@ fn val_variants_stay_out_of_plain_comparisons() {
     assert_eq!(first[5].as_f64(), Some(-87.5));
 }
 
-/// Three terrains a group: 8 arrangements of signs where groups share draws, 20 of terrains where they do not. Missions, 24 a
-/// group, count for nothing.
+/// Three terrains per group: 8 arrangements of signs if groups share draws, 20 of terrains if they do not. The 24 missions per group
+/// do not matter.
 #[test]
 fn val_terrains_are_the_units_of_tests() {
     let mut data = made_up::full(3, 24);
@@ -397,7 +397,7 @@ fn val_terrains_are_the_units_of_tests() {
                 row[3].as_str().unwrap().starts_with(of) && (steps - steps.round()).abs() < 1e-9 && adjusted >= p,
                 "{row:?}"
             );
-            // No shift is rejected at 5 % by so few; delta is bounded.
+            // So few terrains reject no shift at 5 %; delta is bounded.
             assert!(row[4].is_number() && row[5].is_null() && row[6].is_null(), "{row:?}");
             let [delta, low, high] = [7, 8, 9].map(|k| row[k].as_f64().unwrap());
             assert!(-1.0 <= low && low <= delta && delta <= high && high <= 1.0 && low < high, "{row:?}");
@@ -405,7 +405,7 @@ fn val_terrains_are_the_units_of_tests() {
     }
 }
 
-/// Without groups, and with one terrain a group, there is nothing to test.
+/// Without groups, and with one terrain per group, there is nothing to test.
 #[test]
 fn val_groups_without_terrains_are_not_compared() {
     let mut data = made_up::full(2, 24);
@@ -424,10 +424,10 @@ fn claim(json: serde_json::Value) -> HypothesisItem {
     serde_json::from_value(all).unwrap()
 }
 
-/// Claims are tested as the exploratory part tests them: same p. Holm counts the claims of a family only (by hand: the
-/// smaller of two doubles), and a claim of the other direction does not hold.
+/// Claims have the same p as in the exploratory part. Holm's adjustment is within the family (by hand: the smaller of two p
+/// doubles), and a claim with the opposite direction is not supported.
 #[test]
-fn val_declared_claims_are_tested_apart() {
+fn val_declared_claims_are_adjusted_by_family() {
     let mut data = made_up::full(6, 24);
     let pitch = "rms_pitch_rate_deg_s";
     data.study.hypotheses = vec![
@@ -452,7 +452,7 @@ fn val_declared_claims_are_tested_apart() {
     let page = &files["index.html"];
     let (first, rest) = (page.find("confirmatory").unwrap(), page.find("Everything else is exploratory").unwrap());
     assert!(first < rest && page.contains(&data.study_sha256));
-    assert!(!page.contains("no hypothesis was registered"));
+    assert!(!page.contains("no hypothesis was declared"));
     let rows_of = rows(&files, "hypotheses");
     let p = |k: usize| [6, 7].map(|c| rows_of[k][c].as_f64().unwrap());
     let trends = rows(&files, "comparison-trend");
@@ -463,16 +463,16 @@ fn val_declared_claims_are_tested_apart() {
     assert_eq!(p(2)[0], p(2)[1]);
     let verdicts: Vec<&str> = rows_of.iter().map(|r| r[1].as_str().unwrap()).collect();
     assert_eq!(verdicts[0], "supported");
-    assert_eq!(verdicts[2], "not supported: it goes the other way");
+    assert_eq!(verdicts[2], "not supported: the effect has the opposite direction");
     assert_eq!(verdicts[3], "supported");
     assert_eq!(verdicts[4], "equivalent within the margin");
     assert_eq!(verdicts[5], "not supported");
-    assert_eq!(verdicts[6], "cannot tell: a group has no missions with this figure");
+    assert_eq!(verdicts[6], "cannot tell: a group has no missions with this metric");
 }
 
-/// Eleven of 20 terrains are as good as all of the others: the shift is 0 and the success falls all the same.
+/// On 11 of 20 terrains success is as high as in the other group: the shift is 0, but success still falls.
 #[test]
-fn val_ties_do_not_turn_a_claim_round() {
+fn val_ties_do_not_reverse_a_claim() {
     let mut data = made_up::full(20, 24);
     let on_steep = data.missions.iter().map(|m| m.terrain_id.clone()).filter(|id| id.starts_with("d2.60"));
     let terrains: std::collections::BTreeSet<String> = on_steep.collect();
@@ -490,9 +490,9 @@ fn val_ties_do_not_turn_a_claim_round() {
     assert_eq!((row[1].as_str(), row[2].as_f64()), (Some("supported"), Some(0.0)), "{row:?}");
 }
 
-/// Three blocks have eight arrangements of signs: no data could reach 5 %.
+/// Three blocks have eight arrangements of signs, so no data could reach 5 %.
 #[test]
-fn val_claims_that_no_data_could_support_cannot_be_told() {
+fn val_claims_that_no_data_could_support_are_undecided() {
     let mut data = made_up::full(3, 24);
     let groups = ["2.30", "2.60"];
     data.study.hypotheses =
@@ -502,7 +502,7 @@ fn val_claims_that_no_data_could_support_cannot_be_told() {
 
 /// Six blocks reach 2 / 64 at best: enough for one claim at 5 %, too few for two in a family.
 #[test]
-fn val_families_and_scatter_decide_what_can_be_told() {
+fn val_family_size_decides_whether_terrains_suffice() {
     let mut data = made_up::full(6, 24);
     let groups = ["2.30", "2.60"];
     let success = serde_json::json!({ "statistic": "success", "groups": groups, "test": "difference" });
@@ -521,10 +521,10 @@ fn val_families_and_scatter_decide_what_can_be_told() {
     assert!(row[3].is_null() && row[6].as_f64() == Some(1.0 / 64.0), "{row:?}");
 }
 
-/// Every mission has the same figure in all groups, and the hard ones fail in the last: nothing changes from group to group, though the
-/// survivors' means do.
+/// Every mission has the same metric in all groups, and the hard ones fail in the last group: nothing changes between groups, although the
+/// means of the survivors do.
 #[test]
-fn val_paired_figures_are_of_missions_that_succeed_in_both() {
+fn val_paired_metrics_use_missions_that_succeed_in_both() {
     let mut data = made_up::full(6, 24);
     for mission in &mut data.missions {
         let number: u32 = mission.pair_id.bytes().map(u32::from).sum::<u32>() % 7;
@@ -550,9 +550,9 @@ fn val_paired_figures_are_of_missions_that_succeed_in_both() {
     assert!(row[3] == "0 blocks, 0 missions" && row[4].is_null() && row[10].is_null(), "{row:?}");
 }
 
-/// A second run over the same terrains is a group of its own everywhere, and a claim says which run it means.
+/// A second run over the same terrains is a separate group everywhere, and a claim names its run.
 #[test]
-fn val_runs_are_groups_of_their_own() {
+fn val_runs_are_separate_groups() {
     let mut data = made_up::full(6, 24);
     data.missions.retain(|m| m.variant.is_none());
     let first = data.missions[0].traverse_id.clone();
@@ -580,9 +580,9 @@ fn val_runs_are_groups_of_their_own() {
     assert!(of_runs[0] < 1.0 && of_runs[1] == 1.0, "{of_runs:?}");
 }
 
-/// The same release, whose heights are known by hash: every value is the same. Other heights: terrains are apart.
+/// The same release, with heights known by hash: every value is the same. Other heights: terrains are independent.
 #[test]
-fn val_a_release_against_another() {
+fn val_a_release_is_compared_with_another() {
     let hashed = |salt: &str| {
         let mut data = made_up::full(6, 24);
         data.contents = data.terrains.iter().map(|t| (t.path.clone(), format!("{salt}{}", t.terrain_id))).collect();
@@ -620,10 +620,9 @@ fn val_a_release_against_another() {
     assert!(!report(&hashed("")).0["index.html"].contains("id=\"releases\""));
 }
 
-/// A log with a mission's own figures lies among its group, one that is far rougher lies above, one below its noise floor
-/// cannot tell.
+/// A log with the metrics of a mission lies among its group, a far rougher one lies above, one below its noise floor cannot tell.
 #[test]
-fn val_logs_beside_missions() {
+fn val_logs_are_compared_with_missions() {
     let mut data = made_up::full(6, 24);
     let median = |of: fn(&MissionRow) -> f64| {
         let group = data.mission_groups().swap_remove(0);
@@ -652,10 +651,10 @@ fn val_logs_beside_missions() {
     assert_eq!(found.len(), 8 + 8 * 3);
     let verdicts: Vec<&str> = found[..4].iter().map(|r| r[3].as_str().unwrap()).collect();
     let few = "cannot tell: at the edge, and too few terrains";
-    assert_eq!(verdicts, ["no value", few, "within the middle 95 %", "cannot tell: below three noise floors"]);
+    assert_eq!(verdicts, ["no value", few, "within the middle 95 %", "cannot tell: below three times the noise floor"]);
     assert_eq!(found[1][10].as_f64(), Some(100.0));
     assert!(files["index.html"].contains("Sampled at another rate than the missions (20 Hz)"));
-    // Of 40 terrains a p of 2/41 can come; a drive that failed, or whose log broke off, is not judged.
+    // With 40 terrains, p can be 2/41; a drive that failed, or whose log is incomplete, is not judged.
     let missions = made_up::full(40, 2);
     let verdict = |outcome: &str, broken: Option<&str>| {
         let (outcome, broken) = (Some(outcome.to_owned()), broken.map(str::to_owned));
@@ -669,13 +668,13 @@ fn val_logs_beside_missions() {
     };
     let text = |words: &str| Cell::Text(words.into());
     assert_eq!(verdict("success", None), text("above the missions"));
-    assert_eq!(verdict("stuck", None), text("not judged: it ended as stuck"));
-    assert_eq!(verdict("success", Some("at 3 s")), text("not judged: the log broke off"));
+    assert_eq!(verdict("stuck", None), text("not judged: outcome stuck"));
+    assert_eq!(verdict("success", Some("at 3 s")), text("not judged: the log is incomplete"));
 }
 
-/// Figures by group and changes of the paper, each with a verdict that its own row bears out.
+/// Values by group and changes of the paper, each with a verdict that agrees with its row.
 #[test]
-fn val_every_published_figure_has_a_verdict() {
+fn val_every_published_value_has_a_verdict() {
     let rows = rows(&report(&made_up::full(3, 24)).0, "published");
     assert_eq!(rows.len(), 6 * 3 + 12 * 2);
     for row in rows {
@@ -688,7 +687,7 @@ fn val_every_published_figure_has_a_verdict() {
     }
 }
 
-/// Not a check: leaves a page to look at (its place is printed).
+/// Not a check: writes a page to look at and prints its path.
 #[test]
 #[ignore = "writes a page to look at"]
 fn gold_a_page_to_look_at() {

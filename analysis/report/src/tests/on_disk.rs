@@ -104,7 +104,7 @@ fn val_failed_items_are_listed() {
     assert!(files["data/failed.json"].contains("too small"));
 }
 
-/// Claims of the study are read from its file; one that no test fits is a damaged file.
+/// Hypotheses are read from the study file; an invalid one makes the file unreadable.
 #[test]
 fn val_hypotheses_are_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -120,7 +120,7 @@ fn val_hypotheses_are_read() {
     assert!(error.to_string().contains("margin"), "{error}");
 }
 
-/// The disk of the class maps is that of the study, whole numbers too.
+/// The disk of the class maps is read from the study, also as an integer.
 #[test]
 fn val_roughness_is_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -132,7 +132,7 @@ fn val_roughness_is_read() {
     assert_eq!(radius_m(), 1.0);
 }
 
-/// A companion that is not what it should be is refused in one sentence.
+/// An unusable companion is refused in one sentence.
 #[test]
 fn val_unusable_companions_are_refused() {
     let folder = tempfile::tempdir().unwrap();
@@ -144,11 +144,96 @@ fn val_unusable_companions_are_refused() {
         error.to_string()
     };
     let against = |path: &Path| error(Companions { against: Some(path.to_owned()), ..Companions::default() });
-    assert!(against(&folder.path().join("nowhere")).contains("no release"));
+    assert!(against(&folder.path().join("nowhere")).contains("is not a release"));
     let logs = |path: &Path| error(Companions { logs: vec![path.to_owned()], ..Companions::default() });
     assert!(logs(&folder.path().join("no.parquet")).contains("sastrugi analyze -o"));
     assert!(logs(&staging.join("tables/missions/part-0000.parquet")).contains("sastrugi analyze -o"));
     assert!(logs(&staging.join("study.toml")).contains("sastrugi analyze -o"));
+}
+
+/// A file in place of the report, of the folder above it or of a folder in it, and files of others in it: each is named, and stays.
+#[test]
+fn val_what_is_in_the_way_is_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let [release, page] = ["release", "page"].map(|name| folder.path().join(name));
+    fs::create_dir(&release).unwrap();
+    fs::write(release.join("study.toml"), STUDY).unwrap();
+    let refused = |out: &Path| {
+        let error = render(&release, out, &|_| ()).unwrap_err();
+        assert!(matches!(error, ReportError::Occupied { .. }) && !error.unusable_input(), "{error}");
+        error.to_string()
+    };
+    fs::write(&page, "mine").unwrap();
+    let is_file = format!("{} is a file, not a folder; choose another folder with -o", page.display());
+    assert_eq!([refused(&page), refused(&page.join("below"))], [is_file.as_str(); 2]);
+    assert_eq!(fs::read_to_string(&page).unwrap(), "mine");
+    fs::remove_file(&page).unwrap();
+    for (file, named) in [
+        ("thesis.tex", "thesis.tex"),
+        ("figures", "figures"),
+        ("data", "data"),
+        ("index.html/x", "index.html"),
+        ("figures/a.png", "figures/a.png"),
+        ("data/a.svg", "data/a.svg"),
+        ("data/without-ending", "data/without-ending"),
+    ] {
+        let path = page.join(file);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(&path, "mine").unwrap();
+        let expected = format!(
+            "{} contains {named}, which is not part of a report; choose another folder with -o",
+            page.display()
+        );
+        assert_eq!(refused(&page), expected);
+        assert_eq!(fs::read_to_string(&path).unwrap(), "mine", "{file}");
+        fs::remove_dir_all(&page).unwrap();
+    }
+    // Files of an earlier report are replaced.
+    for file in ["index.html", "figures/old.svg", "data/old.json"] {
+        let path = page.join(file);
+        fs::create_dir_all(path.parent().unwrap()).unwrap();
+        fs::write(path, "old").unwrap();
+    }
+    render(&release, &page, &|_| ()).unwrap();
+    assert!(fs::read_to_string(page.join("index.html")).unwrap().starts_with("<!DOCTYPE html>"));
+    assert!(!page.join("figures/old.svg").exists() && !page.join("data/old.json").exists());
+}
+
+/// Paths in tables are those of the release: whatever leads out of it counts as missing, although the file exists.
+#[test]
+fn val_paths_lead_to_files_of_the_release() {
+    let folder = tempfile::tempdir().unwrap();
+    let builder = assembled(&folder.path().join("release"));
+    let staging = builder.staging().to_owned();
+    let inside = "dem/jacksboro.metric.tif";
+    let outside = staging.parent().unwrap().join("outside.tif");
+    fs::copy(staging.join(inside), &outside).unwrap();
+    let files = crate::data::Data::open(&staging).unwrap().files;
+    assert!(files.grid(inside).unwrap().is_some());
+    let absolute = outside.display().to_string();
+    for path in ["../outside.tif", "dem/../../outside.tif", absolute.as_str(), "dem/missing.tif", "dem"] {
+        assert!(files.grid(path).unwrap().is_none(), "{path}");
+    }
+}
+
+/// The head of the page has what the study states; creators are texts or tables.
+#[test]
+fn val_the_study_is_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let study = |more: &str| {
+        fs::write(folder.path().join("study.toml"), format!("{STUDY}license = \"CC0-1.0\"\n{more}")).unwrap();
+        crate::data::Data::open(folder.path()).unwrap().study
+    };
+    let plain = study("description = \"Two hills.\"\n");
+    assert_eq!((plain.name.as_str(), plain.title.as_str(), plain.seed), ("made-up", "A <title>", 7));
+    assert_eq!((plain.date.as_str(), plain.license.as_str()), ("2026-11-21", "CC0-1.0"));
+    assert_eq!((plain.description.as_str(), plain.creators), ("Two hills.", vec!["A".to_owned(), "B".to_owned()]));
+    let creators = |toml: &str| {
+        fs::write(folder.path().join("study.toml"), format!("[study]\n{toml}")).unwrap();
+        crate::data::Data::open(folder.path()).unwrap().study.creators
+    };
+    assert_eq!(creators("creators = [{ name = \"A\", orcid = \"0\" }, \"B\"]\n"), ["A", "B"]);
+    assert_eq!(creators("[[study.creators]]\nname = \"C\"\n[[study.creators]]\nname = \"D\"\n"), ["C", "D"]);
 }
 
 #[test]

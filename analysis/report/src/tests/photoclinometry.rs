@@ -1,4 +1,4 @@
-//! Pages about heights from images.
+//! Pages on heights from images.
 
 use super::made_up::{self, Shelf};
 use super::{assert_sound, report, rows};
@@ -113,9 +113,9 @@ fn release(surfaces: Vec<(PhotoclinometryRow, Vec<PhotoclinometryBandRow>)>) -> 
 
 const OCTAVES: [(f64, f64, f64); 3] = [(1.0, 0.7, 0.8), (1.0, 1.05, 0.95), (2.0, 2.0, 0.99)];
 
-/// The verdict says at which wavelengths the texture is the truth's: the first octave has 30 % too little height, the others are within 5 %. Over all
-/// of them heights have sqrt((0.49 + 1.1025 + 4) / 6) = 96.5 % of the truth's rms, slopes sqrt((0.49 + 0.275625 + 0.25) / 1.5) = 82.3 %. An error of 4 m that is 0.05 m less the plane
-/// is called a tilt, and lies above three times the uncertainty.
+/// The verdict names the wavelengths at which the texture matches the truth: the first octave has 30 % too little height, the others are within 5 %. Over all
+/// of them, heights have sqrt((0.49 + 1.1025 + 4) / 6) = 96.5 % of the truth's RMS, slopes sqrt((0.49 + 0.275625 + 0.25) / 1.5) = 82.3 %. An error of 4 m that
+/// falls to 0.05 m after subtracting the plane is called a tilt, and exceeds three times the uncertainty.
 #[test]
 fn val_the_verdict_names_wavelengths() {
     let (files, summary) = report(&release(vec![(row("recovered", None, 0.05), bands("recovered", &OCTAVES))]));
@@ -123,15 +123,15 @@ fn val_the_verdict_names_wavelengths() {
     let page = &files["index.html"];
     for words in [
         "<section id=\"photoclinometry\">",
-        "on the same waves, at 8 to 32 m; not at 4 to 8 m (rms height 70 %, rms slope 70 % of the truth&#39;s, squared coherence 0.80)",
-        "rms height 97 % of the truth&#39;s, rms slope 82 %",
-        "Heights are off by 4.00 m (rms) where the true ones have 1.00 m; most of it is a tilt: 0.0500 m remain less the plane.",
-        "recovered: heights are off by more than three times their uncertainty",
+        "coherent with it, at 8 to 32 m, but not at 4 to 8 m (RMS height 70 %, RMS slope 70 % of the truth&#39;s, squared coherence 0.80)",
+        "the RMS height is 97 % of the truth&#39;s, the RMS slope 82 %",
+        "The RMS height error is 4.00 m, for a true RMS height of 1.00 m; most of it is a tilt: 0.0500 m remain after subtracting the plane.",
+        "recovered: height errors exceed three times the uncertainty",
     ] {
         let plain = words.replace("&#39;", "'");
         assert!(page.contains(words) || page.contains(&plain), "{words}");
     }
-    assert!(!page.contains("did not settle") && !page.contains("hardly tell"));
+    assert!(!page.contains("did not converge") && !page.contains("barely separate"));
     for figure in [
         "photoclinometry-heights-by-wavelength-1",
         "photoclinometry-slopes-by-wavelength-1",
@@ -150,7 +150,8 @@ fn val_the_verdict_names_wavelengths() {
     assert!(near(&slopes[1][3], 0.5) && near(&slopes[1][4], 0.525), "{slopes:?}");
 }
 
-/// The error map is recovered less true heights on the cells of the map, less the mean: the tilt from edge to edge, 31 cells of 2 m. Both reliefs have the colours of the truth.
+/// The error map is recovered minus true heights on the cells of the map, minus the mean: the tilt from edge to edge, 31 cells of 2 m. Both reliefs have the
+/// colours of the truth.
 #[test]
 fn val_errors_are_mapped_on_the_cells() {
     let files = report(&release(vec![(row("recovered", None, 0.05), bands("recovered", &OCTAVES))])).0;
@@ -174,7 +175,7 @@ fn val_errors_are_mapped_on_the_cells() {
     assert!(files["index.html"].contains("25.0 % of the cells that are lit at all are lit in fewer than three"));
 }
 
-/// A sweep is drawn by the value that it sweeps, in order of the values; of many surfaces the best and the worst of the item are mapped.
+/// A sweep is drawn against its swept value, in order; of many surfaces, the best and the worst of the item are mapped.
 #[test]
 fn val_sweeps_are_drawn_and_mapped_at_their_ends() {
     let value = |k: usize| [0.0, 0.02, 0.04, 0.1][k];
@@ -195,17 +196,17 @@ fn val_sweeps_are_drawn_and_mapped_at_their_ends() {
     let mapped: Vec<&String> = summary.figures.iter().filter(|f| f.starts_with("photoclinometry-error-")).collect();
     assert_eq!(mapped, ["photoclinometry-error-recovered-0", "photoclinometry-error-recovered-0.1"]);
     let page = &files["index.html"];
-    assert!(page.contains("Drawn are 2 of 4 recovered surfaces"));
+    assert!(page.contains("The figures show 2 of 4 recovered surfaces"));
     assert!(
-        page.contains("recovered-0.1: heights did not settle, they still changed by up to 0.30 m in the last round.")
+        page.contains("recovered-0.1: heights did not converge; they still changed by up to 0.30 m in the last round.")
     );
     assert_eq!(rows(&files, "photoclinometry-errors").len(), 4);
 }
 
-/// Covariances of both fits stand beside each other: with 0.9 of the truth's covariance at every lag they differ by 10 %, and so do the rms heights below the window.
-/// Fits with windows of other sizes are not compared, and the page says what is missing.
+/// Covariances of both fits are compared: with 0.9 of the truth's covariance at every lag they differ by 10 %, and so do the band RMS below the window.
+/// Fits with windows of other sizes are not compared, and the page states what is missing.
 #[test]
-fn val_covariances_stand_beside_each_other() {
+fn val_covariances_are_compared() {
     let mut data = release(vec![(row("recovered", None, 0.05), bands("recovered", &OCTAVES))]);
     let full = made_up::full(1, 24);
     let like = full.fits.iter().find(|f| f.mode == "corrected").unwrap();
@@ -229,19 +230,19 @@ fn val_covariances_stand_beside_each_other() {
     let files = report(&data).0;
     assert_sound(&files);
     let found = rows(&files, "photoclinometry-covariance");
-    // Lags of 2, 4, 6 and 8 m are known to both: 0.1 (3.5, 3, 2.5, 2) over 3.5.
+    // Both have lags of 2, 4, 6 and 8 m: 0.1 (3.5, 3, 2.5, 2) over 3.5.
     let squares: f64 = [3.5, 3.0, 2.5, 2.0].iter().map(|v: &f64| (0.1 * v) * (0.1 * v)).sum();
     let difference = 100.0 * (squares / 4.0).sqrt() / 3.5;
     assert!(near(&found[0][10], 0.9) && near(&found[0][11], 4.0) && near(&found[0][12], difference), "{:?}", found[0]);
     assert_eq!(found.len(), 4);
-    assert!(files["index.html"].contains("by 8 % (rms over lags); rms height below a window of 10.0 m: 90 %"));
+    assert!(files["index.html"].contains("by 8 % (RMS over lags); its band RMS below a window of 10.0 m is 90 %"));
     data.fits[1].window_x_m = 20.0;
     let files = report(&data).0;
     assert!(!files.contains_key("data/photoclinometry-covariance.json"));
-    assert!(files["index.html"].contains("no true surface is with a window of nearly the same size"));
+    assert!(files["index.html"].contains("no true surface has one with a window of nearly the same size"));
 }
 
-/// Without a true surface there is no verdict, no error map and no curve, and the page says so.
+/// Without a true surface there is no verdict, no error map and no curve, and the page states it.
 #[test]
 fn val_without_a_truth_nothing_is_compared() {
     let unknown = PhotoclinometryRow {

@@ -28,9 +28,9 @@ fn planets(planetary: usize, elaborate: usize) -> Data {
     data
 }
 
-/// Every terrain has a picture: the one with the middle slope of each group a large one, the others thumbnails, each with its row of numbers.
+/// Every terrain has a picture: a large one for the terrain with the median slope of each group, thumbnails for the others, each with its row of numbers.
 #[test]
-fn val_every_planet_is_rendered() {
+fn val_every_planetary_terrain_is_rendered() {
     let (files, summary) = report(&planets(6, 3));
     assert_sound(&files);
     let large: Vec<&String> = summary.figures.iter().filter(|f| f.starts_with("rendered-")).collect();
@@ -46,15 +46,15 @@ fn val_every_planet_is_rendered() {
     let drawn = sheets.iter().flatten().filter_map(|row| row[0].as_str()).collect::<Vec<_>>();
     assert!(!drawn.contains(&"terrain/planetary-0002.tif") && drawn.contains(&"terrain/planetary-0005.tif"));
     let page = &files["index.html"];
-    assert!(page.contains("5 terrains from above with their albedo and cast shadows, pixels of 0.500 m"));
+    assert!(page.contains("5 terrains from above with mapped albedo and cast shadows, pixels of 0.500 m"));
     assert!(
-        page.contains("2 terrains from above with one albedo")
+        page.contains("2 terrains from above with uniform albedo")
             && page.contains("sun from 315 degrees (north-west), 25 degrees above the horizon")
     );
     assert!(!page.contains("are not rendered here"));
 }
 
-/// A page holds 96 thumbnails, and says how many terrains it leaves out.
+/// A page has at most 96 thumbnails and states how many terrains it leaves out.
 #[test]
 fn val_thumbnails_are_bounded() {
     let (files, _) = report(&planets(100, 0));

@@ -1,4 +1,4 @@
-//! Pages about rovers.
+//! Pages on rovers.
 
 use super::made_up::rovers::{LIMIT_M, RADIUS_M, ROVERS, factor};
 use super::{assert_sound, made_up, report, rows};
@@ -23,13 +23,13 @@ fn near(cell: &Value, expected: f64) -> bool {
     cell.as_f64().is_some_and(|v| (v - expected).abs() <= 1e-9 * expected.abs().max(1.0))
 }
 
-/// The made-up distances of the first group, rover by rover.
+/// The synthetic distances of the first group, rover by rover.
 fn distances(worlds: usize) -> Vec<f64> {
     let of = |w: usize| (0..ROVERS).map(move |r| RADIUS_M * factor(0.0, w as f64, r as f64));
     (0..worlds).flat_map(of).collect()
 }
 
-/// Both efficiencies by hand: all of the first group arrive with 0.4 m left; of the last every fifth is stopped.
+/// Both efficiencies by hand: all rovers of the first group arrive with 0.4 m left; every fifth of the last group is stopped.
 #[test]
 fn val_efficiencies() {
     let (files, summary) = report(&driven(4));
@@ -42,11 +42,11 @@ fn val_efficiencies() {
     assert_eq!((row[0].as_str(), row[1].as_u64(), row[2].as_u64()), (Some("2.30"), Some(4), Some(40)));
     assert!(near(&row[3], 100.0) && near(&row[6], efficiency) && near(&row[7], efficiency), "{row:?}");
     assert!(near(&row[10], RADIUS_M * 40.0 / all.iter().sum::<f64>()), "{row:?}");
-    // Efficiency over that of the ground's shortest way, 1.05 times the straight line.
+    // Efficiency relative to that of the ground's shortest path, 1.05 times the straight line.
     assert!(near(&row[14], 1.05 * efficiency) && near(&row[15], 0.0), "{row:?}");
     // All arrive on four worlds: worlds count as single trials, 0.025^(1/4).
     assert!(near(&row[4], 100.0 * libm::pow(0.025, 0.25)) && near(&row[5], 100.0), "{row:?}");
-    // Two of ten rovers of the last group are stopped, one of them without a way.
+    // Two of ten rovers of the last group are stopped, one of them without a path.
     assert!(near(&found[2][3], 80.0) && near(&found[2][15], 10.0), "{:?}", found[2]);
     for figure in [
         "rover-mean-efficiency",
@@ -59,12 +59,12 @@ fn val_efficiencies() {
         assert!(summary.figures.iter().any(|f| f == figure), "{figure} of {:?}", summary.figures);
     }
     let page = &files["index.html"];
-    assert!(page.contains("Every set stands on fewer than 20 worlds (the least: 4)"));
-    assert!(page.contains("For 4 of 120 rovers the ground has no way"));
+    assert!(page.contains("Every set has fewer than 20 worlds (the smallest number is 4)"));
+    assert!(page.contains("For 4 of 120 rovers, the ground has no path"));
     assert!(page.contains("2.60: 80 %"));
 }
 
-/// Budgets are read off the sorted distances; where a fifth is stopped, 90 % is not reached and the row says so.
+/// Budgets are read off the sorted distances; if a fifth of the rovers is stopped, 90 % is not reached and the row states it.
 #[test]
 fn val_budgets() {
     let files = report(&driven(4)).0;
@@ -72,6 +72,7 @@ fn val_budgets() {
     assert_eq!(found.len(), 3 * 4);
     let mut all = distances(4);
     all.sort_by(f64::total_cmp);
+    assert_eq!(found.iter().filter(|r| r[0] == "2.30").count(), 4);
     for row in found.iter().filter(|r| r[0] == "2.30") {
         let n = (row[1].as_f64().unwrap() / 100.0 * 40.0).round() as usize;
         assert!(near(&row[2], all[n - 1]) && near(&row[5], all[n - 1] / RADIUS_M), "{row:?}");
@@ -85,7 +86,7 @@ fn val_budgets() {
     assert!(near(&last[2], 0.8) && near(&last[1], RADIUS_M * factor(2.0, 3.0, 8.0)), "{last:?}");
 }
 
-/// Rows of size, columns of clearance, a block for each group; the list has every combination.
+/// Sizes in rows, clearances in columns, a block for each group; the list has every combination.
 #[test]
 fn val_designs() {
     let files = report(&driven(3)).0;
@@ -120,9 +121,9 @@ fn repeated(worlds: usize) -> Data {
     data
 }
 
-/// The paper's circle is the last group's alone; each verdict follows from its row; other numbers of rovers are warned of.
+/// The paper's circle matches only the last group; each verdict follows from its row; a warning names other numbers of rovers.
 #[test]
-fn val_published_trials_stand_beside_their_group() {
+fn val_published_trials_are_compared_with_their_group() {
     assert!(!report(&driven(3)).0.contains_key("data/rover-published.json"));
     let files = report(&repeated(4)).0;
     assert_sound(&files);
@@ -137,13 +138,16 @@ fn val_published_trials_stand_beside_their_group() {
         assert_eq!(row[9] == "inside", (from..=to).contains(&paper), "{row:?}");
     }
     assert_eq!(found[0][3].as_f64(), Some(0.0893));
-    assert!(files["index.html"].contains("2.60: the paper has 100 rovers on its world, 4 of ours have another number"));
+    assert!(
+        files["index.html"]
+            .contains("2.60: the paper has 100 rovers on its world, but 4 of our worlds have another number")
+    );
     // A single world has no band and no verdict.
     let files = report(&repeated(1)).0;
     assert!(rows(&files, "rover-published").iter().all(|r| r[7].is_null() && r[9] == "–"));
 }
 
-/// The strongest parameter stands first; the colour of a bar follows the interval of its mean effect.
+/// The strongest parameter comes first; the colour of a bar follows the interval of its mean effect.
 #[test]
 fn val_effects() {
     let (files, summary) = report(&driven(2));
@@ -152,7 +156,7 @@ fn val_effects() {
     assert_eq!(rows(&files, "rover-effects").len(), 4 * 3);
     let page = &files["index.html"];
     assert!(page.contains(
-        "circle, 2.30: efficiency most by hazard_step_m, arrival most by hazard_step_m, distance most by hazard_step_m."
+        "circle, 2.30: the most influential parameter is hazard_step_m for efficiency, hazard_step_m for arrival, hazard_step_m for distance."
     ));
     let svg = &files["figures/rover-effects-circle-2.30--efficiency.svg"];
     let at = |word: &str| svg.find(word).unwrap_or_else(|| panic!("{word}"));
@@ -161,10 +165,10 @@ fn val_effects() {
         !svg.contains("cycle limit")
             && files["index.html"].contains("3 of 4 parameters (1 without any effect), 8 trajectories on 3 worlds")
     );
-    assert!(["raises", "lowers", "cannot be told"].iter().all(|w| svg.contains(w)));
+    assert!(["raises", "lowers", "sign unclear"].iter().all(|w| svg.contains(w)));
 }
 
-/// Whatever is missing or extreme, the page stands.
+/// Pages are sound whatever is missing or extreme.
 #[test]
 fn prop_odd_releases_have_sound_pages() {
     type Take = (&'static str, fn(&mut Data));
@@ -204,8 +208,8 @@ fn prop_odd_releases_have_sound_pages() {
     assert!(!report(&data).0["index.html"].contains("<section id=\"rovers\">"));
 }
 
-/// A rover that leaves the ground at its start has an efficiency of 1 without a drive: in means it counts as 0, it does not arrive, and the page says how many there are.
-/// The efficiency of arrivals leaves out those that are stopped.
+/// A rover that leaves the ground at its start has an efficiency of 1 without having driven: in means it counts as 0, it does not arrive, and the page states
+/// the number of such rovers. The efficiency of arrivals leaves out rovers that are stopped.
 #[test]
 fn val_rovers_off_the_ground_count_as_zero() {
     let mut data = driven(4);
@@ -230,7 +234,7 @@ fn val_rovers_off_the_ground_count_as_zero() {
         assert!(near(&found[0][column], share * before[0][column].as_f64().unwrap()), "{column}: {:?}", found[0]);
     }
     assert!(files["index.html"].contains("1 of 121 rovers ended off the known ground."));
-    // A fifth of the last group is stopped: arrivals are better than all.
+    // A fifth of the last group is stopped, so arrivals are more efficient than all rovers.
     let arrived: Vec<f64> = data
         .rovers
         .iter()
@@ -243,8 +247,8 @@ fn val_rovers_off_the_ground_count_as_zero() {
     assert!(found[2][6].as_f64() > found[2][7].as_f64());
 }
 
-/// Efficiencies scattered about 0.98 on three worlds: intervals and bands on the logarithm would pass 1, and end there. Straight over mean distance ends at
-/// the straight line over what is left of it at arrival, 0.4 m.
+/// Efficiencies scattered around 0.98 on three worlds: intervals and bands on the logarithm would exceed 1 and are clipped there. Straight over mean distance
+/// ends at the straight distance over the shortest drive, which is 0.4 m shorter.
 #[test]
 fn val_bands_end_at_a_straight_drive() {
     let mut data = driven(3);

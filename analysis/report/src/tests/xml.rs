@@ -1,4 +1,4 @@
-//! A slow, strict reader of XML (and of HTML as this room writes it), for tests only.
+//! A slow, strict XML reader (also for the HTML that this crate writes), for tests only.
 
 /// Elements of HTML that have no end tag.
 const VOID: [&str; 4] = ["meta", "br", "wbr", "hr"];

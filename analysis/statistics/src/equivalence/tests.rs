@@ -5,7 +5,7 @@ const A: [f64; 6] = [62.0, 71.5, 55.0, 80.0, 66.5, 71.5];
 const B: [f64; 5] = [58.0, 49.0, 71.5, 40.5, 55.0];
 const D: [f64; 8] = [1.5, -0.5, 3.0, 0.0, 2.5, 0.5, -1.0, 4.0];
 
-/// statsmodels 0.15.0 (`tests/statistical/nested_tests.py`): weightstats.ttost_ind with usevar="unequal", ttost_paired,
+/// Against statsmodels 0.15.0 (`tests/statistical/nested_tests.py`): weightstats.ttost_ind with usevar="unequal", ttost_paired,
 /// CompareMeans.tconfint_diff, and scipy.stats.t.interval. Relative tolerance 1e-11.
 #[test]
 fn val_of_statsmodels() {
@@ -21,9 +21,9 @@ fn val_of_statsmodels() {
     close(pairs.smallest_margin(0.05), 2.450_908_376_757_077);
 }
 
-/// The two forms agree: p <= 0.05 where the interval of 90 % lies within the margins.
+/// The two criteria agree: p <= 0.05 exactly if the 90 % interval lies within the margins.
 #[test]
-fn prop_inclusion_is_the_two_tests() {
+fn prop_interval_inclusion_equals_the_two_tests() {
     let difference = MeanDifference::between(&A, &B).unwrap();
     for k in 1..80 {
         let margin = 0.5 * f64::from(k);
@@ -41,7 +41,7 @@ fn val_degenerate_samples() {
     assert_eq!(MeanDifference::between(&[1.0], &[1.0, 2.0]), None);
     assert_eq!(MeanDifference::between(&[], &[]), None);
     assert_eq!(MeanDifference::of_pairs(&[1.0]), None);
-    // Nothing varies: an estimate, no interval, and the p of a sign test: by hand 1/4 of two pairs, 1/8 of three terrains.
+    // Nothing varies: an estimate, no interval, and the p of a sign test; by hand 1/4 for two pairs, 1/8 for three terrains.
     for sure in [MeanDifference::between(&[2.0; 3], &[1.0; 3]), MeanDifference::of_pairs(&[-1.0, -1.0 - 1e-13])] {
         let sure = sure.unwrap();
         assert!((sure.estimate + 1.0).abs() < 1e-12 && !sure.scatters());
@@ -56,8 +56,8 @@ fn val_degenerate_samples() {
 }
 
 /// Null: the true difference is the margin itself, 1. Level 0.05: equivalence is claimed in 5 % of 4000 sets of 10 + 10
-/// (and 10 pairs of) normal terrain means with deviations 0.3 and 0.6. More than 272 of 4000 has a false-alarm
-/// probability of 3e-7 (binomial, p = 0.05), fewer than 134 one of 2e-7: levels of 8 % and 2.5 % would be noticed.
+/// (and 10 pairs of) normal terrain means with standard deviations 0.3 and 0.6. More than 272 of 4000 has a false-alarm
+/// probability of 3e-7 (binomial, p = 0.05), fewer than 134 one of 2e-7: levels of 8 % and 2.5 % would be detected.
 #[test]
 fn stat_level_at_the_margin() {
     let mut s = Streams::for_seed(1, "equivalence-test").stream("level");

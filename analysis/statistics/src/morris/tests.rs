@@ -15,7 +15,7 @@ fn trajectories(count: usize, parameters: usize, levels: u32, s: &mut Stream) ->
     (0..count).map(|_| one(Trajectory::draw(parameters, levels, s))).collect()
 }
 
-/// Effects by parameter, trajectory and world of an output that knows the world's number.
+/// Effects by parameter, trajectory and world of an output that depends on the world's number.
 fn effects_of(
     trajectories: &[(Vec<Vec<f64>>, Vec<usize>)],
     worlds: usize,
@@ -33,7 +33,7 @@ fn effects_of(
     effects
 }
 
-/// Every parameter moves once, by half of the levels, and all levels come up equally often. Null: each of 4 levels has probability 1/4 among the
+/// Every parameter moves once, by half of the levels, and all levels occur equally often. Null: each of 4 levels has probability 1/4 among the
 /// first designs of 2000 trajectories, of 6 parameters: 12 000 draws. Bound 5 standard deviations of each count: false alarm 4 x 6e-7.
 #[test]
 fn stat_trajectories_move_each_parameter_once() {
@@ -58,7 +58,7 @@ fn stat_trajectories_move_each_parameter_once() {
     assert!(firsts.iter().all(|c| near(*c, 2000.0, 1.0 / 6.0)), "{firsts:?}");
 }
 
-/// Of a linear output the effects are its coefficients, all alike. Tolerance 1e-12 of rounding.
+/// The effects of a linear output are its coefficients, without scatter. Tolerance 1e-12 for rounding.
 #[test]
 fn val_linear_outputs_have_their_coefficients() {
     let coefficients = [3.0, -2.0, 0.0, 0.5];
@@ -71,7 +71,7 @@ fn val_linear_outputs_have_their_coefficients() {
         let (mu, star) = (i.mu_interval.unwrap(), i.mu_star_interval.unwrap());
         assert!([mu.low, mu.high].iter().all(|v| close(*v, c)) && close(star.high, c.abs()), "{i:?}");
     }
-    // A parameter that nothing depends on has no effect to the last bit, not even the sign of a zero.
+    // A parameter without influence has an effect of exactly +0.
     let none = &screen(&effects_of(&t, 3, |x, world| x[0] * x[1] + world as f64), 200, 0.95, &mut stream("dummy"))[2];
     let interval = none.mu_star_interval.unwrap();
     let zeros = [none.mu, none.mu_star, none.sigma, none.noise, interval.low, interval.high];
@@ -79,7 +79,7 @@ fn val_linear_outputs_have_their_coefficients() {
 }
 
 /// By hand: effects of two trajectories on two worlds, (1, 3) and (-2, -4). Means 2 and -3: mu -1/2, mu* 5/2, sigma 5 / sqrt(2). Over the
-/// worlds both have a deviation of sqrt(2), of the mean 1: noise sqrt(2/pi).
+/// worlds both have a standard deviation of sqrt(2), and their means one of 1: noise sqrt(2/pi).
 #[test]
 fn val_means_by_hand() {
     let effects = vec![vec![vec![1.0, 3.0], vec![-2.0, -4.0]]];
@@ -88,7 +88,7 @@ fn val_means_by_hand() {
     assert!(
         (i.sigma - 5.0 / 2f64.sqrt()).abs() < 1e-12 && (i.noise - (2.0 / std::f64::consts::PI).sqrt()).abs() < 1e-12
     );
-    // Redraws of one world and one trajectory alone reach from -4 to 3.
+    // Replicates with a single world and a single trajectory range from -4 to 3.
     let interval = i.mu_interval.unwrap();
     assert_eq!((interval.low, interval.high, interval.estimate), (-4.0, 3.0, -0.5));
     assert_eq!(i.mu_star_interval.map(|star| (star.low, star.high)), Some((1.0, 4.0)));
@@ -98,13 +98,15 @@ fn val_means_by_hand() {
 fn val_no_interval_without_worlds_or_trajectories() {
     let one_world = screen(&[vec![vec![1.0], vec![2.0]]], 99, 0.95, &mut stream("world"))[0];
     assert!(one_world.mu_interval.is_none() && one_world.mu_star_interval.is_none() && one_world.noise.is_nan());
-    assert!((one_world.mu_star - 1.5).abs() < 1e-15 && one_world.sigma > 0.0);
+    assert!((one_world.mu_star - 1.5).abs() < 1e-15 && (one_world.sigma - 0.5f64.sqrt()).abs() < 1e-15);
     let one_trajectory = screen(&[vec![vec![1.0, 2.0]]], 99, 0.95, &mut stream("trajectory"))[0];
-    assert!(one_trajectory.mu_interval.is_none() && one_trajectory.sigma.is_nan() && one_trajectory.noise > 0.0);
+    assert!(one_trajectory.mu_interval.is_none() && one_trajectory.sigma.is_nan());
+    // Standard deviation sqrt(1/2) over the worlds, 1/2 of their mean.
+    assert!((one_trajectory.noise - 0.5 * (2.0 / std::f64::consts::PI).sqrt()).abs() < 1e-15);
     assert_eq!(screen(&[], 99, 0.95, &mut stream("nothing")), []);
 }
 
-/// Input of Morris's function: as it is, but for inputs 3, 5 and 7, which are curved.
+/// Inputs of Morris's function: linear except inputs 3, 5 and 7.
 fn w(i: usize, x: f64) -> f64 {
     2.0 * (if [2, 4, 6].contains(&i) { 1.1 * x / (x + 0.1) } else { x } - 0.5)
 }
@@ -140,8 +142,8 @@ fn expected_mu(i: usize) -> f64 {
     2.0 * (first + (0..20).filter(|j| *j != i).map(|j| sign(i + j) * mean(j)).sum::<f64>())
 }
 
-/// The paper's result (figure 1; 4 trajectories, 4 levels): inputs 1 to 10 stand apart from the other ten; 8 to 10 have effects near 40 with little
-/// spread, 1 to 7 spread widely. Here with 10 trajectories.
+/// The paper's result (figure 1; 4 trajectories, 4 levels): inputs 1 to 10 are separated from the other ten; 8 to 10 have effects near 40 with
+/// little spread, 1 to 7 have a wide spread. Here with 10 trajectories.
 #[test]
 fn val_morriss_function_has_its_ranking() {
     let t = trajectories(10, 20, 4, &mut stream("morris"));
@@ -157,7 +159,7 @@ fn val_morriss_function_has_its_ranking() {
 }
 
 /// Null: the effects of the inputs without curvature are those of the closed form. 400 trajectories; the mean lies within 5 standard errors of
-/// the truth: false alarm 13 x 6e-7 = 8e-6. Standard errors are 0.2 to 0.4, so that an error of 5 % of inputs 8 to 10 is caught.
+/// the true value: false alarm 13 x 6e-7 = 8e-6. Standard errors are 0.2 to 0.4, so that an error of 5 % for inputs 8 to 10 is detected.
 #[test]
 fn stat_expected_effects_of_morriss_function() {
     let t = trajectories(400, 20, 4, &mut stream("expected"));
@@ -169,9 +171,9 @@ fn stat_expected_effects_of_morriss_function() {
     }
 }
 
-/// Null: 95 % intervals of mu. 300 screenings of 12 trajectories on 12 worlds; an effect is 1 + N(0, 0.5) of the trajectory + N(0, 0.5) of the
-/// world + N(0, 1) of both. The pigeonhole bootstrap is conservative for the mean, its percentiles with 12 of each a little short (290 of 300 here).
-/// Fewer than 258 hits of 300 has probability 7e-6 where the coverage is 0.93 (binomial).
+/// Null: 95 % intervals of mu. 300 screenings of 12 trajectories on 12 worlds; an effect is 1 + N(0, 0.5) for the trajectory + N(0, 0.5) for
+/// the world + N(0, 1) for both. The pigeonhole bootstrap is conservative for the mean, its percentile intervals with 12 of each slightly short
+/// (290 of 300 here). Fewer than 258 hits of 300 has probability 7e-6 if the coverage is 0.93 (binomial).
 #[test]
 fn stat_intervals_cover_worlds_and_trajectories() {
     let mut s = stream("coverage");
@@ -188,10 +190,12 @@ fn stat_intervals_cover_worlds_and_trajectories() {
     assert!(hits >= 258, "{hits} of 300");
 }
 
-/// The noise is what mu* is without a mean effect. Null: 200 screenings of 20 trajectories on 10 worlds, effects N(0, 2); the mean of mu* over that of the noise is
-/// 1 within 5 standard errors of 0.01: the standard error of mu* is 0.1 of it in a screening (20 half-normal numbers, 0.756 / sqrt(20) = 0.17),
-/// over 200 of them 0.012; the noise averages s, whose expectation with 10 worlds is 0.973 of the standard deviation. Bound 0.973 +- 0.06: false
-/// alarm 6e-7.
+/// The noise is the expected mu* without a mean effect, but for the bias of a standard deviation. Null: 200 screenings of 20 trajectories on
+/// 10 worlds, effects N(0, 2). Statistic: the mean noise over the mean mu*, which is c4(10) = sqrt(2/9) Gamma(5) / Gamma(4.5) = 0.9727, the
+/// expectation of s from 10 values over the standard deviation. Relative standard errors: a half-normal number scatters by
+/// sqrt(pi/2 - 1) = 0.756 of its mean, so that mu* is good to 0.756 / sqrt(200 x 20) = 0.0119; s scatters by sqrt(1 / c4^2 - 1) = 0.239 of its
+/// mean, so that the noise is good to 0.239 / sqrt(200 x 20) = 0.0038; both are independent for normal effects: 0.0125, or 0.0122 of the
+/// ratio. Bound: 5 of these, 0.061 (false alarm 6e-7). A missing factor sqrt(2/pi) = 0.80 or sqrt(10) would be far outside.
 #[test]
 fn stat_noise_is_the_star_of_no_effect() {
     let mut s = stream("noise");
@@ -202,14 +206,14 @@ fn stat_noise_is_the_star_of_no_effect() {
         star += i.mu_star;
         noise += i.noise;
     }
-    assert!((noise / star - 0.973).abs() < 0.06, "{}", noise / star);
+    assert!((noise / star - 0.9727).abs() < 0.061, "{}", noise / star);
 }
 
 proptest! {
-    /// Effects do not know the order of worlds or trajectories, nor a constant, and go with the unit of the output; mu* is no less than |mu|.
-    /// Tolerance 1e-9 of rounding, for effects up to 100.
+    /// Effects do not depend on the order of worlds or trajectories, nor on a constant, and scale with the unit of the output; mu* is at
+    /// least |mu|. Tolerance 1e-9 for rounding, for effects up to 100.
     #[test]
-    fn prop_effects_go_with_the_output(
+    fn prop_effects_scale_with_the_output(
         effects in prop::collection::vec(prop::collection::vec(-100.0..100.0f64, 3), 2..6),
         unit in 0.1..10.0f64,
         constant in -10.0..10.0f64,
@@ -223,7 +227,7 @@ proptest! {
         prop_assert!(close(plain.mu, other.mu) && close(plain.mu_star, other.mu_star));
         prop_assert!(close(plain.sigma, other.sigma) && close(plain.noise, other.noise));
         prop_assert!(plain.mu_star >= plain.mu.abs() - 1e-12);
-        // Of one trajectory: the output moves as a whole.
+        // One trajectory whose output is shifted by a constant.
         let (points, order) = (vec![vec![0.9, 1.1], vec![1.1, 1.1], vec![1.1, 0.9]], [0, 1]);
         let values = [effects[0][0], effects[0][1], effects[0][2]];
         let moved = values.map(|v| v + constant);

@@ -12,7 +12,7 @@ fn stream(purpose: &str) -> Stream {
     Streams::for_seed(1, "permutation-test").stream(purpose)
 }
 
-/// Two independent groups and any statistic of both, large when they differ.
+/// Test of two independent groups with any statistic of both that is large if they differ.
 fn two_groups(
     first: &[f64],
     second: &[f64],
@@ -28,7 +28,7 @@ fn two_groups(
     })
 }
 
-/// Paired groups and any statistic of the differences within blocks, large when the groups differ: signs are flipped.
+/// Test of paired groups with any statistic of the differences within blocks that is large if the groups differ: signs are flipped.
 fn paired(
     differences: &[f64],
     draws: usize,
@@ -46,7 +46,7 @@ fn difference_of_means(a: &[f64], b: &[f64]) -> f64 {
     (sums::mean(a) - sums::mean(b)).abs()
 }
 
-/// scipy.stats.permutation_test of scipy 1.17.1, all arrangements; ties within and between groups. Tolerance 1e-12.
+/// Against scipy.stats.permutation_test of scipy 1.17.1, all arrangements; ties within and between groups. Tolerance 1e-12.
 #[test]
 fn val_exact_tests_of_scipy() {
     let mut s = stream("scipy");
@@ -69,7 +69,7 @@ fn val_exact_tests_of_scipy() {
     }
 }
 
-/// Random arrangements against all of them. 20 000 draws: 5 standard errors of the share, false alarm 6e-7 each.
+/// Random arrangements against the full enumeration. 20 000 draws: 5 standard errors of the share, false alarm 6e-7 each.
 #[test]
 fn stat_random_arrangements_estimate_the_exact_p() {
     let mut s = stream("random");
@@ -81,10 +81,10 @@ fn stat_random_arrangements_estimate_the_exact_p() {
     assert!((all.p - some.p).abs() < 5.0 * error, "{} {}", all.p, some.p);
 }
 
-/// Every arrangement within blocks comes once: a set of all that the odometer shows, against the product of
+/// Every arrangement within blocks occurs exactly once: the set of all enumerated arrangements against the product of
 /// multinomials.
 #[test]
-fn val_arrangements_are_all_and_once() {
+fn val_every_arrangement_occurs_once() {
     for (labels, blocks, n) in
         [(&[0, 0, 1, 1, 2][..], &[5][..], 30), (&[0, 1, 0, 1, 2], &[2, 3], 12), (&[0, 0, 1], &[2, 1], 1)]
     {
@@ -125,15 +125,15 @@ proptest! {
     }
 }
 
-/// A terrain's mean over 20 missions: scatter between terrains 1, between missions 1.
+/// Means of terrains over 20 missions: standard deviation 1 between terrains, 1 between missions.
 fn terrain_means(terrains: usize, s: &mut Stream) -> Vec<f64> {
     (0..terrains).map(|_| s.normal() + s.normal() / 20f64.sqrt()).collect()
 }
 
-/// Null: both groups have one distribution, so a test at level 0.05 finds a difference in at most 5 % of data sets.
+/// Null: both groups have the same distribution, so a test at level 0.05 finds a difference in at most 5 % of data sets.
 /// 2000 sets of 10 + 10 terrains (10 pairs), 99 random arrangements. More than 151 of 2000 has a false-alarm
-/// probability of 4e-7 (binomial, p = 0.05), fewer than 57 one of 7e-7: a level of 8.5 % or 2.5 % would be noticed. A
-/// test that took the missions as independent finds one in 55 % of the sets.
+/// probability of 4e-7 (binomial, p = 0.05), fewer than 57 one of 7e-7: a level of 8.5 % or 2.5 % would be detected. A
+/// test that treated the missions as independent would find one in 55 % of the sets.
 #[test]
 fn stat_level_of_the_two_group_tests() {
     let mut s = stream("level");
@@ -151,9 +151,9 @@ fn stat_level_of_the_two_group_tests() {
     assert!(found.iter().all(|n| (57..=151).contains(n)), "{found:?} of 2000");
 }
 
-/// Means of equal values differ by rounding when there are more of them; that is no sign.
+/// Means of equal values differ by rounding if their numbers differ; that does not count as a sign.
 #[test]
-fn val_rounding_is_no_difference() {
+fn val_rounding_is_not_a_difference() {
     let mean = |n: usize| (0..n).map(|_| 0.1).sum::<f64>() / n as f64;
     let pairs = [3, 6, 7, 10].map(|n| [mean(1), mean(n)]);
     assert!(pairs.iter().any(|[a, b]| a != b));
@@ -161,7 +161,7 @@ fn val_rounding_is_no_difference() {
     assert_eq!(differences([[1.0, 1.5], [2.0, 1.0], [0.0, 0.0], [0.0, 1e-12]]), [0.5, -1.0, 0.0, 1e-12]);
 }
 
-/// Of many values the normal distribution against random arrangements: 160 + 160 terrains with ties, and 160 pairs. 20 000 draws: 5
+/// Normal approximation for many values against random arrangements: 160 + 160 terrains with ties, and 160 pairs. 20 000 draws: 5
 /// standard errors of the share, false alarm 6e-7 each.
 #[test]
 fn stat_normal_p_is_that_of_arrangements() {
@@ -182,8 +182,8 @@ fn stat_normal_p_is_that_of_arrangements() {
     }
 }
 
-/// Where a few values stand out of many ties, or a small group is beside a large one, the normal distribution is too sure: arrangements are
-/// drawn. Four of 200 pairs differ, all one way: 2 / 2^4 (5 standard errors of 20 000 draws, false alarm 6e-7).
+/// If a few values stand out from many ties, or a small group is compared with a large one, the normal distribution is anticonservative, and
+/// arrangements are drawn. Four of 200 pairs differ, all in one direction: 2 / 2^4 (5 standard errors of 20 000 draws, false alarm 6e-7).
 #[test]
 fn stat_large_terms_are_drawn() {
     let mut s = stream("terms");
@@ -202,8 +202,8 @@ fn stat_large_terms_are_drawn() {
     assert_eq!(rank_sum(&large, &small, 999, &mut s).unwrap().arrangements, Arrangements::Drawn(1000));
 }
 
-/// The least p of groups of equal size is that of an arrangement and its mirror image; ties can leave an unequal one alone: five
-/// terrains at 0, three at 100 give 1 / 56.
+/// The smallest p of groups of equal size is that of an arrangement and its mirror image. With unequal groups there may be no mirror image:
+/// five terrains at 0, three at 100 give 1 / 56.
 #[test]
 fn val_least_p() {
     let mut s = stream("least");
@@ -212,18 +212,41 @@ fn val_least_p() {
     let unequal = rank_sum(&[0.0; 5], &[100.0; 3], 999, &mut s).unwrap();
     assert_eq!((unequal.p, unequal.least_p), (1.0 / 56.0, 1.0 / 56.0));
     assert_eq!(signed_rank(&[1.0, 2.0, 3.0], 999, &mut s).unwrap().least_p, 0.25);
+    // The same in advance, without values: 8! / 4!^2 = 70, 8! / (5! 3!) = 56, 6! / 2!^3 = 90, and 2^3 and 6^5 within blocks.
+    assert_eq!([&[4, 4][..], &[5, 3], &[2, 2, 2]].map(least_p_apart), [2.0 / 70.0, 1.0 / 56.0, 2.0 / 90.0]);
+    assert_eq!((least_p_in_blocks(2, 3), least_p_in_blocks(3, 5)), (0.25, 2.0 / 7776.0));
+    // One group has one arrangement.
+    assert_eq!((least_p_apart(&[3]), least_p_in_blocks(1, 4)), (1.0, 1.0));
 }
 
-/// Ranks of values that are equal but for rounding are shared.
+/// By hand: two groups of 150 without ties, 0, 1, ... and 20.5, 21.5, ... The k-th of the second group is above k + 21 of the first, and at
+/// most all: U is the sum of these, T = U - 150 x 150 / 2, and its variance is 150 x 150 x 301 / 12 (H. Mann and D. Whitney, 1947).
 #[test]
-fn val_rounding_makes_no_rank() {
+fn val_normal_p_by_hand() {
+    let first: Vec<f64> = (0..150).map(f64::from).collect();
+    let second: Vec<f64> = (0..150).map(|k| f64::from(k) + 20.5).collect();
+    let test = rank_sum(&first, &second, 999, &mut stream("by hand")).unwrap();
+    let u: f64 = (0..150).map(|k| f64::min(150.0, f64::from(k) + 21.0)).sum();
+    let observed = u - 0.5 * 150.0 * 150.0;
+    let deviation = (150.0 * 150.0 * 301.0f64 / 12.0).sqrt();
+    assert_eq!((test.arrangements, test.observed), (Arrangements::Normal, observed));
+    assert!((test.p / (2.0 * normal::cdf(-observed / deviation)) - 1.0).abs() < 1e-12, "{test:?}");
+    assert_eq!(test.least_p, 0.0);
+}
+
+/// Values that are equal except for rounding share their rank.
+#[test]
+fn val_rounding_does_not_change_ranks() {
     assert_eq!(tied(&[0.1 + 0.2, 1.0, 0.3, 0.3000001]), [0.3, 1.0, 0.3, 0.3000001]);
     assert_eq!(signed_ranks(&[0.1 + 0.2, -0.3, 1.0]), [1.5, -1.5, 3.0]);
 }
 
-/// Four tests at 5 % need no more than usual, 1000 do: their least adjusted p is then below the level.
+/// Four tests at 5 % need no more draws than usual, 1000 tests do: their smallest adjusted p is then below the level.
 #[test]
-fn val_draws_leave_something_to_find() {
+fn val_draws_suffice_after_adjustment() {
     assert_eq!(draws(4, 0.05), 9999);
+    // Four per test and level.
+    assert_eq!(draws(1000, 0.0625), 64_000);
     assert!(1000.0 / (draws(1000, 0.05) + 1) as f64 <= 0.05);
+    assert_eq!(draws(1_000_000, 0.01), 100_000);
 }

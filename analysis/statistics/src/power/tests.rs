@@ -5,10 +5,10 @@ fn stream(purpose: &str) -> Stream {
     Streams::for_seed(1, "power-test").stream(purpose)
 }
 
-/// statsmodels 0.15.0 (`tests/statistical/nested_tests.py`): TTestIndPower and TTestPower for the standardised
+/// Against statsmodels 0.15.0 (`tests/statistical/nested_tests.py`): TTestIndPower and TTestPower for the standardised
 /// difference of terrain means. The rank tests are 95.5 % as efficient for normal values (J. Hodges and E. Lehmann,
-/// 1956), which costs at most 3 points of power, and 199 arrangements another; the simulation's 5 standard errors are 8
-/// points (false alarm 6e-7 each).
+/// 1956), which costs at most 3 points of power, and having only 199 arrangements costs another; 5 standard errors of the simulation
+/// are 8 points (false alarm 6e-7 each).
 #[test]
 fn stat_power_is_that_of_the_t_test() {
     let mut s = stream("t-test");

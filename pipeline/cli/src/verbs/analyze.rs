@@ -15,7 +15,7 @@ use std::collections::BTreeSet;
 /// `analyze`.
 pub fn analyze(args: &Analyze, common: &Common) -> Verdict {
     let differentiator = serde_json::from_value(json!(args.differentiator)).map_err(|_| {
-        Failure::usage(format!("`--differentiator {}`: it is second_difference or gradient", args.differentiator))
+        Failure::usage(format!("`--differentiator {}`: must be second_difference or gradient", args.differentiator))
     })?;
     let settings = LogSettings {
         topic: args.topic.clone(),
@@ -27,7 +27,7 @@ pub fn analyze(args: &Analyze, common: &Common) -> Verdict {
     };
     let mut once = BTreeSet::new();
     if let Some(twice) = args.logs.iter().find(|path| !once.insert(*path)) {
-        return Err(Failure::usage(format!("{} is named twice", twice.display())));
+        return Err(Failure::usage(format!("{} is given twice", twice.display())));
     }
     let offset_m = numbers::<3>("--offset", &args.offset)?;
     let request = Request { settings, dem: args.dem.as_deref(), offset_m, group: args.group.clone() };
@@ -57,50 +57,50 @@ pub fn analyze(args: &Analyze, common: &Common) -> Verdict {
 
 fn text(judged: &Judged) -> String {
     let Judged { row, notes } = judged;
-    let told = |tells: bool| if tells { "" } else { "cannot tell" };
-    let figure = |name: &str, value: f64, unit: &str, floor: f64, word: &str| {
+    let verdict = |tells: bool| if tells { "" } else { "cannot tell" };
+    let metric = |name: &str, value: f64, unit: &str, floor: f64, word: &str| {
         let cell = |v: f64| if v.is_finite() { format!("{v:.4}") } else { "-".to_owned() };
         vec![format!("  {name}"), cell(value), unit.to_owned(), cell(floor), word.to_owned()]
     };
-    let plain = |name: &str, value: f64, unit: &str| figure(name, value, unit, f64::NAN, "");
+    let plain = |name: &str, value: f64, unit: &str| metric(name, value, unit, f64::NAN, "");
     let band = format!("  vertical acceleration, {} to {} Hz", row.band_low_hz, row.band_high_hz);
     let mut rows = vec![
-        ["  figure", "value", "", "noise floor", ""].map(str::to_owned).to_vec(),
+        ["  metric", "value", "", "noise floor", ""].map(str::to_owned).to_vec(),
         plain("time", row.time_s, "s"),
         plain("path length", row.path_length_m, "m"),
-        figure(
-            "vertical acceleration, rms",
+        metric(
+            "vertical acceleration, RMS",
             row.rms_vertical_acceleration_m_s2,
             "m/s2",
             row.vertical_acceleration_floor_m_s2,
-            told(row.vertical_acceleration_tells),
+            verdict(row.vertical_acceleration_tells),
         ),
-        figure(
+        metric(
             band.trim_start(),
             row.band_vertical_acceleration_m_s2,
             "m/s2",
             row.band_vertical_acceleration_floor_m_s2,
             &row.band_source.as_ref().map_or_else(String::new, |source| format!("from {source}")),
         ),
-        figure(
-            "pitch rate, rms",
+        metric(
+            "pitch rate, RMS",
             row.rms_pitch_rate_deg_s,
             "deg/s",
             row.pitch_rate_floor_deg_s,
-            told(row.pitch_rate_tells),
+            verdict(row.pitch_rate_tells),
         ),
-        figure(
-            "roll rate, rms",
+        metric(
+            "roll rate, RMS",
             row.rms_roll_rate_deg_s,
             "deg/s",
             row.roll_rate_floor_deg_s,
-            told(row.roll_rate_tells),
+            verdict(row.roll_rate_tells),
         ),
-        plain("largest pitch", row.max_pitch_deg, "deg"),
-        plain("largest roll", row.max_roll_deg, "deg"),
+        plain("maximum pitch", row.max_pitch_deg, "deg"),
+        plain("maximum roll", row.max_roll_deg, "deg"),
     ];
     if row.ground_share.is_finite() {
-        rows.push(plain("least clearance", row.min_clearance_m, "m"));
+        rows.push(plain("minimum clearance", row.min_clearance_m, "m"));
         rows.push(plain("on class low", 100.0 * row.share_low, "%"));
         rows.push(plain("on class semi", 100.0 * row.share_semi, "%"));
         rows.push(plain("on class high", 100.0 * row.share_high, "%"));
@@ -116,7 +116,7 @@ fn text(judged: &Judged) -> String {
         columns(&rows)
     );
     if row.gaps > 0 {
-        text.push_str(&format!("\n  {} gaps, {:.2} s in all, are not bridged", row.gaps, row.gap_time_s));
+        text.push_str(&format!("\n  {} gaps, {:.2} s in total, are not interpolated", row.gaps, row.gap_time_s));
     }
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     text

@@ -11,7 +11,7 @@ use sastrugi_stages::verbs::{numbers, parameters};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Paths of a kind that are shown.
+/// Maximum number of paths shown for each kind of difference.
 const SHOWN: usize = 8;
 
 /// `compare`.
@@ -44,7 +44,7 @@ pub fn compare(args: &Compare, common: &Common) -> Verdict {
     Ok(if args.fail_on_difference && comparison.differs() { Code::Difference } else { Code::Done })
 }
 
-/// A folder is a release; what is not there counts as one beside a folder.
+/// A folder is a release; so is a missing path given together with a folder.
 fn are_releases(a: &Path, b: &Path) -> bool {
     (a.is_dir() || b.is_dir()) && !a.is_file() && !b.is_file()
 }
@@ -52,7 +52,9 @@ fn are_releases(a: &Path, b: &Path) -> bool {
 /// Two releases.
 fn of_releases(args: &Compare, b: &Path, parameters: &Value, common: &Common) -> Verdict {
     if args.window_a.is_some() || args.window_b.is_some() || args.cell.is_some() {
-        return Err(Failure::usage("--window-a, --window-b and --cell are for DEMs; releases are compared as a whole"));
+        return Err(Failure::usage(
+            "--window-a, --window-b and --cell apply to DEMs only; releases are compared in full",
+        ));
     }
     let comparison = releases::compare(&args.a, b, parameters, args.seed)?;
     let record = serde_json::to_value(&comparison).map_err(Failure::failed)?;
@@ -66,8 +68,8 @@ fn text_of_releases(comparison: &releases::Comparison) -> String {
         text.push_str(&format!("{name}: {} ({}, version {})\n", side.folder, side.name, side.version));
     }
     comparison.files.iter().for_each(|files| text.push_str(&text_of_files(files)));
-    let interval = format!("its {} % interval", 100.0 - 200.0 * comparison.parameters.alpha);
-    let head = ["group", "figure", "terrains", "A", "B", "difference", &interval, "same within", "p (Holm)", "answer"];
+    let interval = format!("{} % interval", 100.0 - 200.0 * comparison.parameters.alpha);
+    let head = ["group", "metric", "terrains", "A", "B", "difference", &interval, "same within", "p (Holm)", "verdict"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(comparison.quantities.iter().map(row_of_releases));
     text.push_str(&format!("\n{}\n\n", columns(&rows)));
@@ -77,17 +79,17 @@ fn text_of_releases(comparison: &releases::Comparison) -> String {
 }
 
 fn text_of_files(files: &Files) -> String {
-    let mut text = format!("files: {} with the same bytes\n", files.equal);
+    let mut text = format!("files: {} identical\n", files.equal);
     let kinds = [
-        ("with the same content, packed otherwise", &files.packaging),
-        ("that differ", &files.different),
+        ("with the same content but other compression", &files.packaging),
+        ("different", &files.different),
         ("only in A", &files.only_a),
         ("only in B", &files.only_b),
     ];
     for (what, paths) in kinds.into_iter().filter(|(_, paths)| !paths.is_empty()) {
         text.push_str(&format!("  {} {what}:", paths.len()));
         paths.iter().take(SHOWN).for_each(|path| text.push_str(&format!(" {path}")));
-        text.push_str(if paths.len() > SHOWN { " ... (all of them with --json)\n" } else { "\n" });
+        text.push_str(if paths.len() > SHOWN { " ... (--json lists all)\n" } else { "\n" });
     }
     text
 }
@@ -111,7 +113,7 @@ fn row_of_releases(q: &releases::Quantity) -> Vec<String> {
 }
 
 fn text(comparison: &Comparison) -> String {
-    let head = ["quantity", "A", "B", "difference", "interval", "same within", "p (Holm)", "answer"];
+    let head = ["quantity", "A", "B", "difference", "interval", "same within", "p (Holm)", "verdict"];
     let mut rows = vec![head.map(str::to_owned).to_vec()];
     rows.extend(comparison.quantities.iter().map(row));
     let mut text = columns(&rows);

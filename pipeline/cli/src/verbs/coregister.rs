@@ -22,13 +22,13 @@ pub fn coregister(args: &Coregister, common: &Common) -> Verdict {
     let request = Request { a: &args.a, b: &args.b, output: args.output.as_deref(), options, reading };
     let done = coregister::coregister(&request)?;
     let mut text = describe(&done.coregistration);
-    args.output.iter().for_each(|output| text.push_str(&format!("\n{}: A less B", output.display())));
+    args.output.iter().for_each(|output| text.push_str(&format!("\n{}: A minus B", output.display())));
     done.notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     print(common.json, &serde_json::to_value(&done).map_err(Failure::failed)?, &text)?;
     Ok(Code::Done)
 }
 
-/// A co-registration for people: how B was moved, what that did to the difference, and the verdict.
+/// A co-registration as text: how B was moved, the difference before and after, and the verdict.
 pub fn describe(c: &Coregistration) -> String {
     let moved = moves(c).map(|(name, value, error)| vec![name.to_owned(), value, error]);
     let head = ["B was", "by", "standard error"].map(str::to_owned).to_vec();
@@ -48,7 +48,7 @@ pub fn describe(c: &Coregistration) -> String {
     format!("{}\n\n{counts}\n{}", columns(&rows), verdict(c))
 }
 
-/// With this many decimals; zero has no sign.
+/// Formats with this number of decimals; zero without sign.
 fn fixed(value: f64, decimals: usize) -> String {
     let text = format!("{value:.decimals$}");
     if text.contains(|c| matches!(c, '1'..='9')) { text } else { text.replace('-', "") }

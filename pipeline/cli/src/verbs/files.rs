@@ -1,4 +1,4 @@
-//! Verbs on single files of any kind.
+//! Verbs on single files.
 
 use super::{options, reading};
 use crate::Verdict;
@@ -33,7 +33,7 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     let output = args.output.display();
     let name = args.input.to_string_lossy();
     if verbs::vehicle::is_known(&name) && !args.input.exists() {
-        let message = format!("{output}: {name} is a vehicle; vehicles are written as {}", mechanism::WRITTEN_ENDINGS);
+        let message = format!("{output}: {name} is a vehicle; a vehicle is written as {}", mechanism::WRITTEN_ENDINGS);
         return Err(Failure::usage(message));
     }
     let mut options = options(&args.writing, &args.output)?;
@@ -41,11 +41,11 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     let limits = mesh_limits(args, format)?;
     match (args.simulator, format) {
         (Some(_), _) if args.output.exists() && !args.output.is_dir() => {
-            return Err(Failure::usage(format!("{output}: is a file; with --for OUT names a folder")));
+            return Err(Failure::usage(format!("{output} is a file; with --for, OUT must be a folder")));
         }
         (None, None) => {
             let message = format!(
-                "{output}: the ending names no DEM format; {} do, and for vehicles {}",
+                "{output}: unknown extension; DEMs are written as {}, vehicles as {}",
                 dem::WRITTEN_ENDINGS,
                 mechanism::WRITTEN_ENDINGS
             );
@@ -86,11 +86,14 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     Ok(Code::Done)
 }
 
-/// Limits of a mesh, which only some outputs have.
+/// Limits of a mesh; refuses them for outputs without a mesh.
 fn mesh_limits(args: &Convert, format: Option<dem::Format>) -> Result<Option<MeshLimits>, Failure> {
     if args.surface.is_some() {
         let endings = mechanism::WRITTEN_ENDINGS;
-        return Err(Failure::usage(format!("{}: --surface is for vehicles, {endings}", args.output.display())));
+        return Err(Failure::usage(format!(
+            "{}: --surface applies to vehicles only ({endings})",
+            args.output.display()
+        )));
     }
     let limits = MeshLimits { error_max_m: args.max_error, triangles_max: args.triangles };
     if limits == MeshLimits::default() {
@@ -100,7 +103,7 @@ fn mesh_limits(args: &Convert, format: Option<dem::Format>) -> Result<Option<Mes
     if has_mesh {
         return Ok(Some(limits));
     }
-    let message = "--max-error and --triangles decimate meshes: .obj, .glb, .usda, and --for gazebo or isaac";
+    let message = "--max-error and --triangles apply to meshes only: .obj, .glb, .usda, and --for gazebo or isaac";
     Err(Failure::usage(format!("{}: {message}", args.output.display())))
 }
 
@@ -109,7 +112,9 @@ fn convert_vehicle(args: &Convert, format: mechanism::Format, common: &Common) -
     let output = args.output.display();
     let is_of_dem = args.window.is_some() || !args.masks.all().is_empty() || args.writing.cog;
     if is_of_dem || args.max_error.is_some() || args.triangles.is_some() {
-        return Err(Failure::usage(format!("{output}: a vehicle takes --surface; the other options are for DEMs")));
+        return Err(Failure::usage(format!(
+            "{output}: the only option for a vehicle is --surface; the others apply to DEMs"
+        )));
     }
     let name = args.input.to_string_lossy();
     let (vehicle, doubts) = verbs::vehicle::mechanism(&name, args.surface.as_deref())?;
@@ -140,7 +145,7 @@ pub fn hillshade(args: &args::Hillshade, common: &Common) -> Verdict {
     let result = verbs::hillshade::hillshade(&read, &args.output, args.pixels, args.exaggeration)?;
     let [cols, rows] = [&result["pixels"][0], &result["pixels"][1]];
     let mut text =
-        format!("{}: {cols} x {rows} pixels, slopes times {}", args.output.display(), result["exaggeration"]);
+        format!("{}: {cols} x {rows} pixels, slopes exaggerated by {}", args.output.display(), result["exaggeration"]);
     read.notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     print(common.json, &result, &text)?;
     Ok(Code::Done)

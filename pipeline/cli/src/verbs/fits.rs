@@ -1,4 +1,4 @@
-//! `fit` of several DEMs, or to a table.
+//! `fit` of several DEMs, or with a table as output.
 
 use super::reading;
 use super::shown::check_ending;
@@ -17,7 +17,7 @@ use std::path::Path;
 
 /// `fit A B C ... --table OUT`.
 pub fn fits(args: &Fit, common: &Common) -> Verdict {
-    let why = "a table of fits is written as .parquet or .csv";
+    let why = "a table of fits must be .parquet or .csv";
     args.table.iter().try_for_each(|path| check_ending(path, &["parquet", "csv"], why))?;
     check_single(args)?;
     let request = Request {
@@ -47,13 +47,13 @@ pub fn fits(args: &Fit, common: &Common) -> Verdict {
     })
 }
 
-/// Why a DEM was not fitted; most sentences name the file themselves.
+/// Why a DEM was not fitted; most messages already name the file.
 fn failure(dem: &Path, error: &str) -> String {
     let name = dem.display().to_string();
     if error.starts_with(&name) { format!("sastrugi: {error}") } else { format!("sastrugi: {name}: {error}") }
 }
 
-/// Refuses what is written once, or shown of one DEM.
+/// Refuses outputs that exist for a single DEM only.
 fn check_single(args: &Fit) -> Result<(), Failure> {
     let single: [(&str, Option<&Path>); 6] = [
         ("--difference", args.difference.as_deref()),
@@ -65,14 +65,14 @@ fn check_single(args: &Fit) -> Result<(), Failure> {
     ];
     match single.iter().find(|(_, path)| path.is_some()) {
         Some((option, _)) => {
-            let message = format!("`{option}` shows one DEM; fit it alone, with `-o` and without `--table`");
+            let message = format!("`{option}` works with one DEM only; fit it alone, with `-o` and without `--table`");
             Err(Failure::usage(message))
         }
         None => Ok(()),
     }
 }
 
-/// Sigma, b and sigma^2 / b of every DEM as `fit` quotes them.
+/// Sigma, b and sigma^2 / b of every DEM, as quoted by `fit`.
 fn text(rows: &[DemFitRow], fitted: &BTreeMap<String, FitFile>) -> String {
     let head =
         ["file", "model", "sigma m", "b m", "sigma^2/b m", "band RMS m", "intervals"].map(str::to_owned).to_vec();
@@ -80,7 +80,7 @@ fn text(rows: &[DemFitRow], fitted: &BTreeMap<String, FitFile>) -> String {
         None => vec![row.file.clone(), "not fitted".to_owned()],
         Some(fit) => {
             let of = |name: &str| fit.quoted(name).map_or_else(|| "-".to_owned(), parameter);
-            // A sum of terms has no one sigma and b.
+            // A sum of terms does not have a single sigma and b.
             let of_one = |name: &str| if row.fit.sigma_m.is_finite() { of(name) } else { "-".to_owned() };
             let kind = |(intervals, kind): (&Intervals, &str)| format!("{:.0} %, {kind}", 100.0 * intervals.level);
             vec![
@@ -113,7 +113,7 @@ fn parameter(quoted: Quoted) -> String {
     }
 }
 
-/// Parameters of a fit as the options state them.
+/// Parameters of a fit from the options.
 pub fn fit_parameters(args: &Fit) -> Result<Value, Failure> {
     let mut params = json!({});
     parameters::assign(&mut params, &args.set)?;
@@ -134,7 +134,7 @@ pub fn fit_parameters(args: &Fit) -> Result<Value, Failure> {
     Ok(params)
 }
 
-/// What of a DEM is fitted, and how it is read.
+/// Which part of a DEM is fitted, and how it is read.
 pub fn fit_reading(args: &Fit) -> Result<Reading, Failure> {
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let noise_reference = args.noise_reference.clone();
@@ -146,7 +146,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_limits_and_estimates_are_told_apart() {
+    fn val_limits_and_estimates_are_distinguished() {
         assert_eq!(parameter(Quoted::AtLeast(4.395_78)), "at least 4.396");
         assert_eq!(parameter(Quoted::AtLeast(0.012_345)), "at least 0.01235");
         assert_eq!(parameter(Quoted::NotIdentified { ended: 420.0 }), "not identified");

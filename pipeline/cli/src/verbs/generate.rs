@@ -1,4 +1,4 @@
-//! Verbs that make or describe one file.
+//! Verbs that produce or describe one file.
 
 use super::coregister::describe;
 use super::fits::{self, fit_parameters, fit_reading};
@@ -24,7 +24,7 @@ pub fn terrain(args: &Terrain, common: &Common) -> Verdict {
     let options = options(&args.writing, &args.output)?;
     let request =
         verbs::terrain::Request { spec: &args.spec, set: &args.set, seed: args.seed, output: &args.output, options };
-    made(common, &verbs::terrain::terrain(&request)?)
+    print_summary(common, &verbs::terrain::terrain(&request)?)
 }
 
 /// `texture`.
@@ -57,7 +57,7 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         output: &args.output,
         options: options(&args.writing, &args.output)?,
     };
-    made(common, &verbs::texture::texture(&request)?)
+    print_summary(common, &verbs::texture::texture(&request)?)
 }
 
 /// A number, else a raster.
@@ -65,13 +65,13 @@ fn amplitude(text: &str) -> Amplitude<'_> {
     text.parse().map_or_else(|_| Amplitude::Raster(Path::new(text)), Amplitude::Factor)
 }
 
-/// A number as JSON, whole where it is, so that a count can be read from it.
+/// A number as JSON; as an integer if it is one, so that it can be read as a count.
 fn whole(number: f64) -> Value {
     if number.fract() == 0.0 && number.abs() < 1e9 { json!(number as i64) } else { json!(number) }
 }
 
-/// Says what was made.
-fn made(common: &Common, result: &Value) -> Verdict {
+/// Prints a summary of the result.
+fn print_summary(common: &Common, result: &Value) -> Verdict {
     let grid = &result["grid"];
     let number = |v: &Value| v.as_f64().map_or_else(|| "none".to_owned(), |x| format!("{x:.4}"));
     let text = format!(
@@ -90,7 +90,7 @@ fn made(common: &Common, result: &Value) -> Verdict {
     Ok(Code::Done)
 }
 
-/// The files of maps beside the heights.
+/// Map files written with the heights.
 fn maps(all: &Value) -> String {
     let text = |map: &Value, key: &str| map[key].as_str().unwrap_or_default().to_owned();
     let lines = all.as_object().into_iter().flatten().map(|(_, map)| (text(map, "file"), text(map, "description")));
@@ -125,7 +125,7 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     let verbs::fit::Done { fit, source, notes: read_notes } = verbs::fit::fit(&request)?;
     let fit = match fit {
         Ok(fit) => fit,
-        Err(error) => return no_fit(&source, error, common),
+        Err(error) => return fit_failed(&source, error, common),
     };
     shown.write(&fit)?;
     let mut text = format!("{}: {} ({})", output.display(), fit.model, fit.mode);
@@ -139,18 +139,22 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
     Ok(Code::Done)
 }
 
-/// A co-registration stays where its difference could not be fitted: as JSON it stands where a fit file has it.
-fn no_fit(source: &Source, error: Error, common: &Common) -> Verdict {
+/// Prints the co-registration even though the difference could not be fitted; its place in the JSON is that of a fit file.
+fn fit_failed(source: &Source, error: Error, common: &Common) -> Verdict {
     if let Some(minus) = &source.minus {
         let value = json!({ "error": error.to_string(), "source": source });
-        let text = format!("co-registration of {}, not fitted:\n{}", minus.file, describe(&minus.coregistration));
+        let text = format!(
+            "co-registration of {} (the difference could not be fitted):\n{}",
+            minus.file,
+            describe(&minus.coregistration)
+        );
         print(common.json, &value, &text)?;
     }
     Err(error.into())
 }
 
-/// Parameters, and sigma^2 / b where it has an interval, with the intervals to quote. Where the search for the range ended at
-/// its bound only lower limits are known.
+/// Parameters with the intervals to quote, and sigma^2 / b if it has an interval. If the search for the range ended at its bound,
+/// only lower limits are known.
 fn fitted_parameters(fit: &FitFile) -> String {
     let kind = fit
         .quoted_intervals()
@@ -175,12 +179,12 @@ fn parameter(name: &str, quoted: Quoted, number: impl Fn(f64) -> String) -> Stri
         Quoted::Estimate { value, interval: None } => format!("{name} = {}", number(value)),
         Quoted::AtLeast(low) => format!("{name} at least {}", number(low)),
         Quoted::NotIdentified { ended } => {
-            format!("{name} not identified ({} is where the search ended)", number(ended))
+            format!("{name} not identified (the search ended at {})", number(ended))
         }
     }
 }
 
-/// Figures above the least-squares plane, as lines.
+/// Areal parameters relative to the least-squares plane, as lines.
 fn areal(figures: &ArealFigures) -> [(&'static str, String); 6] {
     let known = |value: f64, text: String| if value.is_finite() { text } else { "none".to_owned() };
     let f = figures;
@@ -191,19 +195,16 @@ fn areal(figures: &ArealFigures) -> [(&'static str, String); 6] {
     let ratio = if f.aspect_ratio.is_finite() { format!("{:.3}", f.aspect_ratio) } else { "not known".to_owned() };
     let [x, y] = f.rms_slopes;
     [
-        ("Sq, Sa", known(f.sq_m, format!("{:.5}, {:.5} m above the least-squares plane", f.sq_m, f.sa_m))),
+        ("Sq, Sa", known(f.sq_m, format!("{:.5}, {:.5} m relative to the least-squares plane", f.sq_m, f.sa_m))),
         ("Ssk, Sku", known(f.ssk, format!("{:.3}, {:.3}", f.ssk, f.sku))),
         ("Sp, Sv, Sz", known(f.sz_m, format!("{:.5}, {:.5}, {:.5} m", f.sp_m, f.sv_m, f.sz_m))),
         ("Sdq", known(f.sdq, format!("{:.4}; along x {x:.4}, along y {y:.4}", f.sdq))),
-        (
-            "Sal, Str, Std",
-            known(f.sal_m, format!("{:.4} m, {ratio}, along {:.0} degrees from north", f.sal_m, f.direction_deg)),
-        ),
+        ("Sal, Str, Std", known(f.sal_m, format!("{:.4} m, {ratio}, azimuth {:.0} degrees", f.sal_m, f.direction_deg))),
         ("Hurst exponent", hurst),
     ]
 }
 
-/// What shakes a vehicle, as lines.
+/// Ride-relevant roughness, as lines.
 fn ride(figures: &Ride) -> Vec<(&'static str, String)> {
     let known = |value: f64, text: String| if value.is_finite() { text } else { "none".to_owned() };
     let f = figures;
@@ -230,14 +231,14 @@ fn ride(figures: &Ride) -> Vec<(&'static str, String)> {
     let iri = [f.iri.along_x_m_km, f.iri.along_y_m_km];
     vec![
         ("RMS in the band", known(f.rms_m, format!("{:.5} m{along}", f.rms_m))),
-        ("its band", format!("wavelengths of {min} to {max} m, detrender {}", f.detrender.name())),
-        ("density", law),
+        ("band", format!("wavelengths {min} to {max} m, detrending {}", f.detrender.name())),
+        ("PSD", law),
         ("ISO 8608 class", format!("{class} at 0.1 cycles/m{beyond}")),
         ("IRI", known(iri[0].max(iri[1]), format!("{} m/km", both(iri, 2)))),
     ]
 }
 
-/// The options about a vehicle.
+/// The options for ride roughness.
 fn ride_request(args: &Roughness) -> Option<RideRequest<'_>> {
     let bumps = match (&args.vehicle, &args.band) {
         (Some(vehicle), _) => Bumps::Vehicle(vehicle),
@@ -253,7 +254,7 @@ fn ride_request(args: &Roughness) -> Option<RideRequest<'_>> {
     Some(RideRequest { bumps, detrender, allow_coarse: args.allow_coarse, map, predicted })
 }
 
-/// The options about wind.
+/// The options for wind.
 fn wind_settings(args: &Roughness) -> Option<WindSettings> {
     let azimuths_deg = match args.wind {
         Some(count) => WindSettings::sectors(count).azimuths_deg,
@@ -267,7 +268,7 @@ fn wind_settings(args: &Roughness) -> Option<WindSettings> {
     Some(WindSettings { azimuths_deg, outer_scale_m: args.outer_scale, obstacle_height })
 }
 
-/// Roughness lengths by wind direction, as a table with its notes.
+/// Roughness length by wind direction, as a table with notes.
 fn aerodynamic(roughness: &AerodynamicRoughness) -> String {
     let known = |value: f64, text: String| if value.is_finite() { text } else { "none".to_owned() };
     let millimetres = |value_m: f64, error_m: f64| {
@@ -326,7 +327,7 @@ pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
         ("semi roughness", percent(summary.shares.semi)),
         (
             "high roughness",
-            format!("{}, without a border of {} m", percent(summary.shares.high), summary.share_border_m),
+            format!("{}, excluding a border of {} m", percent(summary.shares.high), summary.share_border_m),
         ),
         ("PSD slope", format!("{:.3}", summary.psd_slope)),
     ];

@@ -1,4 +1,4 @@
-//! The verb that writes a study to start from.
+//! `init`: writes a starting study.
 
 use crate::Verdict;
 use crate::args::{Common, Init};
@@ -16,15 +16,15 @@ pub fn init(args: &Init, common: &Common) -> Verdict {
     let starting = starting.ok_or_else(|| Failure::usage(format!("unknown kind `{}`", args.kind)))?;
     let (path, schema) = (&args.output, args.output.with_file_name(SCHEMA));
     let Some(name) = path.file_name().map(|name| name.to_string_lossy().into_owned()) else {
-        return Err(Failure::usage(format!("{}: is not a file name", path.display())));
+        return Err(Failure::usage(format!("{} is not a file name", path.display())));
     };
     if name == SCHEMA {
-        return Err(Failure::usage(format!("{name}: the schema gets this name; choose another with -o")));
+        return Err(Failure::usage(format!("{name} is reserved for the schema; choose another name with -o")));
     }
     if path.exists() {
-        return Err(Failure::usage(format!("{}: already exists; choose another name with -o", path.display())));
+        return Err(Failure::usage(format!("{} already exists; choose another name with -o", path.display())));
     }
-    // The schema belongs to the program, not to the user, and may be of an earlier version.
+    // The schema belongs to the program and is overwritten: it may be from an earlier version.
     let published = serde_json::to_string_pretty(&study_schema()).map_err(Failure::failed)? + "\n";
     for (path, text) in [(&schema, published), (path, starting.text.replace("study.toml", &name))] {
         atomic::write(path, text.as_bytes()).map_err(|e| Error::at(path, e))?;

@@ -1,4 +1,4 @@
-//! Verbs that list what the program knows.
+//! Verbs that list kinds, schemas and completions.
 
 use crate::Verdict;
 use crate::args::{Arguments, Common, Completions, Kinds, Schema};
@@ -28,14 +28,14 @@ pub fn kinds(args: &Kinds, common: &Common) -> Verdict {
         let names = all.iter().flat_map(|k| [k.kind, k.family]);
         let hint = nearest(name, names)
             .map_or_else(|| "`sastrugi kinds` lists them".to_owned(), |n| format!("did you mean `{n}`?"));
-        return Err(Failure::usage(format!("there is no kind `{name}`; {hint}")));
+        return Err(Failure::usage(format!("unknown kind `{name}`; {hint}")));
     }
     let text: Vec<String> = chosen.iter().map(|k| describe(k)).collect();
     print(common.json, &chosen.iter().map(|k| as_json(k)).collect(), &text.join("\n\n"))?;
     Ok(Code::Done)
 }
 
-/// A kind as JSON. One that has values has them as `parameters`, as its file has, and their description as `schema`.
+/// A kind as JSON. A kind with values has them under `parameters`, as in its file, and their description under `schema`.
 fn as_json(kind: &Kind) -> Value {
     let Some(values) = kind.values() else { return json!(kind) };
     let mut schema = kind.parameters.clone();
@@ -130,14 +130,14 @@ pub fn schema(args: &Schema, common: &Common) -> Verdict {
             let rovers = topics::ROVER_VIEWER.into_iter().chain(ROVER_ROS2);
             let all = topics::VIEWER.into_iter().chain(ROS2).chain(teams).chain(rovers);
             let mut found: Vec<&Topic> = Vec::new();
-            // Missions, teams and rovers share the terrain's.
+            // Missions, teams and rovers share the topics of the terrain.
             for topic in all.filter(|t| t.name == name) {
                 if !found.contains(&topic) {
                     found.push(topic);
                 }
             }
             if found.is_empty() {
-                return Err(Failure::usage(format!("there is no topic `{name}`; `sastrugi schema topics` lists them")));
+                return Err(Failure::usage(format!("unknown topic `{name}`; `sastrugi schema topics` lists them")));
             }
             let text: Vec<String> = found.iter().map(|t| describe_topic(t)).collect();
             print(common.json, &json!(found), &text.join("\n\n"))?;
@@ -146,7 +146,7 @@ pub fn schema(args: &Schema, common: &Common) -> Verdict {
             let table = tables::by_name(name).ok_or_else(|| {
                 let known: Vec<&str> = tables::ALL.iter().map(|t| t.name).collect();
                 let known = known.join(", ");
-                Failure::usage(format!("there is no schema `{name}`; there are study, tables, topics, {known}"))
+                Failure::usage(format!("unknown schema `{name}`; known: study, tables, topics, {known}"))
             })?;
             print(common.json, &json!(table), &describe_table(table))?;
         }

@@ -1,4 +1,4 @@
-//! One module per group of verbs: arguments in, a printed result and an exit code out.
+//! Verbs, one module per group: arguments in; a printed result and an exit code out.
 
 mod analyze;
 mod compare;
@@ -25,7 +25,7 @@ use sastrugi_store::dem::points::GridSettings;
 use sastrugi_store::dem::{Compression, Format, WriteOptions};
 use std::path::Path;
 
-/// Does what was asked.
+/// Runs the verb.
 pub fn dispatch(arguments: &Arguments) -> Verdict {
     let common = &arguments.common;
     arguments.verb.output_file().into_iter().for_each(atomic::clear_leftovers);
@@ -59,7 +59,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
     }
 }
 
-/// Threads for kernels.
+/// Starts the thread pool of the kernels.
 pub fn start_threads(threads: Option<u16>) -> Result<(), Failure> {
     let threads = usize::from(threads.unwrap_or(0));
     rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::failed)
@@ -68,7 +68,7 @@ pub fn start_threads(threads: Option<u16>) -> Result<(), Failure> {
 /// How a DEM is written to `output`.
 fn options(writing: &Writing, output: &Path) -> Result<WriteOptions, Failure> {
     if writing.cog && Format::of_name(output) != Some(Format::GeoTiff) {
-        return Err(Failure::usage(format!("{}: --cog takes a GeoTIFF (.tif)", output.display())));
+        return Err(Failure::usage(format!("{}: --cog requires a GeoTIFF (.tif)", output.display())));
     }
     let compression = match writing.compress {
         Compress::None => Compression::None,
@@ -95,5 +95,34 @@ fn cell(text: Option<&str>) -> Result<Option<[f64; 2]>, Failure> {
     if cell.iter().all(|c| *c > 0.0) {
         return Ok(Some(cell));
     }
-    Err(Failure::usage(format!("`--cell {text}`: cell sizes must be above 0")))
+    Err(Failure::usage(format!("`--cell {text}`: cell size must be above 0")))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_cell_sizes() {
+        let read = |text: &str| cell(Some(text)).map_err(|failure| failure.0.to_string());
+        assert_eq!(cell(None).ok(), Some(None));
+        assert_eq!(read("0.5"), Ok(Some([0.5, 0.5])));
+        assert_eq!(read("0.5,2"), Ok(Some([0.5, 2.0])));
+        for text in ["0", "-1", "1,0"] {
+            assert_eq!(read(text), Err(format!("`--cell {text}`: cell size must be above 0")));
+        }
+        for text in ["", "a", "1,2,3", "nan"] {
+            assert_eq!(read(text), Err(format!("`--cell {text}`: expected 2 numbers")));
+        }
+    }
+
+    /// What cannot be an overview is refused before anything is read.
+    #[test]
+    fn val_cloud_optimised_files_are_geotiffs() {
+        let writing = |compress| Writing { compress, cog: true };
+        let good = options(&writing(Compress::Zstd), Path::new("a.tif")).ok().unwrap();
+        assert!(good.cloud_optimised && good.compression == Compression::Zstd);
+        let refused = options(&writing(Compress::None), Path::new("a.asc")).err().unwrap();
+        assert!(refused.0.to_string().contains("--cog requires a GeoTIFF"), "{}", refused.0);
+    }
 }

@@ -10,7 +10,7 @@ use sastrugi_stages::verbs::{numbers, parameters, traverse};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Plans a route, and leads a team along it.
+/// Plans a route, optionally with a team that follows it.
 pub fn navigate(args: &Navigate, common: &Common) -> Verdict {
     let mut search = json!({ "method": args.method });
     parameters::assign(&mut search, &args.set)?;
@@ -32,12 +32,12 @@ pub fn navigate(args: &Navigate, common: &Common) -> Verdict {
         return route_alone(&request, output, common);
     }
     let place = traverse::Place { output, work: work.as_deref(), replace: args.replace, limits: limits(None)? };
-    finish_run(common, |teller| Ok(release(&request, &args.date, &place, teller)?))
+    finish_run(common, |reporter| Ok(release(&request, &args.date, &place, reporter)?))
 }
 
 fn route_alone(request: &Request<'_>, output: &Path, common: &Common) -> Verdict {
     let result = route(request, output)?;
-    let rows = result["route"].as_object().ok_or_else(|| Failure::failed("the route has no figures"))?;
+    let rows = result["route"].as_object().ok_or_else(|| Failure::failed("the route has no metrics"))?;
     let rows: Vec<Vec<String>> = rows.iter().map(|(name, value)| vec![format!("  {name}"), shown(value)]).collect();
     let mut text = format!("{}\n{}", output.display(), columns(&rows));
     for note in result["notes"].as_array().into_iter().flatten().filter_map(Value::as_str) {

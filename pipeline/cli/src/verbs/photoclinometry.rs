@@ -14,19 +14,19 @@ pub fn photoclinometry(args: &Photoclinometry, common: &Common) -> Verdict {
     let seed = args.seed.unwrap_or(0);
     let request = Request { images: &args.images, set: &args.set, seed, output: &args.output, options };
     let result = photoclinometry::photoclinometry(&request)?;
-    print(common.json, &result, &in_words(&result))?;
+    print(common.json, &result, &as_text(&result))?;
     Ok(Code::Done)
 }
 
-fn in_words(result: &Value) -> String {
-    let head = ["round", "brightness rms", "heights changed by", "stereo points"].map(str::to_owned).to_vec();
+fn as_text(result: &Value) -> String {
+    let head = ["iteration", "brightness RMS", "height change", "stereo points"].map(str::to_owned).to_vec();
     let rounds = result["rounds"].as_array().into_iter().flatten().enumerate().map(|(k, round)| {
-        let figure = |key: &str| round[key].as_f64().unwrap_or(f64::NAN);
-        let rms = format!("{} %", significant(100.0 * figure("brightness_rms")));
+        let number = |key: &str| round[key].as_f64().unwrap_or(f64::NAN);
+        let rms = format!("{} %", significant(100.0 * number("brightness_rms")));
         vec![
             (k + 1).to_string(),
             rms,
-            format!("{} m", significant(figure("change_m"))),
+            format!("{} m", significant(number("change_m"))),
             round["stereo_points"].to_string(),
         ]
     });
@@ -47,7 +47,7 @@ fn in_words(result: &Value) -> String {
     let evaluation = &result["evaluation"];
     if evaluation.is_object() {
         text.push_str(&format!(
-            "\n  against the truth: shading correlates {} (ceiling {}), slopes off by {} rms (ceiling {}), heights by {} m rms",
+            "\n  against the truth: shading correlation {} (ceiling {}), slope error {} RMS (ceiling {}), height error {} m RMS",
             shown(&evaluation["shaded_correlation"]),
             shown(&evaluation["shaded_correlation_ceiling"]),
             shown(&evaluation["slope_error_rms"]),
@@ -58,7 +58,7 @@ fn in_words(result: &Value) -> String {
     let strings = |key: &str| {
         result[key].as_array().into_iter().flatten().filter_map(Value::as_str).map(str::to_owned).collect::<Vec<_>>()
     };
-    text.push_str(&format!("\n  beside it: {}", strings("maps").join(", ")));
+    text.push_str(&format!("\n  maps: {}", strings("maps").join(", ")));
     strings("notes").iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     text
 }

@@ -14,7 +14,7 @@ use std::path::Path;
 pub fn render(args: &Render, common: &Common) -> Verdict {
     let [azimuth_deg, elevation_deg] = numbers::<2>("--sun", &args.sun).map_err(|_| {
         Error::Usage(format!(
-            "`--sun {}`: it takes azimuth and elevation in degrees, as `--sun 120,20` for a sun in the south-east, 20 degrees above the horizon",
+            "`--sun {}`: expected azimuth and elevation in degrees, such as `--sun 120,20` for a sun in the south-east, 20 degrees above the horizon",
             args.sun
         ))
     })?;
@@ -39,15 +39,15 @@ pub fn render(args: &Render, common: &Common) -> Verdict {
         options: options(&args.writing, &args.output)?,
     };
     let result = verbs::render::render(&request)?;
-    print(common.json, &result, &in_words(&result))?;
+    print(common.json, &result, &as_text(&result))?;
     Ok(Code::Done)
 }
 
-fn in_words(result: &Value) -> String {
+fn as_text(result: &Value) -> String {
     let number = |key: &str| result[key].as_f64().unwrap_or(f64::NAN);
     let percent = |key: &str| format!("{:.1} %", 100.0 * number(key));
     let mut text = format!(
-        "{}: {} x {} pixels, mean brightness {}; {} of the ground seen in shadow, {} of the image without ground",
+        "{}: {} x {} pixels, mean brightness {}; {} of the visible ground in shadow, {} of the image without ground",
         result["file"].as_str().unwrap_or_default(),
         result["pixels"][0],
         result["pixels"][1],
@@ -63,12 +63,12 @@ fn in_words(result: &Value) -> String {
     text
 }
 
-/// A camera as the parameters of an image have it.
+/// The parameters of a camera.
 fn camera(text: &str, size: Option<&str>) -> Result<Value, Error> {
     let (kind, rest) = text.split_once(':').unwrap_or((text, ""));
     let refused = || {
         Error::Usage(format!(
-            "`--camera {text}`: it takes nadir[:PIXEL_M], parallel:AZ,EL[,PIXEL_M] or pinhole:X,Y,Z,TO_X,TO_Y,TO_Z[,FOV_DEG]"
+            "`--camera {text}`: expected nadir[:PIXEL_M], parallel:AZ,EL[,PIXEL_M] or pinhole:X,Y,Z,TO_X,TO_Y,TO_Z[,FOV_DEG]"
         ))
     };
     let words = rest.split(',').filter(|_| !rest.is_empty());
@@ -93,7 +93,7 @@ fn camera(text: &str, size: Option<&str>) -> Result<Value, Error> {
     match size {
         Some(_) if kind == "nadir" => {
             return Err(Error::Usage(
-                "`--size` is for parallel and pinhole cameras; nadir covers the surface".to_owned(),
+                "`--size` applies to parallel and pinhole cameras only; nadir covers the surface".to_owned(),
             ));
         }
         Some(size) => camera["size_px"] = json!(pixels(size)?),
@@ -108,5 +108,5 @@ fn pixels(size: &str) -> Result<[u64; 2], Error> {
     let [cols, rows] = numbers::<2>("--size", size)?.map(whole);
     cols.zip(rows)
         .map(|(cols, rows)| [cols, rows])
-        .ok_or_else(|| Error::Usage(format!("`--size {size}`: it takes whole numbers of columns and rows, above 0")))
+        .ok_or_else(|| Error::Usage(format!("`--size {size}`: columns and rows must be whole numbers above 0")))
 }

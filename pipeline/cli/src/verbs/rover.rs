@@ -10,7 +10,7 @@ use sastrugi_stages::studies::{self, RunRequest};
 use sastrugi_stages::verbs::rover::{Estimated, PURPOSE, Request, Summary, load, share, summary};
 use std::collections::BTreeMap;
 
-/// Most parameters of a ranking for people.
+/// Maximum number of parameters in a printed ranking.
 const RANKED: usize = 10;
 
 /// Drives the rovers of a study.
@@ -21,7 +21,7 @@ pub fn rover(args: &Rover, common: &Common) -> Verdict {
     let Place { output, work } = &args.place;
     let (work, replace) = (work.as_deref(), args.replace);
     let request = RunRequest { output, work, part: None, purpose: Some(PURPOSE), replace, limits };
-    let (run, mut text) = watch(common, |teller| Ok(studies::run(&loaded, &request, teller)?))?;
+    let (run, mut text) = watch(common, |reporter| Ok(studies::run(&loaded, &request, reporter)?))?;
     let summary = summary(&run.output)?;
     text.push_str("\n\n");
     text.push_str(&trials(&summary));
@@ -31,8 +31,8 @@ pub fn rover(args: &Rover, common: &Common) -> Verdict {
     }
     if !summary.ranking.is_empty() {
         text.push_str(
-            "\nmu: mean effect; mu*: mean size of the effects, by which they rank; sigma: their scatter between trajectories; noise: the mu* that\n\
-             reshuffled ways alone would give.",
+            "\nmu: mean effect; mu*: mean absolute effect, by which parameters are ranked; sigma: standard deviation between trajectories;\n\
+             noise: the mu* that changed paths alone would give.",
         );
     }
     let mut json = serde_json::to_value(&run).map_err(Failure::failed)?;
@@ -42,7 +42,7 @@ pub fn rover(args: &Rover, common: &Common) -> Verdict {
     Ok(code(&run))
 }
 
-/// One line for each trial.
+/// One line per trial.
 fn trials(summary: &Summary) -> String {
     let heads = [
         "stage",
@@ -78,8 +78,8 @@ fn trials(summary: &Summary) -> String {
             trial.off_ground.to_string(),
         ]);
     }
-    let note = "e: straight line over metres driven and left; d0/mean d: straight line over mean metres driven. Intervals count worlds, not rovers. Distances of\n\
-                rovers at a limit are censored: d0/mean d depends on the limit. Rovers that ended off the ground count as e = 0.";
+    let note = "e: straight line over distance driven plus distance left; d0/mean d: straight line over mean distance driven. Intervals resample worlds, not\n\
+                rovers. Rovers stopped at a limit have censored distances, so d0/mean d depends on the limit. Rovers that left the ground count as e = 0.";
     format!("{}\n{note}", columns(&rows))
 }
 
@@ -87,7 +87,7 @@ fn range(of: &Estimated) -> String {
     if of.low.is_nan() { "-".to_owned() } else { format!("{:.3} to {:.3}", of.low, of.high) }
 }
 
-/// One table for each stage and group: effects on efficiency and arrival of one share of each parameter.
+/// One table per stage and group: effects on efficiency and arrival of changing each parameter by one share.
 fn rankings(rows: &[RoverEffectRow]) -> Vec<String> {
     let mut groups: BTreeMap<_, Vec<&RoverEffectRow>> = BTreeMap::new();
     rows.iter().for_each(|row| groups.entry((&row.stage_id, &row.group, &row.variant)).or_default().push(row));
@@ -140,11 +140,11 @@ fn ranking(rows: &[&RoverEffectRow]) -> String {
     let Some(first) = efficiency.first() else { return String::new() };
     let mut rest = String::new();
     if some.len() > RANKED {
-        rest.push_str(&format!("\n  and {} with smaller effects (all with --json)", some.len() - RANKED));
+        rest.push_str(&format!("\n  and {} with smaller effects (--json lists all)", some.len() - RANKED));
     }
     if !none.is_empty() {
         let names: Vec<&str> = none.iter().map(|row| row.parameter.as_str()).collect();
-        rest.push_str(&format!("\n  without any effect on e: {}", names.join(", ")));
+        rest.push_str(&format!("\n  no effect on e: {}", names.join(", ")));
     }
     format!(
         "{}: change for {} % of each parameter, {}, {}, {} in each\n{}{rest}",
@@ -157,7 +157,7 @@ fn ranking(rows: &[&RoverEffectRow]) -> String {
     )
 }
 
-/// A change for one share of a parameter.
+/// The change caused by one share of a parameter.
 fn per_share(value: f64, share: f64) -> String {
     if value.is_nan() {
         return "-".to_owned();

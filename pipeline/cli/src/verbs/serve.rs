@@ -12,26 +12,26 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 use tracing_subscriber::EnvFilter;
 
-/// Environment variable with the token, so that no list of processes shows it.
+/// Environment variable with the token, so that process lists do not show it.
 const TOKEN: &str = "SASTRUGI_TOKEN";
-/// Tiles that may wait for each worker.
+/// Maximum number of tiles queued per worker.
 const QUEUE_PER_WORKER: usize = 256;
 const GIB: f64 = (1u64 << 30) as f64;
 
-/// The server that runs, if one does.
+/// The running server, if any.
 static RUNNING: OnceLock<Stop> = OnceLock::new();
 static STOPPING: AtomicBool = AtomicBool::new(false);
 
-/// What an interrupt means to a server.
+/// Effect of an interrupt on a server.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Interrupt {
-    /// It ends in good order.
+    /// Shut down gracefully.
     First,
-    /// It is to end at once.
+    /// Stop immediately.
     Again,
 }
 
-/// Ends a server in good order at the first interrupt; `None` where there is none.
+/// Shuts the server down gracefully at the first interrupt; `None` if no server is running.
 pub fn interrupted() -> Option<Interrupt> {
     let stop = RUNNING.get()?;
     if STOPPING.swap(true, Ordering::Relaxed) {
@@ -45,7 +45,7 @@ pub fn interrupted() -> Option<Interrupt> {
 pub fn serve(args: &Serve, common: &Common) -> Verdict {
     let listen: SocketAddr = args.listen.parse().map_err(|_| {
         Failure::usage(format!(
-            "`--listen {}`: it must be an IP address and a port, for example 127.0.0.1:8080",
+            "`--listen {}`: must be an IP address and a port, for example 127.0.0.1:8080",
             args.listen
         ))
     })?;
@@ -74,7 +74,7 @@ pub fn serve(args: &Serve, common: &Common) -> Verdict {
             per_client: args.per_client as usize,
             connections: args.connections as usize,
             request: Duration::from_secs(args.request_seconds),
-            // Half of what the cores can do in that time: the expectation is rough, and clients share them.
+            // Half of what the cores can do in that time: the estimate is rough, and clients share the cores.
             work_s: 0.5 * args.request_seconds as f64 * workers as f64,
             ..defaults
         },
@@ -107,7 +107,7 @@ fn shortened(ids: &[&String]) -> String {
     text
 }
 
-/// Warnings, and with --log or RUST_LOG more, on stderr.
+/// Logs warnings on stderr, and more with --log or RUST_LOG.
 fn start_log(args: &Serve, common: &Common) {
     let default = match (common.quiet, args.log) {
         (true, _) => "error",
@@ -116,14 +116,14 @@ fn start_log(args: &Serve, common: &Common) {
     };
     let filter = EnvFilter::try_from_default_env().unwrap_or_else(|_| EnvFilter::new(default));
     let log = tracing_subscriber::fmt().with_env_filter(filter).with_writer(std::io::stderr);
-    // A log that runs already is as good.
+    // A log that was started before is fine.
     drop(match args.log_format {
         LogFormat::Text => log.with_ansi(false).try_init(),
         LogFormat::Json => log.json().try_init(),
     });
 }
 
-/// A number of bytes, as `10G`, `512M` or `1.5GiB`.
+/// A number of bytes, such as `10G`, `512M` or `1.5GiB`.
 fn bytes(option: &str, text: &str) -> Result<u64, Failure> {
     let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
     let (number, unit) = text.split_at(end);
@@ -139,7 +139,7 @@ fn bytes(option: &str, text: &str) -> Result<u64, Failure> {
     if (0.0..1e18).contains(&value) {
         return Ok(value as u64);
     }
-    Err(Failure::usage(format!("`{option} {text}`: it must be a number of bytes, as 10G or 512M")))
+    Err(Failure::usage(format!("`{option} {text}`: must be a number of bytes, such as 10G or 512M")))
 }
 
 #[cfg(test)]

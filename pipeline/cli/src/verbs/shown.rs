@@ -1,4 +1,4 @@
-//! Files that show a fit beside its fit file.
+//! Further files that show a fit.
 
 use crate::args::FitShown;
 use crate::failure::Failure;
@@ -8,20 +8,20 @@ use sastrugi_stages::verbs::fit::write_bins;
 use sastrugi_store::atomic;
 use std::path::Path;
 
-/// The files asked for, with endings that are known.
+/// The requested files, with known extensions.
 pub struct ShownFiles<'a> {
     plot: Option<&'a Path>,
     csv: Option<&'a Path>,
 }
 
 impl<'a> ShownFiles<'a> {
-    /// Refuses endings that nothing is written as.
+    /// Refuses unknown extensions.
     pub fn of(args: &'a FitShown) -> Result<Self, Failure> {
         let plot = args.plot.as_deref();
-        let why = "plots are written as .svg or .png";
+        let why = "a plot must be .svg or .png";
         plot.into_iter().try_for_each(|path| check_ending(path, &["svg", "png"], why))?;
         let csv = args.csv.as_deref();
-        csv.into_iter().try_for_each(|path| check_ending(path, &["csv"], "`--csv` writes a file that ends in .csv"))?;
+        csv.into_iter().try_for_each(|path| check_ending(path, &["csv"], "the file of `--csv` must end in .csv"))?;
         Ok(Self { plot, csv })
     }
 
@@ -43,7 +43,7 @@ impl<'a> ShownFiles<'a> {
     }
 }
 
-/// Refuses a file whose ending is not among those given.
+/// Refuses a file whose extension is not listed.
 pub fn check_ending(path: &Path, endings: &[&str], why: &str) -> Result<(), Failure> {
     if endings.iter().any(|ending| ends_in(path, ending)) {
         return Ok(());
@@ -51,7 +51,7 @@ pub fn check_ending(path: &Path, endings: &[&str], why: &str) -> Result<(), Fail
     Err(Failure::usage(format!("{}: {why}", path.display())))
 }
 
-/// The picture of a fit in the format of the file's ending.
+/// The plot of a fit, in the format of the file's extension.
 fn plot(path: &Path, fit: &FitFile, name: &str) -> Result<Vec<u8>, Failure> {
     if ends_in(path, "png") {
         return fit_png(fit, name).map_err(|e| Failure::failed(format!("{}: {e}", path.display())));

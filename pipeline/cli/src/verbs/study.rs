@@ -4,7 +4,7 @@ use crate::Verdict;
 use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verify};
 use crate::failure::{Code, Failure};
 use crate::output::{bytes, columns, print, seconds, warn};
-use crate::progress::Teller;
+use crate::progress::Reporter;
 use sastrugi_report::{Companions, ReportError};
 use sastrugi_schemas::manifest::ItemNote;
 use sastrugi_stages::loaded;
@@ -19,21 +19,21 @@ use serde_json::json;
 use std::path::{Path, PathBuf};
 use std::time::Instant;
 
-/// Working memory of the items at once where no option sets it, GiB.
+/// Default limit on the working memory of concurrent items, GiB.
 const MEMORY_GIB: f64 = 4.0;
-/// Most verdicts on fits that a run ends with.
+/// Maximum number of verdicts on fits printed at the end of a run.
 const VERDICTS_MAX: usize = 5;
-/// Most other notes that it ends with.
+/// Maximum number of other notes printed there.
 const NOTES_MAX: usize = 3;
-/// Most lines of a plan for people.
+/// Maximum number of lines of a printed plan.
 const PLAN_LINES: usize = 40;
 
-/// Limits of a run; those without `memory_gib` are only on what runs at once.
+/// Limits of a run; without `memory_gib`, memory limits only which items run concurrently.
 pub(super) fn limits(memory_gib: Option<f64>) -> Result<Limits, Failure> {
     let beyond = memory_gib.is_none();
     let memory_gib = memory_gib.unwrap_or(MEMORY_GIB);
     if !(memory_gib.is_finite() && memory_gib > 0.0) {
-        return Err(Failure::usage(format!("`--memory {memory_gib}`: it must be above 0")));
+        return Err(Failure::usage(format!("`--memory {memory_gib}`: must be above 0")));
     }
     let memory_bytes = (memory_gib * 1024.0 * 1024.0 * 1024.0) as u64;
     Ok(Limits { workers: rayon::current_num_threads(), memory_bytes, beyond })
@@ -44,14 +44,14 @@ pub fn run(args: &Run, common: &Common) -> Verdict {
     let part = args.shard.as_deref().map(Part::parse).transpose()?;
     let limits = limits(args.memory)?;
     let loaded = loaded::load(&args.study)?;
-    tell_doubts(&loaded.doubts, common);
+    print_warnings(&loaded.doubts, common);
     let Place { output, work } = &args.place;
     let request = RunRequest { output, work: work.as_deref(), part, purpose: None, replace: args.replace, limits };
-    finish_run(common, |teller| Ok(studies::run(&loaded, &request, teller)?))
+    finish_run(common, |reporter| Ok(studies::run(&loaded, &request, reporter)?))
 }
 
-/// What a user should know before hours are spent on a study.
-fn tell_doubts(doubts: &[String], common: &Common) {
+/// Prints warnings that a user should see before a long run.
+fn print_warnings(doubts: &[String], common: &Common) {
     if !common.quiet {
         doubts.iter().for_each(|doubt| warn(&format!("sastrugi: warning: {doubt}")));
     }
@@ -59,7 +59,7 @@ fn tell_doubts(doubts: &[String], common: &Common) {
 
 /// `merge`.
 pub fn merge(args: &Merge, common: &Common) -> Verdict {
-    finish_run(common, |teller| Ok(studies::merge(&args.shards, &args.output, args.replace, teller)?))
+    finish_run(common, |reporter| Ok(studies::merge(&args.shards, &args.output, args.replace, reporter)?))
 }
 
 /// `traverse`.
@@ -74,15 +74,15 @@ pub fn traverse(args: &Traverse, common: &Common) -> Verdict {
     parameters::assign(&mut parameters, &args.set)?;
     let mut roughness = json!({});
     parameters::assign(&mut roughness, &args.set_roughness)?;
-    tell_doubts(&parameters::vehicle_doubts(&parameters), common);
+    print_warnings(&parameters::vehicle_doubts(&parameters), common);
     let request = drive::Request { dem: &args.dem, seed: args.seed, roughness, missions, parameters, date: &args.date };
     let Place { output, work } = &args.place;
     let place = drive::Place { output, work: work.as_deref(), replace: args.replace, limits: limits(None)? };
-    finish_run(common, |teller| Ok(drive::traverse(&request, &place, teller)?))
+    finish_run(common, |reporter| Ok(drive::traverse(&request, &place, reporter)?))
 }
 
-/// Runs, says what it came to, and gives the exit code.
-pub(super) fn finish_run(common: &Common, run: impl FnOnce(&Teller) -> Result<RunSummary, Failure>) -> Verdict {
+/// Runs, prints the summary, and returns the exit code.
+pub(super) fn finish_run(common: &Common, run: impl FnOnce(&Reporter) -> Result<RunSummary, Failure>) -> Verdict {
     let (summary, text) = watch(common, run)?;
     print(common.json, &serde_json::to_value(&summary).map_err(Failure::failed)?, &text)?;
     Ok(code(&summary))
@@ -93,15 +93,15 @@ pub(super) fn code(summary: &RunSummary) -> Code {
     if summary.failures.is_empty() { Code::Done } else { Code::Partial }
 }
 
-/// Runs under the eyes of whoever waits, and says what it came to.
+/// Runs with progress reports, and returns the summary with its text.
 pub(super) fn watch(
     common: &Common,
-    run: impl FnOnce(&Teller) -> Result<RunSummary, Failure>,
+    run: impl FnOnce(&Reporter) -> Result<RunSummary, Failure>,
 ) -> Result<(RunSummary, String), Failure> {
-    let teller = Teller::new(common.quiet);
+    let reporter = Reporter::new(common.quiet);
     let start = Instant::now();
-    let summary = run(&teller);
-    teller.close();
+    let summary = run(&reporter);
+    reporter.close();
     let summary = summary?;
     let took = seconds(start.elapsed().as_secs_f64());
     let failed = summary.failures.len();
@@ -112,15 +112,15 @@ pub(super) fn watch(
         summary.computed
     );
     if failed > 0 {
-        text.push_str("\nfailed items are listed with their parameters in manifest.json:");
+        text.push_str("\nfailed items (parameters in manifest.json):");
         summary.failures.iter().for_each(|f| text.push_str(&format!("\n  {}: {}", f.item, f.message)));
     }
-    text.push_str(&told(&summary));
+    text.push_str(&notes(&summary));
     Ok((summary, text))
 }
 
-/// What the items came to: the verdict on each fit, then the other notes, where they are few.
-fn told(summary: &RunSummary) -> String {
+/// Notes on items: first verdicts on fits, then the other notes if they are few.
+fn notes(summary: &RunSummary) -> String {
     let verdicts = summary.verdicts();
     let line = |note: &ItemNote| format!("\n  {}/{}: {}", note.stage, note.item, note.note);
     let mut text: String = verdicts.iter().take(VERDICTS_MAX).map(|note| line(note)).collect();
@@ -128,7 +128,7 @@ fn told(summary: &RunSummary) -> String {
         summary.notes.iter().filter(|note| !verdicts.iter().take(VERDICTS_MAX).any(|v| v == note)).collect();
     match others.len() {
         0..=NOTES_MAX => others.iter().for_each(|note| text.push_str(&line(note))),
-        n => text.push_str(&format!("\n  {n} notes on items: `notes` in manifest.json")),
+        n => text.push_str(&format!("\n  {n} notes on items: see `notes` in manifest.json")),
     }
     text
 }
@@ -138,7 +138,7 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     let loaded = loaded::load(&args.study)?;
     let part = args.shard.as_deref().map(Part::parse).transpose()?;
     let plan = studies::plan_of(&loaded, &args.place.output, args.place.work.as_deref(), part)?;
-    tell_doubts(&loaded.doubts, common);
+    print_warnings(&loaded.doubts, common);
     let total_seconds = plan.stale.iter().fold(0.0, |sum, s| sum + s.seconds);
     let total_bytes = plan.stale.iter().fold(0.0, |sum, s| sum + s.bytes);
     let mut text = format!(
@@ -150,7 +150,7 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
         bytes(total_bytes)
     );
     if let Some(largest) = plan.stale.iter().max_by_key(|s| s.memory_bytes) {
-        text.push_str(&format!(", up to {} of memory for {}", bytes(largest.memory_bytes as f64), largest.item));
+        text.push_str(&format!(", at most {} of memory (for {})", bytes(largest.memory_bytes as f64), largest.item));
     }
     let shown = plan.stale.iter().take(PLAN_LINES);
     let rows: Vec<Vec<String>> =
@@ -158,7 +158,7 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     text.push('\n');
     text.push_str(&columns(&rows));
     if plan.stale.len() > PLAN_LINES {
-        text.push_str(&format!("\n  and {} more (all of them with --json)", plan.stale.len() - PLAN_LINES));
+        text.push_str(&format!("\n  and {} more (--json lists all)", plan.stale.len() - PLAN_LINES));
     }
     print(common.json, &serde_json::to_value(&plan).map_err(Failure::failed)?, &text)?;
     Ok(Code::Done)
@@ -167,42 +167,41 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
 /// `verify`.
 pub fn verify(args: &Verify, common: &Common) -> Verdict {
     let recompute = args.recompute.as_deref().map(parse_recompute).transpose()?;
-    let teller = Teller::new(common.quiet);
-    let found = verification::verify(&args.release, recompute, limits(None)?, &teller);
-    teller.close();
+    let reporter = Reporter::new(common.quiet);
+    let found = verification::verify(&args.release, recompute, limits(None)?, &reporter);
+    reporter.close();
     let verification = found?;
     let mut text = format!("{} files, {} checked", verification.files, bytes(verification.bytes as f64));
     if !verification.recomputed.is_empty() {
-        text.push_str(&format!(", {} items computed again", verification.recomputed.len()));
+        text.push_str(&format!(", {} items recomputed", verification.recomputed.len()));
     }
     match verification.differences.len() {
-        0 => text.push_str(": all as they should be"),
+        0 => text.push_str(": no differences"),
         n => text.push_str(&format!(": {n} differences")),
     }
     text.push_str(&listed(&verification.differences));
     if let Some(why) = &verification.not_comparable {
-        text.push_str(&format!("\n{why}; `sastrugi compare` will tell whether the numbers agree"));
+        text.push_str(&format!("\n{why}; `sastrugi compare` tests whether the numbers agree"));
     }
     print(common.json, &serde_json::to_value(&verification).map_err(Failure::failed)?, &text)?;
     Ok(if verification.differences.is_empty() { Code::Done } else { Code::Difference })
 }
 
-/// Differences, a line each.
+/// Differences, one per line.
 fn listed(differences: &[Difference]) -> String {
     differences.iter().map(|d| format!("\n  {}: {}", d.path, d.problem)).collect()
 }
 
 /// `pack`.
 pub fn pack(args: &Pack, common: &Common) -> Verdict {
-    let teller = Teller::new(common.quiet);
-    let packed = packing::pack(&args.release, &args.output, &teller);
-    teller.close();
+    let reporter = Reporter::new(common.quiet);
+    let packed = packing::pack(&args.release, &args.output, &reporter);
+    reporter.close();
     let packing = packed?;
     let (output, json) = (packing.output.display(), serde_json::to_value(&packing).map_err(Failure::failed)?);
     let Some(sha256) = &packing.sha256 else {
         let count = packing.differences.len();
-        let text =
-            format!("{output}: not written: the release has {count} differences{}", listed(&packing.differences));
+        let text = format!("{output} not written: the release has {count} differences{}", listed(&packing.differences));
         print(common.json, &json, &text)?;
         return Ok(Code::Difference);
     };
@@ -215,7 +214,7 @@ fn parse_recompute(text: &str) -> Result<Recompute, Failure> {
     match (text, text.parse::<usize>()) {
         ("all", _) => Ok(Recompute::All),
         (_, Ok(count)) if count > 0 => Ok(Recompute::Some(count)),
-        _ => Err(Failure::usage(format!("`--recompute {text}`: it takes `all` or a number of items"))),
+        _ => Err(Failure::usage(format!("`--recompute {text}`: expected `all` or a number of items above 0"))),
     }
 }
 
@@ -224,12 +223,13 @@ pub fn report(args: &Report, common: &Common) -> Verdict {
     let output = args.output.clone().unwrap_or_else(|| default_report(&args.release));
     let within = |release: &PathBuf| studies::resolved(&output).starts_with(studies::resolved(release));
     if [&args.release].into_iter().chain(&args.against).any(within) {
-        let message = "the report cannot go into the release, which is sealed; name a folder beside it with -o";
+        let message =
+            "the report cannot be written into the release, which is sealed; choose a folder outside it with -o";
         return Err(Failure::usage(message));
     }
     let companions = Companions { against: args.against.clone(), logs: args.logs.clone() };
-    let teller = Teller::new(common.quiet);
-    let summary = sastrugi_report::render_with(&args.release, &companions, &output, &|step| teller.step(step));
+    let reporter = Reporter::new(common.quiet);
+    let summary = sastrugi_report::render_with(&args.release, &companions, &output, &|step| reporter.step(step));
     let summary = summary.map_err(|e| match e {
         ReportError::Occupied { .. } => Failure::usage(e.to_string()),
         e if e.unusable_input() => Failure::input(e),

@@ -1,27 +1,27 @@
-//! Exposure and haze of every image, between the rounds.
+//! Estimates exposure and haze of every image between the rounds.
 //!
-//! What an image should show of the integrated surface, `m`, and what it shows, `I`, are joined by `I = E m + H`: a weighted regression over lit
-//! cells. Slopes of single cells would fit any exposure; those of one surface do not, for most of their errors are no gradient.
-//! What is left undetermined is held: the common factor of all exposures (it is the albedo's), and the mean plane of the surface, which exposures
-//! of differently lit images imitate. Constraints on heights tell it: the plane through what they have above or below the surface of the
-//! slopes alone is added to it.
+//! The predicted brightness `m` of the integrated surface and the observed brightness `I` are related by `I = E m + H`, a weighted regression
+//! over lit cells. Slopes of separate cells would fit any exposure; the slopes of one surface do not, because most errors of the slopes are not
+//! a gradient field. Undetermined quantities are held: the common factor of all exposures, which is that of the albedo, and the mean plane of
+//! the surface, whose tilt has the same effect as different exposures of differently lit images. Constraints on heights determine that plane:
+//! the plane through their residuals relative to the surface from the slopes alone is added to the mean plane of that surface.
 
 use super::observation::{Calibration, Relief, Stack};
 use crate::photometry::Photometry;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, sums};
 
-/// Points nearer to one line than this determine no plane: product of the variances along their axes over the square of their sum.
+/// Points nearer to one line than this determine no plane: product of the variances along their principal axes over the square of their sum.
 const COLLINEAR: f64 = 1e-4;
 
-/// Slopes of the least-squares plane through the known heights of a map; 0 where they determine none.
+/// Slopes of the least-squares plane through the known heights of a map; 0 if they do not determine a plane.
 pub fn plane(g: &Geometry, heights_m: &[f64]) -> [f64; 2] {
     let known = heights_m.iter().enumerate().filter(|(_, z)| z.is_finite());
     let points: Vec<[f64; 4]> = known.map(|(k, z)| [g.x(k % g.cols), g.y(k / g.cols), *z, 1.0]).collect();
     plane_through(&points).unwrap_or_default()
 }
 
-/// Slopes of the least-squares plane through points `[x, y, z, weight]`; `None` for fewer than three, or points nearly on a line.
+/// Slopes of the least-squares plane through points `[x, y, z, weight]`; `None` for fewer than three points, or nearly collinear ones.
 pub fn plane_through(points: &[[f64; 4]]) -> Option<[f64; 2]> {
     let total = |f: &dyn Fn(&[f64; 4]) -> f64| sums::sum(&points.iter().map(f).collect::<Vec<_>>());
     let weight = total(&|p| p[3]);
@@ -33,14 +33,14 @@ pub fn plane_through(points: &[[f64; 4]]) -> Option<[f64; 2]> {
     (points.len() >= 3 && spread).then(|| [(yy * xz - xy * yz) / determinant, (xx * yz - xy * xz) / determinant])
 }
 
-/// Brightness that an image with exposure 1 and no haze would show of a cell.
+/// Predicted brightness of a cell in an image with exposure 1 and no haze.
 fn predicted(stack: &Stack, image: usize, photometry: &Photometry, relief: Relief, k: usize, tilt: [f64; 2]) -> f64 {
     let source = &stack.images[image];
     let [p, q] = relief.slopes(k);
     photometry.of_slopes([p + tilt[0], q + tilt[1]], source.light, source.camera.view_from(relief.point(k)))
 }
 
-/// Rms difference of observed brightness and that of a surface, over the mean brightness; over the lit cells of all images.
+/// Rms difference between the observed brightness and that of a surface, divided by the mean brightness, over the lit cells of all images.
 pub fn brightness_rms(stack: &Stack, photometry: &Photometry, relief: Relief, albedo: &[f64]) -> f64 {
     let of_image = |image: usize| -> Vec<[f64; 2]> {
         let one = |k: usize| {
@@ -55,7 +55,7 @@ pub fn brightness_rms(stack: &Stack, photometry: &Photometry, relief: Relief, al
     mean(0).sqrt() / mean(1)
 }
 
-/// Exposures and hazes that fit the surface best; with `plane`, the surface is first tilted to that mean plane. `free`: exposure, haze.
+/// Exposures and hazes that fit the surface best. With `to_plane`, the surface is first tilted to that mean plane. `free`: exposure, haze.
 pub fn update(
     stack: &Stack,
     photometry: &Photometry,
@@ -83,7 +83,7 @@ pub fn update(
         })
         .collect();
     if free[0] {
-        // The common factor stays.
+        // The common factor is unchanged.
         let logs = |all: &[Calibration]| sums::mean(&all.iter().map(|c| libm::log(c.exposure)).collect::<Vec<_>>());
         let factor = libm::exp(logs(stack.calibrations) - logs(&next));
         next.iter_mut().for_each(|c| c.exposure *= factor);
@@ -91,7 +91,7 @@ pub fn update(
     next
 }
 
-/// `raw = E expected + H` with what is free; rows are weight, expected, raw.
+/// Fits `raw = E expected + H` with the free parameters; rows are weight, expected, raw.
 fn regression(rows: &[[f64; 3]], now: Calibration, free: [bool; 2]) -> Calibration {
     let total = |f: &dyn Fn(&[f64; 3]) -> f64| sums::sum(&rows.iter().map(f).collect::<Vec<_>>());
     let weight = total(&|r| r[0]);
@@ -111,7 +111,7 @@ fn regression(rows: &[[f64; 3]], now: Calibration, free: [bool; 2]) -> Calibrati
     if next.exposure.is_finite() && next.exposure > 0.0 && next.haze.is_finite() { next } else { now }
 }
 
-/// Largest change of an exposure, as a share, or of a haze over its exposure.
+/// Largest relative change of an exposure, or change of a haze divided by its exposure.
 pub fn drift(before: &[Calibration], after: &[Calibration]) -> f64 {
     let of = |(a, b): (&Calibration, &Calibration)| {
         (b.exposure / a.exposure - 1.0).abs().max((b.haze - a.haze).abs() / a.exposure)

@@ -10,28 +10,28 @@
 //! | `E_k`, `H_k` | exposure and haze of the image |
 //! | `S_k` | brightness of a facet of albedo 1 under the light and view of the image ([`Photometry::shade`]) |
 //!
-//! by Gauss-Newton steps with the damping of Levenberg and Marquardt (doi:10.1137/0111030), from the solution of the problem made linear about
-//! level ground. A cell that too few images show lit has a prior as well: further squares, stated in [`Prior`].
+//! by Gauss-Newton steps with Levenberg-Marquardt damping (doi:10.1137/0111030), starting from the solution of the problem linearised about
+//! level ground. A cell lit in too few images also has a prior: additional squared terms, given in [`Prior`].
 
 use super::normal::Symmetric3;
 use crate::direction::{Vector, dot};
 use crate::photometry::Photometry;
 
-/// Most steps of one cell.
+/// Maximum number of steps for one cell.
 const STEPS_MAX: usize = 60;
-/// Steps end when slopes move by less than this.
+/// Steps end when slopes change by less than this.
 const STEP_MIN: f64 = 1e-11;
-/// Damping at the first step.
+/// Damping of the first step.
 const DAMPING: f64 = 1e-4;
-/// Damping at which no step helps any more.
+/// Damping above which the iteration gives up.
 const DAMPING_MAX: f64 = 1e10;
-/// Slopes of the linear start are kept within this.
+/// Largest slope of the linear start.
 const START_SLOPE_MAX: f64 = 1.5;
 
 /// One lit image of a cell.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
-    /// Brightness less haze, over exposure.
+    /// Brightness minus haze, divided by exposure.
     pub brightness: f64,
     /// Its standard deviation.
     pub sigma: f64,
@@ -41,10 +41,10 @@ pub struct Sample {
     pub view: Vector,
 }
 
-/// What is known of a cell before its images are looked at.
+/// Prior of a cell's slopes and albedo.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prior {
-    /// Expected albedo, and its standard deviation.
+    /// Expected albedo and its standard deviation.
     pub albedo: [f64; 2],
     /// Expected slopes.
     pub slopes: [f64; 2],
@@ -63,7 +63,7 @@ pub struct Fit {
     pub covariance: Symmetric3,
     /// Sum of the squared residuals of the images.
     pub chi_square: f64,
-    /// Condition number of the equations of the images for `p`, `q` and the logarithm of the albedo.
+    /// Condition number of the image equations for `p`, `q` and the logarithm of the albedo.
     pub condition: f64,
 }
 
@@ -79,13 +79,13 @@ impl Fit {
 
 /// The problem of one cell.
 pub struct Problem<'a> {
-    /// Law of brightness.
+    /// Photometric function.
     pub photometry: &'a Photometry,
-    /// Images that show the cell lit.
+    /// Images in which the cell is lit.
     pub samples: &'a [Sample],
     /// Prior of a poorly lit cell.
     pub prior: Option<Prior>,
-    /// The albedo where it is not looked for.
+    /// The albedo if it is known and not estimated.
     pub fixed_albedo: Option<f64>,
 }
 
@@ -93,7 +93,7 @@ pub struct Problem<'a> {
 type Unknowns = [f64; 3];
 
 impl Problem<'_> {
-    /// The solution from a start, or from the linear one where none is given; `None` where the equations do not determine it.
+    /// The solution from a given start, or else from the linear start; `None` if the equations do not determine it.
     pub fn solve(&self, start: Option<Unknowns>) -> Option<Fit> {
         let mut at = start.or_else(|| self.linear_start())?;
         if let Some(albedo) = self.fixed_albedo {
@@ -179,7 +179,7 @@ impl Problem<'_> {
         (normal, gradient)
     }
 
-    /// Derivatives of a brightness, and the brightness.
+    /// Derivatives of a predicted brightness, and the brightness itself.
     #[inline]
     fn row(&self, [p, q, albedo]: Unknowns, sample: &Sample) -> (Vector, f64) {
         let shade = self.photometry.shade([p, q], sample.light, sample.view);
@@ -191,7 +191,7 @@ impl Problem<'_> {
         let mut normal = Symmetric3::default();
         self.samples.iter().for_each(|s| normal.add(self.row(at, s).0.map(|v| v / s.sigma), 1.0));
         match self.fixed_albedo {
-            // Two unknowns: the third eigenvalue is put between the others.
+            // Two unknowns: the third eigenvalue is set between the other two.
             Some(_) => {
                 let [xx, xy, _, yy, ..] = normal.0;
                 Symmetric3([xx, xy, 0.0, yy, 0.0, 0.5 * (xx + yy)]).condition()
@@ -200,7 +200,7 @@ impl Problem<'_> {
         }
     }
 
-    /// Brightness is `alpha (S + S_p p + S_q q)` near level ground: linear in `alpha`, `alpha p`, `alpha q`.
+    /// Linear start: near level ground, brightness is `alpha (S + S_p p + S_q q)`, linear in `alpha`, `alpha p`, `alpha q`.
     fn linear_start(&self) -> Option<Unknowns> {
         if let Some(prior) = self.prior {
             return Some([prior.slopes[0], prior.slopes[1], prior.albedo[0]]);

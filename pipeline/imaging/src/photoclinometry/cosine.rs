@@ -1,13 +1,13 @@
 //! Poisson's equation on a rectangle with closed borders, by the cosine transform.
 //!
-//! The cosine transform of a field is taken from the Fourier transform of the reordered field (even samples forwards, odd ones
-//! backwards: J. Makhoul, A fast cosine transform in one and two dimensions, 1980, doi:10.1109/TASSP.1980.1163351), so that one real
-//! transform forwards and one back solve the equation. The bits are those of `numeric::fft`.
+//! The cosine transform of a field is computed from the Fourier transform of the reordered field (even samples forwards, odd ones
+//! backwards: J. Makhoul, A fast cosine transform in one and two dimensions, 1980, doi:10.1109/TASSP.1980.1163351), so one forward and
+//! one inverse real transform solve the equation. The transforms are those of `numeric::fft`, with the same reproducibility.
 
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2};
 use std::f64::consts::PI;
 
-/// A solver of `w_x D_x z + w_y D_y z + c z = f` for one shape, with second differences `D` (positive) that end at the borders.
+/// Solver of `w_x D_x z + w_y D_y z + c z = f` for one shape, with positive second differences `D` that end at the borders.
 pub struct CosinePoisson {
     rows: usize,
     cols: usize,
@@ -22,7 +22,7 @@ pub struct CosinePoisson {
 }
 
 impl CosinePoisson {
-    /// Weights along x and y are those of `z^2` differences (1/m2 included); `shift` of 0 sets the mean to 0.
+    /// The weights along x and y include 1/m2; with a `shift` of 0 the mean of the solution is 0.
     pub fn new(rows: usize, cols: usize, [weight_x, weight_y]: [f64; 2], shift: f64) -> Self {
         let turns = |n: usize| -> Vec<Complex64> {
             (0..=n).map(|k| libm::sincos(-PI * k as f64 / (2 * n) as f64)).map(|(s, c)| Complex64::new(c, s)).collect()
@@ -42,14 +42,22 @@ impl CosinePoisson {
         }
     }
 
-    /// Solution for a right-hand side; without a shift, that with mean 0 for the right-hand side less its mean.
+    /// Solution for a right-hand side; without a shift, the zero-mean solution for the right-hand side minus its mean.
+    ///
+    /// ```
+    /// use sastrugi_imaging::photoclinometry::CosinePoisson;
+    ///
+    /// // A constant has no differences: what remains of the equation is `shift z = f`.
+    /// let z = CosinePoisson::new(4, 6, [1.0, 2.0], 0.5).solve(&[3.0; 24]);
+    /// assert!(z.iter().all(|z| (z - 6.0).abs() < 1e-12));
+    /// ```
     pub fn solve(&self, right: &[f64]) -> Vec<f64> {
         let spectrum = self.fft.forward(&self.reordered(right));
         let solved = self.fft.inverse_of(|kx, column| self.solve_column(&spectrum, kx, column));
         self.restored(&solved)
     }
 
-    /// Divides the four cosine modes behind two Fourier modes by their eigenvalues: modes `(ky, kx)`, `(rows - ky, kx)` and both with
+    /// Divides the four cosine modes of two Fourier modes by their eigenvalues: modes `(ky, kx)`, `(rows - ky, kx)` and both with
     /// `cols - kx`.
     fn solve_column(&self, spectrum: &HalfSpectrum, kx: usize, column: &mut [Complex64]) {
         let rows = self.rows;
@@ -66,7 +74,7 @@ impl CosinePoisson {
         }
     }
 
-    /// One over the eigenvalue of a cosine mode.
+    /// Inverse of the eigenvalue of a cosine mode.
     #[inline]
     fn gain(&self, ky: usize, kx: usize) -> f64 {
         let value = self.row_values[ky] + self.col_values[kx] + self.shift;
@@ -94,7 +102,7 @@ impl CosinePoisson {
     }
 }
 
-/// Where sample `k` of `n` stands in the reordered line.
+/// Position of sample `k` of `n` in the reordered line.
 #[inline]
 fn place(k: usize, n: usize) -> usize {
     if k.is_multiple_of(2) { k / 2 } else { n - 1 - k / 2 }
@@ -105,7 +113,7 @@ mod tests {
     use super::*;
     use sastrugi_numeric::Streams;
 
-    /// The equation itself, by differences.
+    /// The left-hand side of the equation, by differences.
     fn applied(z: &[f64], rows: usize, cols: usize, weights: [f64; 2], shift: f64) -> Vec<f64> {
         let at = |r: usize, c: usize| z[r * cols + c];
         let one = |r: usize, c: usize| {
@@ -128,7 +136,7 @@ mod tests {
         (0..rows * cols).map(|k| one(k / cols, k % cols)).collect()
     }
 
-    /// The solution put back into the differences, even and odd shapes, with and without a shift.
+    /// The solution satisfies the difference equation, for even and odd shapes, with and without a shift.
     #[test]
     fn val_the_solution_satisfies_the_differences() {
         for (rows, cols) in [(2, 2), (3, 2), (5, 8), (6, 7), (9, 9), (16, 12), (7, 30)] {

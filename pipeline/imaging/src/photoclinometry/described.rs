@@ -1,4 +1,4 @@
-//! Images by the files beside them, and the map that they have in common.
+//! Images from their descriptions, and the map common to them.
 
 use super::observation::Image;
 use super::params::Settings;
@@ -11,12 +11,12 @@ use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Rows and columns beyond which a map is refused.
+/// Maximum number of rows or columns of a map.
 const SIDE_MAX: usize = 1 << 15;
-/// Part of a cell by which a map may fall short of a whole one.
+/// Share of a cell by which a map may fall short of a whole cell.
 const ROUNDING: f64 = 1e-6;
 
-/// Errors put on what is known of the first image, to see what they do to the surface; all 0 by default.
+/// Errors applied to the metadata of the first image, to study their effect on the surface; all 0 by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FirstImageErrors {
@@ -24,13 +24,13 @@ pub struct FirstImageErrors {
     pub sun_azimuth_deg: f64,
     /// Added to the elevation of its sun, deg.
     pub sun_elevation_deg: f64,
-    /// Its exposure is taken as this share too high.
+    /// Relative error of its exposure; positive if too high.
     pub exposure: f64,
     /// Added to its haze, I/F.
     pub haze: f64,
-    /// Its camera is taken to stand this far east of where it stands, m: a misregistration.
+    /// Shift of its camera to the east, m: a misregistration.
     pub shift_east_m: f64,
-    /// The same to the north, m.
+    /// Shift of its camera to the north, m.
     pub shift_north_m: f64,
 }
 
@@ -66,7 +66,7 @@ impl FirstImageErrors {
     }
 }
 
-/// Images as their descriptions have them; `pixels` of each from the top row.
+/// Images from their descriptions and pixels, top row first; the errors apply to the first one.
 pub fn images(described: Vec<(ImageDescription, Vec<f64>)>, errors: &FirstImageErrors) -> Vec<Image> {
     let of = |(k, (description, brightness)): (usize, (ImageDescription, Vec<f64>))| {
         let (mut sun, mut pose) = (description.sun, description.camera);
@@ -98,7 +98,7 @@ fn shifted(pose: CameraPose, [east, north]: [f64; 2]) -> CameraPose {
     }
 }
 
-/// Height that the middle of an image shows, m.
+/// Height of the point at the centre of an image, m.
 pub fn level_m(pose: &CameraPose) -> f64 {
     match pose {
         CameraPose::Parallel { centre_m, .. } => centre_m[2],
@@ -106,14 +106,17 @@ pub fn level_m(pose: &CameraPose) -> f64 {
     }
 }
 
-/// The map of some images: a window, or the rectangle that all of them show of level ground at `level_m`.
+/// The map of a set of images: a window, or the rectangle of level ground at `level_m` that all of them show.
 ///
 /// # Errors
-/// Cameras without a pixel size and no `cell_m`; a window, or images with nothing in common, smaller than 4 x 4 cells; maps too large.
+/// Cameras without a pixel size and no `cell_m`; a window or common ground smaller than 4 x 4 cells; images without common ground; maps too large.
 pub fn map(poses: &[CameraPose], level_m: f64, settings: &Settings) -> Result<Geometry, ParameterError> {
     let finest = poses.iter().filter_map(CameraPose::pixel_m).reduce(f64::min);
     let Some(cell) = settings.cell_m.or(finest) else {
-        return Err(ParameterError::new("cell_m", "is missing; pinhole cameras do not state a pixel size"));
+        return Err(ParameterError::new(
+            "cell_m",
+            "is missing; it is required because pinhole cameras have no pixel size",
+        ));
     };
     ParameterError::positive("cell_m", cell)?;
     let shown_by = |pose: &CameraPose| footprint(&pose.camera(), level_m);
@@ -125,15 +128,16 @@ pub fn map(poses: &[CameraPose], level_m: f64, settings: &Settings) -> Result<Ge
         return Err(too_small([x0, y0, x1, y1], cell, settings.window_m.is_some()));
     }
     if cols > SIDE_MAX as f64 || rows > SIDE_MAX as f64 {
-        return Err(ParameterError::new("cell_m", format!("is {cell}; the map would have {cols} x {rows} cells")));
+        let message = format!("is {cell}; the map would have {cols} x {rows} cells, more than {SIDE_MAX} along a side");
+        return Err(ParameterError::new("cell_m", message));
     }
     Ok(Geometry { rows: rows as usize, cols: cols as usize, cell: [cell; 2], origin: [x0, y0] })
 }
 
-/// A map, given or common to all images, of fewer than 4 x 4 cells.
+/// Error for a map of fewer than 4 x 4 cells, given by a window or common to all images.
 fn too_small([x0, y0, x1, y1]: [f64; 4], cell: f64, given: bool) -> ParameterError {
     let size = format!("{} x {} m", shown(x1 - x0), shown(y1 - y0));
-    let least = format!("a map has at least 4 x 4 cells of {} m", shown(cell));
+    let least = format!("a map needs at least 4 x 4 cells of {} m", shown(cell));
     let overlap = x1 > x0 && y1 > y0;
     match (given, overlap) {
         (true, _) => ParameterError::new("window_m", format!("spans {size}; {least}")),
@@ -142,12 +146,12 @@ fn too_small([x0, y0, x1, y1]: [f64; 4], cell: f64, given: bool) -> ParameterErr
             format!("is too large: the ground that all images show spans {size}; {least}"),
         ),
         (false, false) => {
-            ParameterError::new("images", "have no ground in common: no place is in the footprint of all of them")
+            ParameterError::new("images", "have no ground in common: no point lies in the footprints of all of them")
         }
     }
 }
 
-/// Rectangle around what an image shows of level ground; without bounds where a corner looks above the horizon.
+/// Bounding rectangle of the level ground shown by an image; unbounded if a corner looks above the horizon.
 fn footprint(camera: &Camera, level_m: f64) -> [f64; 4] {
     let [rows, cols] = camera.shape().map(|n| n as f64);
     let mut bounds = [f64::INFINITY, f64::INFINITY, f64::NEG_INFINITY, f64::NEG_INFINITY];
@@ -179,9 +183,9 @@ mod tests {
         CameraPose::Parallel { azimuth_deg: 90.0, elevation_deg, centre_m, pixel_m: 0.5, rows: 40, cols: 60 }
     }
 
-    /// From above the map is the image; an oblique one shows more ground along its tilt; what two have in common is the overlap.
+    /// From above, the map is the image; an oblique image covers more ground along its tilt; the map of two images is their overlap.
     #[test]
-    fn val_the_map_is_what_all_images_show() {
+    fn val_the_map_is_the_common_ground() {
         let above = CameraPose::Parallel {
             azimuth_deg: 0.0,
             elevation_deg: 90.0,
@@ -193,12 +197,49 @@ mod tests {
         let g = map(&[above], 3.0, &Settings::default()).unwrap();
         assert_eq!((g.rows, g.cols, g.cell), (40, 60, [0.5; 2]));
         assert!((g.origin[0] - 35.0).abs() < 1e-9 && (g.origin[1] - 10.0).abs() < 1e-9, "{:?}", g.origin);
-        // 30 m across, seen from the east at 30 deg elevation: 60 m of ground.
+        // 30 m across and 20 m high, seen from the east at 30 deg elevation: 60 m of ground east-west, 20 m north-south.
         let wide = footprint(&parallel(30.0, 50.0).camera(), 3.0);
-        assert!((wide[2] - wide[0] - 60.0).abs() < 1e-9 || (wide[3] - wide[1] - 60.0).abs() < 1e-9, "{wide:?}");
+        assert!(wide.iter().zip([20.0, 10.0, 80.0, 30.0]).all(|(a, b)| (a - b).abs() < 1e-9), "{wide:?}");
+        // Ground 1 m lower lies farther along the rays, which lead west.
+        let lower = footprint(&parallel(30.0, 50.0).camera(), 2.0);
+        assert!((lower[0] - (20.0 - 3f64.sqrt())).abs() < 1e-9 && (lower[1] - 10.0).abs() < 1e-9, "{lower:?}");
         let moved = shifted(above, [10.0, -4.0]);
         let g = map(&[above, moved], 3.0, &Settings { cell_m: Some(1.0), ..Settings::default() }).unwrap();
         assert_eq!((g.rows, g.cols), (16, 20));
+    }
+
+    /// Errors apply to the first image alone: sun and haze by addition, exposure by a factor, the camera by a shift.
+    #[test]
+    fn val_errors_apply_to_the_first_image() {
+        let described = ImageDescription {
+            image: "a.tif".to_owned(),
+            sun: Sun { azimuth_deg: 100.0, elevation_deg: 40.0 },
+            camera: parallel(90.0, 50.0),
+            photometry: crate::Photometry::default(),
+            exposure: 2.0,
+            haze: 0.01,
+            noise: crate::Noise::default(),
+            rendered: None,
+        };
+        let errors = FirstImageErrors {
+            sun_azimuth_deg: 5.0,
+            sun_elevation_deg: -2.0,
+            exposure: 0.1,
+            haze: 0.02,
+            shift_east_m: 3.0,
+            shift_north_m: -1.0,
+        };
+        let both = vec![(described.clone(), vec![0.1]), (described.clone(), vec![0.2])];
+        let made = images(both, &errors);
+        assert_eq!(made.len(), 2);
+        let (first, second) = (&made[0], &made[1]);
+        assert_eq!((second.exposure, second.haze, second.light), (2.0, 0.01, described.sun.direction()));
+        assert_eq!((second.camera, &second.brightness[..]), (described.camera.camera(), &[0.2][..]));
+        assert!((first.exposure - 2.2).abs() < 1e-12 && (first.haze - 0.03).abs() < 1e-12);
+        assert_eq!(first.light, crate::direction(105.0, 38.0));
+        // The camera looks 3 m farther east and 1 m farther south.
+        let middle = first.camera.ray([30.0, 20.0]).origin_m;
+        assert!((middle[0] - 53.0).abs() < 1e-12 && (middle[1] - 19.0).abs() < 1e-12, "{middle:?}");
     }
 
     #[test]
@@ -215,18 +256,18 @@ mod tests {
         let of = |settings: &Settings| map(&apart, 3.0, settings).unwrap_err().to_string();
         assert_eq!(
             of(&Settings::default()),
-            "`images` have no ground in common: no place is in the footprint of all of them"
+            "`images` have no ground in common: no point lies in the footprints of all of them"
         );
         let window_m = Some([0.0, 0.0, 1.5, 20.0]);
         assert_eq!(
             of(&Settings { window_m, ..Settings::default() }),
-            "`window_m` spans 1.5 x 20 m; a map has at least 4 x 4 cells of 0.5 m"
+            "`window_m` spans 1.5 x 20 m; a map needs at least 4 x 4 cells of 0.5 m"
         );
         let words =
             map(&apart[..1], 3.0, &Settings { cell_m: Some(9.0), ..Settings::default() }).unwrap_err().to_string();
         assert_eq!(
             words,
-            "`cell_m` is too large: the ground that all images show spans 30 x 20 m; a map has at least 4 x 4 cells of 9 m"
+            "`cell_m` is too large: the ground that all images show spans 30 x 20 m; a map needs at least 4 x 4 cells of 9 m"
         );
         let huge = Settings { cell_m: Some(1e-6), ..Settings::default() };
         assert_eq!(map(&apart[..1], 3.0, &huge).unwrap_err().key, "cell_m");

@@ -1,11 +1,11 @@
-//! How like the truth a recovered surface is.
+//! Evaluation of a recovered surface against the truth.
 //!
-//! The rms error of heights does not tell good from failed inversions: it is made by the longest wavelengths. Beside it stand the normalised
-//! correlation of shaded truth and shaded result, the error of slopes, and both surfaces by wavelength. All are compared with the ceiling: what
-//! the truth itself reaches once it is averaged over the map's cells.
+//! The rms error of heights does not distinguish good from failed inversions, because the longest wavelengths dominate it. Therefore there are
+//! also the normalised correlation of the shaded truth and the shaded result, the slope error, and a comparison by wavelength. All are compared
+//! with a ceiling: the score of the truth itself once it is averaged over the map's cells.
 //!
-//! Shaded means: albedo 1, the brightness of the four facets between a cell's edges averaged ([`shaded`]); a checkerboard of heights changes it, as it
-//! would not change the brightness of central differences.
+//! Shaded means: albedo 1, with the mean brightness of the four facets between a cell's edges ([`shaded`]). A checkerboard of heights changes
+//! it, whereas the brightness from central differences would not change.
 
 use super::observation::Relief;
 use super::stereo::correlation_of;
@@ -16,15 +16,15 @@ use sastrugi_numeric::fft::RealFft2;
 use sastrugi_numeric::resample::block_means;
 use sastrugi_numeric::{Geometry, Grid, Surface, sums};
 
-/// Most cells of the truth along a cell of the map.
+/// Maximum number of cells of the truth along a cell of the map.
 const FINER_MAX: usize = 8;
 
-/// Comparison of a recovered surface with the truth over the cells that both know.
+/// Comparison of a recovered surface with the truth over the cells where both are known.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Evaluation {
     /// Cells compared.
     pub cells: usize,
-    /// Normalised correlation of shaded truth and shaded result.
+    /// Normalised correlation of the shaded truth and the shaded result.
     pub shaded_correlation: f64,
     /// The same for the truth averaged over the cells.
     pub shaded_correlation_ceiling: f64,
@@ -34,11 +34,11 @@ pub struct Evaluation {
     pub slope_error_rms_ceiling: f64,
     /// Rms slope of the truth, 1.
     pub slope_rms: f64,
-    /// Rms error of heights less their mean, m.
+    /// Rms error of heights after removing its mean, m.
     pub height_error_rms_m: f64,
-    /// Rms error of heights less the plane through the errors, m.
+    /// Rms error of heights after removing its least-squares plane, m.
     pub height_error_rms_detrended_m: f64,
-    /// Rms height of the truth less its mean, m.
+    /// Rms height of the truth about its mean, m.
     pub height_rms_m: f64,
 }
 
@@ -51,7 +51,7 @@ pub struct Band {
     pub wavelength_min_m: f64,
     /// Longest wavelength, m.
     pub wavelength_max_m: f64,
-    /// Fourier modes in the band (each with its conjugate once).
+    /// Number of Fourier modes in the band (a mode and its conjugate count once).
     pub modes: usize,
     /// Rms height of the truth, m.
     pub truth_rms_m: f64,
@@ -61,13 +61,13 @@ pub struct Band {
     pub truth_slope_rms: f64,
     /// Rms slope of the result, 1.
     pub recovered_slope_rms: f64,
-    /// Covariance of both, m2.
+    /// Covariance of truth and result, m2.
     pub covariance_m2: f64,
-    /// Squared coherence: covariance squared over both variances.
+    /// Squared coherence: covariance squared over the product of the variances.
     pub coherence: f64,
 }
 
-/// Brightness of a surface of albedo 1: the mean of the four facets between its edges. NaN beside missing heights.
+/// Brightness of a surface of albedo 1: the mean of the four facets between the edges of each cell. NaN next to missing heights.
 pub fn shaded(heights: &Grid, photometry: &Photometry, light: Vector, view: Vector) -> Grid {
     let relief = Relief { geometry: &heights.geometry, heights_m: &heights.values };
     let one = |k: usize| {
@@ -84,7 +84,7 @@ pub fn shaded(heights: &Grid, photometry: &Photometry, light: Vector, view: Vect
     Grid::new(heights.geometry, values)
 }
 
-/// The truth on cells that divide those of the map: as fine as the truth itself, at most 8 along a cell. NaN beyond it.
+/// The truth resampled to cells that divide those of the map: as fine as the truth itself, at most 8 along a cell. NaN outside the truth.
 pub fn aligned(truth: &Grid, map: &Geometry) -> (Grid, usize) {
     let ratio = (0..2).map(|axis| map.cell[axis] / truth.geometry.cell[axis]).fold(1.0, f64::max);
     let finer = ((ratio - 1e-9).ceil() as usize).clamp(1, FINER_MAX);
@@ -107,7 +107,21 @@ pub fn aligned(truth: &Grid, map: &Geometry) -> (Grid, usize) {
     (Grid::new(g, values), finer)
 }
 
-/// Compares heights recovered on a map with a truth of any cell size, shaded under one light and view. `None` where they share too little.
+/// Compares heights recovered on a map with a truth of any cell size, shaded under one light and view. `None` if they share too few cells.
+///
+/// ```
+/// use sastrugi_imaging::photoclinometry::evaluation::evaluate;
+/// use sastrugi_imaging::{Photometry, direction};
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// let g = Geometry::square(12, 12, 1.0);
+/// let truth = Grid::new(g, (0..g.len()).map(|k| 0.02 * ((k % 12) * (k / 12)) as f64).collect());
+/// // The same relief, 5 m too high.
+/// let high = truth.map(|z| z + 5.0);
+/// let of = |found: &Grid| evaluate(&truth, found, &Photometry::default(), direction(40.0, 45.0), [0.0, 0.0, 1.0]).unwrap();
+/// assert!((of(&high).shaded_correlation - 1.0).abs() < 1e-9);
+/// assert!(of(&high).height_error_rms_m < 1e-9, "heights are compared without their mean");
+/// ```
 pub fn evaluate(
     truth: &Grid,
     recovered: &Grid,
@@ -155,7 +169,7 @@ pub fn evaluate(
     })
 }
 
-/// Slopes of every cell from the heights beside it; NaN beside missing heights.
+/// Slopes of every cell from the neighbouring heights; NaN next to missing heights.
 fn slopes(heights: &Grid) -> [Vec<f64>; 2] {
     let relief = Relief { geometry: &heights.geometry, heights_m: &heights.values };
     let known = |k: usize| relief.edges(k).iter().flatten().all(|slope| slope.is_finite());
@@ -164,7 +178,7 @@ fn slopes(heights: &Grid) -> [Vec<f64>; 2] {
     [0, 1].map(|axis| all.iter().map(|s| s[axis]).collect())
 }
 
-/// Values of some cells less the least-squares plane through them.
+/// Values of selected cells minus the least-squares plane through them.
 fn detrended(g: &Geometry, cells: &[usize], values: &[f64]) -> Vec<f64> {
     use super::normal::Symmetric3;
     let place = |k: usize| {
@@ -182,9 +196,10 @@ fn detrended(g: &Geometry, cells: &[usize], values: &[f64]) -> Vec<f64> {
     cells.iter().zip(values).map(|(&k, v)| v - of(k)).collect()
 }
 
-/// Both surfaces by octave of wavelength, from two cells upwards: heights less the plane of their common cells, missing cells 0, under a Hann window
-/// (its mean square divided out). The squared slope of a mode of frequency `f` (cycles/m) is its squared height times `(2 pi f)^2`: the length of the
-/// gradient, both axes together. The window spreads every mode over its neighbours, which adds `4 pi^2 / 3` per squared side of the map to that factor.
+/// Compares both surfaces by octave of wavelength, from two cells upwards: heights minus the plane of their common cells, missing cells set to 0,
+/// under a Hann window (with its mean square divided out). The squared slope of a mode of frequency `f` (cycles/m) is its squared height times
+/// `(2 pi f)^2`, the squared length of the gradient. The window spreads every mode over its neighbours, which adds `4 pi^2 / 3` per squared side
+/// of the map to that factor.
 pub fn bands(truth: &Grid, recovered: &Grid) -> Vec<Band> {
     let g = &recovered.geometry;
     let (fine, finer) = aligned(truth, g);

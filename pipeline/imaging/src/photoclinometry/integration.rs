@@ -1,26 +1,26 @@
 //! Heights from slopes by weighted least squares (Poisson's equation).
 //!
-//! Minimises over the heights of the cell centres
+//! Minimises, over the heights at the cell centres,
 //!
 //! $$ \sum_{cells} \frac14 \sum_{quadrants} (g - t)^T W (g - t) + \sum_j \left( \frac{a_j \cdot z - h_j}{\sigma_j} \right)^2 $$
 //!
 //! | symbol | meaning | unit |
 //! |---|---|---|
-//! | `g` | differences of heights over one edge along x and one along y, those of the quadrant | 1 |
-//! | `t` | the cell's slopes, moved to these edges | 1 |
-//! | `W` | information of the cell's slopes: inverse of their covariance and of the curvature within the cell | 1 |
-//! | `a_j`, `h_j`, `sigma_j` | soft constraints: weighted means of heights (stereo points, points given, cells of a coarse DEM) | m |
+//! | `g` | height differences of the quadrant, over one edge along x and one along y, per length | 1 |
+//! | `t` | the cell's slopes, interpolated to these edges | 1 |
+//! | `W` | information of the cell's slopes: inverse of the sum of their covariance and the variance of slopes within the cell | 1 |
+//! | `a_j`, `h_j`, `sigma_j` | soft constraints: weighted means of heights (stereo points, given points, cells of a coarse DEM) | m |
 //!
-//! Slopes belong to cells, differences to the edges between their centres: all four edges around a cell enter, each by itself. The heights of
-//! a checkerboard differ over every edge, so the sum sees it; central differences would not. With independent slopes the matrix is the
-//! five-point one; their covariance adds the corners. At borders the missing edge of a quadrant is marginalised.
+//! Slopes belong to cells, differences to the edges between their centres; each of the four edges around a cell enters separately. The heights
+//! of a checkerboard differ over every edge, so they contribute to the sum; with central differences they would not. With independent slopes
+//! the matrix has the five-point stencil; their covariance adds the corners. At borders the missing edge of a quadrant is marginalised.
 //!
-//! Moving slopes to an edge adds `-1/24` of their second differences on both sides along it, or `-1/12` of the one that there is at borders and
-//! holes: the mean slope over the edge is then right to fourth (third) order for slopes of heights that are area means.
+//! Interpolating slopes to an edge adds `-1/24` of their second differences on both sides along it, or `-1/12` of the only one at borders and
+//! holes: the mean slope over the edge is then accurate to fourth (third) order, for slopes of heights that are area means.
 //!
 //! # Solution
-//! Conjugate gradients; the preconditioner is the equation with constant weights, solved by cosine transforms, scaled by the root of the ratio of
-//! the diagonals. Sums run in a fixed order. Memory: about 200 bytes per cell. Without constraints the mean height is 0.
+//! Conjugate gradients. The preconditioner is the equation with constant weights, solved by cosine transforms and scaled by the square root of
+//! the ratio of the diagonals. Sums run in a fixed order. Memory: about 200 bytes per cell. Without constraints the mean height is 0.
 //!
 //! Source: B. K. P. Horn, M. J. Brooks, The variational approach to shape from shading, 1986, doi:10.1016/0734-189X(86)90114-3, for the least
 //! squares; Y. Quéau, J.-D. Durou, J.-F. Aujol, Normal integration: a survey, 2018, doi:10.1007/s10851-017-0773-x.
@@ -29,9 +29,9 @@ use super::cosine::CosinePoisson;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Surface, sums};
 
-/// Values multiplied by one task.
+/// Number of values processed by one task.
 const BLOCK: usize = 4096;
-/// Weight of cells without slopes, and the least of any, as a share of the median.
+/// Weight of cells without slopes, and smallest weight of any cell, as a share of the median.
 pub const WEIGHT_FLOOR: f64 = 1e-3;
 
 /// A soft constraint on heights.
@@ -39,13 +39,13 @@ pub const WEIGHT_FLOOR: f64 = 1e-3;
 pub struct Constraint {
     /// Cells and their weights, which usually sum to 1.
     pub cells: Vec<(usize, f64)>,
-    /// Weighted mean of their heights, m.
+    /// Required weighted mean of their heights, m.
     pub height_m: f64,
-    /// Its standard deviation, m.
+    /// Standard deviation of this mean, m.
     pub sigma_m: f64,
 }
 
-/// A height known at a place.
+/// A known height at a point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeightPoint {
     /// Easting, m.
@@ -59,7 +59,18 @@ pub struct HeightPoint {
 }
 
 impl Constraint {
-    /// Of a point, bilinear between the centres around it; `None` beyond the outer centres.
+    /// Constraint of a point, bilinear between the cell centres around it; `None` beyond the outer centres.
+    ///
+    /// ```
+    /// use sastrugi_imaging::photoclinometry::{Constraint, HeightPoint};
+    /// use sastrugi_numeric::Geometry;
+    ///
+    /// let g = Geometry::square(4, 4, 1.0);
+    /// let at = |x_m: f64, y_m: f64| Constraint::point(&g, &HeightPoint { x_m, y_m, height_m: 7.0, sigma_m: 0.1 });
+    /// // In the middle of four cells each has a quarter of the weight.
+    /// assert!(at(2.0, 2.0).unwrap().cells.iter().all(|(_, weight)| *weight == 0.25));
+    /// assert_eq!(at(0.2, 2.0), None);
+    /// ```
     pub fn point(g: &Geometry, point: &HeightPoint) -> Option<Self> {
         let u = (point.x_m - g.origin[0]) / g.cell[0] - 0.5;
         let v = g.rows as f64 - (point.y_m - g.origin[1]) / g.cell[1] - 0.5;
@@ -79,7 +90,8 @@ impl Constraint {
         Some(Self { cells, height_m: point.height_m, sigma_m: point.sigma_m })
     }
 
-    /// Of every cell of a coarse DEM: the mean of the map's cells in it. A DEM finer than the map gives one for every cell of the map.
+    /// Constraints of a coarse DEM: for each of its cells, the mean of the map's cells in it. A DEM finer than the map gives one constraint per
+    /// cell of the map.
     pub fn coarse(g: &Geometry, dem: &Grid, sigma_m: f64) -> Vec<Self> {
         if dem.geometry.cell[0] < g.cell[0] || dem.geometry.cell[1] < g.cell[1] {
             let at = |k: usize| dem.height(g.x(k % g.cols), g.y(k / g.cols)).map(|height| (k, height));
@@ -106,30 +118,30 @@ impl Constraint {
         self.cells.iter().map(|&(k, weight)| weight * z[k]).sum()
     }
 
-    /// Adds `factor` times the row's transpose, over the variance.
+    /// Adds `value` times the transposed row, divided by the variance.
     fn spread(&self, value: f64, out: &mut [f64]) {
         let share = value / (self.sigma_m * self.sigma_m);
         self.cells.iter().for_each(|&(k, weight)| out[k] += weight * share);
     }
 }
 
-/// Heights, and how the solver came to them.
+/// Heights and statistics of the solver.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Integrated {
     /// Height of every cell, m.
     pub heights_m: Vec<f64>,
-    /// Iterations of conjugate gradients.
+    /// Number of conjugate-gradient iterations.
     pub iterations: usize,
-    /// Residual over that of a level plane, in the norm of the preconditioner.
+    /// Residual relative to that of a level plane, in the norm of the preconditioner.
     pub residual: f64,
 }
 
-/// When conjugate gradients end.
+/// Stopping criterion of the conjugate gradients.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Stop {
-    /// Residual over that of a level plane.
+    /// Residual relative to that of a level plane.
     pub residual: f64,
-    /// Most iterations.
+    /// Maximum number of iterations.
     pub iterations: usize,
 }
 
@@ -140,11 +152,11 @@ impl Stop {
     pub const COARSE: Self = Self { residual: 1e-5, iterations: 500 };
 }
 
-/// The equations of one map: weights and constraints, not yet slopes.
+/// The equations of one map: weights and constraints, without the slopes.
 pub struct System {
     geometry: Geometry,
     information: Vec<[f64; 3]>,
-    /// Cells whose slopes may enter a correction along an edge.
+    /// Whether a cell's slopes may enter a correction along an edge.
     good: Vec<bool>,
     constraints: Vec<Constraint>,
     constant: CosinePoisson,
@@ -167,7 +179,7 @@ impl System {
             total * total / (c.sigma_m * c.sigma_m)
         };
         let pull = constraints.iter().map(constraint).sum::<f64>() / geometry.len() as f64;
-        // Without constraints the constant has to stay in the preconditioner, below every other mode.
+        // Without constraints the preconditioner must keep the constant mode, with an eigenvalue below every other mode.
         let least = |n: usize, weight: f64| {
             let sin = libm::sin(0.5 * std::f64::consts::PI / n as f64);
             4.0 * weight * sin * sin
@@ -179,7 +191,7 @@ impl System {
         Self { geometry, information, good, constraints, constant, scale }
     }
 
-    /// Right-hand side of slopes and of the heights of the constraints.
+    /// Right-hand side for given slopes and constraint heights.
     pub fn right_side(&self, slopes: &[[f64; 2]], heights_m: &[f64]) -> Vec<f64> {
         let g = &self.geometry;
         let mut out = self.divergence(|r, c| {
@@ -197,7 +209,7 @@ impl System {
         out
     }
 
-    /// The same with every slope taken as it is at the edges of its cell (second order).
+    /// The same with the uncorrected slope of the cell at its edges (second order).
     #[cfg(test)]
     pub(super) fn uncorrected(&self, slopes: &[[f64; 2]], heights_m: &[f64]) -> Vec<f64> {
         let mut out = self.divergence(|r, c| {
@@ -214,7 +226,7 @@ impl System {
         &self.information
     }
 
-    /// Heights that the constraints ask for.
+    /// Heights of the constraints, m.
     pub fn constraint_heights(&self) -> Vec<f64> {
         self.constraints.iter().map(|c| c.height_m).collect()
     }
@@ -224,12 +236,12 @@ impl System {
         self.constraints.iter().map(|c| c.sigma_m).collect()
     }
 
-    /// True where constraints hold the heights.
+    /// True if there are constraints on the heights.
     pub fn tied(&self) -> bool {
         !self.constraints.is_empty()
     }
 
-    /// What each constraint asks for above given heights, as points `[x, y, height, weight]` at the middle of its cells.
+    /// Residual of each constraint relative to given heights, as a point `[x, y, height, weight]` at the weighted centre of its cells.
     pub fn residuals(&self, heights_m: &[f64]) -> Vec<[f64; 4]> {
         let g = &self.geometry;
         let one = |c: &Constraint| {
@@ -241,7 +253,7 @@ impl System {
         self.constraints.iter().map(one).collect()
     }
 
-    /// Solves for a right-hand side, from heights given or from 0.
+    /// Solves for a right-hand side, starting from given heights or from 0.
     pub fn solve(&self, right: &[f64], start: Option<&[f64]>, stop: Stop) -> Integrated {
         let mut z = start.map_or_else(|| vec![0.0; right.len()], <[f64]>::to_vec);
         let mut residual = match start {
@@ -277,7 +289,7 @@ impl System {
         Integrated { heights_m: z, iterations, residual }
     }
 
-    /// The matrix times heights.
+    /// The product of the matrix and heights.
     pub fn apply(&self, z: &[f64]) -> Vec<f64> {
         let g = &self.geometry;
         let [per_x, per_y] = g.cell.map(|cell| 1.0 / cell);
@@ -294,7 +306,7 @@ impl System {
         out
     }
 
-    /// The constant-weight equation solved, scaled on both sides.
+    /// Applies the preconditioner: solves the constant-weight equation, scaled on both sides.
     fn precondition(&self, residual: &[f64]) -> Vec<f64> {
         let scaled: Vec<f64> = residual.iter().zip(&self.scale).map(|(r, s)| r / s).collect();
         let mut solved = self.constant.solve(&scaled);
@@ -338,8 +350,8 @@ impl System {
         out
     }
 
-    /// What is added to the mean of two slopes for the mean slope between them: the cell at index `first` is number `at` of `len` along the
-    /// axis, its neighbours `pitch` apart.
+    /// Correction added to the mean of two slopes to obtain the mean slope over the edge between them. The cell at index `first` is number `at`
+    /// of `len` along the axis; its neighbours are `pitch` apart.
     fn correction(&self, slopes: &[[f64; 2]], axis: usize, first: usize, at: usize, len: usize, pitch: usize) -> f64 {
         if at + 1 >= len || !self.good[first] || !self.good[first + pitch] {
             return 0.0;
@@ -386,7 +398,7 @@ fn floored([a, b, c]: [f64; 3], floor: f64) -> [f64; 3] {
     [a + floor, b, c + floor]
 }
 
-/// Root of the diagonal over that of the equation with constant weights (the covariance of slopes left out).
+/// Square root of the diagonal relative to that of the equation with constant weights (ignoring the covariance of slopes).
 fn scales(g: &Geometry, information: &[[f64; 3]], [weight_x, weight_y]: [f64; 2]) -> Vec<f64> {
     let per = g.cell.map(|cell| 1.0 / (cell * cell));
     let one = |k: usize| {
@@ -408,7 +420,7 @@ fn scales(g: &Geometry, information: &[[f64; 3]], [weight_x, weight_y]: [f64; 2]
     (0..g.len()).into_par_iter().map(one).collect()
 }
 
-/// Scalar product in blocks, whatever the number of threads.
+/// Scalar product in fixed blocks, independent of the number of threads.
 pub(super) fn ordered_dot(a: &[f64], b: &[f64]) -> f64 {
     let parts: Vec<f64> =
         a.par_chunks(BLOCK).zip(b.par_chunks(BLOCK)).map(|(a, b)| a.iter().zip(b).map(|(x, y)| x * y).sum()).collect();

@@ -1,13 +1,13 @@
-//! Normal equations of three unknowns.
+//! Normal equations with three unknowns.
 
 use crate::direction::Vector;
 
-/// A symmetric matrix of three rows: `[xx, xy, xz, yy, yz, zz]`.
+/// A symmetric 3 x 3 matrix: `[xx, xy, xz, yy, yz, zz]`.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Symmetric3(pub [f64; 6]);
 
 impl Symmetric3 {
-    /// The matrix with these values on its diagonal.
+    /// A diagonal matrix.
     pub fn diagonal(d: Vector) -> Self {
         Self([d[0], 0.0, 0.0, d[1], 0.0, d[2]])
     }
@@ -45,7 +45,7 @@ impl Symmetric3 {
         [xx * v[0] + xy * v[1] + xz * v[2], xy * v[0] + yy * v[1] + yz * v[2], xz * v[0] + yz * v[1] + zz * v[2]]
     }
 
-    /// Inverse by cofactors; `None` where the matrix is not positive definite.
+    /// Inverse by cofactors; `None` if the matrix is not positive definite.
     pub fn inverse(&self) -> Option<Self> {
         let [xx, xy, xz, yy, yz, zz] = self.0;
         let (a, b, c) = (yy * zz - yz * yz, xz * yz - xy * zz, xy * yz - xz * yy);
@@ -55,7 +55,7 @@ impl Symmetric3 {
         (positive && inverse.iter().all(|v| v.is_finite())).then_some(Self(inverse))
     }
 
-    /// Eigenvalues, ascending: those of a symmetric matrix by the trigonometric formula (O. K. Smith, Eigenvalues of a symmetric 3 x 3
+    /// Eigenvalues in ascending order, by the trigonometric formula for symmetric matrices (O. K. Smith, Eigenvalues of a symmetric 3 x 3
     /// matrix, Communications of the ACM 4, 1961).
     pub fn eigenvalues(&self) -> Vector {
         let [xx, xy, xz, yy, yz, zz] = self.0;
@@ -73,7 +73,7 @@ impl Symmetric3 {
         [low, 3.0 * mean - high - low, high]
     }
 
-    /// Root of the ratio of the greatest to the least eigenvalue: the condition number of the rows behind a normal matrix.
+    /// Square root of the ratio of the largest to the smallest eigenvalue: the condition number of the rows of which this is the normal matrix.
     pub fn condition(&self) -> f64 {
         let [low, _, high] = self.eigenvalues();
         if low > 0.0 { (high / low).sqrt() } else { f64::INFINITY }
@@ -91,7 +91,7 @@ mod tests {
     }
 
     #[test]
-    fn val_inverse_times_matrix_is_one() {
+    fn val_inverse_times_matrix_is_the_identity() {
         let (m, inverse) = (sample(), sample().inverse().unwrap());
         for k in 0..3 {
             let mut unit = [0.0; 3];

@@ -1,4 +1,4 @@
-//! Images, and the brightness of each map cell in them at the heights known so far.
+//! Images, and the brightness of each map cell in them at the current heights.
 
 use super::cell::Sample;
 use crate::camera::Camera;
@@ -7,9 +7,9 @@ use crate::direction::Vector;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, sums};
 
-/// Most samples of one cell along an axis.
+/// Maximum number of samples of a cell along an axis.
 const SAMPLES_MAX: usize = 16;
-/// Shares of a pixel smaller than this do not count, so that rounding does not spread missing pixels.
+/// Weights of pixels below this are ignored, so that rounding does not spread missing pixels.
 const SHARE_MIN: f64 = 1e-9;
 
 /// A registered image.
@@ -19,11 +19,11 @@ pub struct Image {
     pub camera: Camera,
     /// Unit vector to the light.
     pub light: Vector,
-    /// Brightness recorded for a brightness of 1, at first.
+    /// Recorded brightness of a surface of brightness 1; initial value.
     pub exposure: f64,
-    /// Brightness added by haze, at first.
+    /// Brightness added by haze; initial value.
     pub haze: f64,
-    /// Brightness (I/F) of every pixel, rows from the top; NaN where there is none.
+    /// Brightness (I/F) of every pixel, rows from the top; NaN without data.
     pub brightness: Vec<f64>,
 }
 
@@ -33,7 +33,8 @@ impl Image {
         sums::median(&sums::finite(&self.brightness))
     }
 
-    /// Bilinear between pixel centres; pixels of the border reach to the edge of the image. NaN beyond, and beside missing pixels.
+    /// Brightness at a position, bilinear between pixel centres; border pixels extend to the edge of the image. NaN outside, and next to
+    /// missing pixels.
     pub fn at(&self, [col, row]: [f64; 2]) -> f64 {
         let [rows, cols] = self.camera.shape();
         let beyond = |v: f64, n: usize| v.is_nan() || v < -SHARE_MIN || v > n as f64 + SHARE_MIN;
@@ -61,9 +62,9 @@ impl Image {
 /// Brightness of the map's cells in one image.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Observed {
-    /// Mean brightness of every cell, NaN where the image does not show it.
+    /// Mean brightness of every cell; NaN where the image does not show it.
     pub brightness: Vec<f64>,
-    /// Pixels in a cell, 1 or more.
+    /// Number of pixels in a cell, at least 1.
     pub pixels: Vec<f32>,
 }
 
@@ -83,8 +84,8 @@ impl Relief<'_> {
         [g.x(k % g.cols), g.y(k / g.cols), self.heights_m[k]]
     }
 
-    /// Slopes at a cell from the heights beside it: half the rise over both edges, one edge at a border and beside an unknown height; NaN where the
-    /// cell itself has no height.
+    /// Slopes of a cell from the neighbouring heights: the mean over both edges, or one edge at a border or next to an unknown height; NaN if
+    /// the cell itself has no height.
     pub fn slopes(&self, k: usize) -> [f64; 2] {
         if self.heights_m[k].is_nan() {
             return [f64::NAN; 2];
@@ -112,8 +113,8 @@ impl Relief<'_> {
 }
 
 impl Observed {
-    /// Projects every cell into the image. A cell that covers several pixels takes their mean: as many samples along each axis as it covers pixels
-    /// (up to 16), on the plane through its centre.
+    /// Projects every cell into the image. A cell that covers several pixels takes their mean: one sample per pixel covered along each axis (up
+    /// to 16), on the plane through its centre.
     pub fn new(image: &Image, relief: Relief) -> Self {
         let cells: Vec<(f64, f32)> =
             (0..relief.geometry.len()).into_par_iter().with_min_len(1024).map(|k| one_cell(image, relief, k)).collect();
@@ -153,19 +154,19 @@ fn one_cell(image: &Image, relief: Relief, k: usize) -> (f64, f32) {
 /// Exposure and haze of an image.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Calibration {
-    /// Brightness recorded for a brightness of 1.
+    /// Recorded brightness of a surface of brightness 1.
     pub exposure: f64,
-    /// Brightness added.
+    /// Brightness added by haze.
     pub haze: f64,
 }
 
-/// What the cells of all images share.
+/// All images with their calibrations and observed cells.
 pub struct Stack<'a> {
     /// Images.
     pub images: &'a [Image],
-    /// Their exposures and hazes.
+    /// Exposure and haze of each image.
     pub calibrations: &'a [Calibration],
-    /// Their cells.
+    /// Brightness of the cells in each image.
     pub observed: &'a [Observed],
     /// Brightness below which a pixel is in shadow, for every image.
     pub shadows: &'a [f64],
@@ -179,7 +180,7 @@ impl Stack<'_> {
         self.observed.iter().any(|o| o.brightness[k].is_finite())
     }
 
-    /// The cell as image `image` shows it; `None` in shadow, beyond the image, and on facets turned away from the camera.
+    /// The cell as seen in image `image`; `None` in shadow, outside the image, and on facets that face away from the camera.
     pub fn sample(&self, image: usize, k: usize, relief: Relief) -> Option<Sample> {
         let (source, observed) = (&self.images[image], &self.observed[image]);
         let Calibration { exposure, haze } = self.calibrations[image];

@@ -1,4 +1,4 @@
-//! How images become heights: settings as a study writes them, with their checks.
+//! Settings of an inversion, as written in a study, with their checks.
 
 use super::described::FirstImageErrors;
 use crate::description::Noise;
@@ -7,24 +7,24 @@ use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Noise of images that state none.
+/// Default noise of images without a stated noise.
 pub const NOISE: Noise = Noise { relative: 0.01, absolute: 1e-4 };
-/// Most rounds of re-projection.
+/// Maximum number of re-projection rounds.
 pub const ROUNDS_MAX: usize = 20;
-/// Most paths of the published integration.
+/// Maximum number of paths of the published integration.
 pub const PATHS_MAX: usize = 450;
-/// Most perturbed solutions behind the uncertainty of heights.
+/// Maximum number of perturbed solutions for the uncertainty of heights.
 pub const SAMPLES_MAX: usize = 512;
 
-/// How slopes become heights.
+/// Method of integrating slopes to heights.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Integration {
-    /// Weighted least squares over the whole map.
+    /// Weighted least squares over the complete map.
     #[default]
     Poisson,
-    /// Outward from the centre, averaged over random paths, as published; constraints on heights do not count, and cells that no path reaches have
-    /// no height.
+    /// Outward from the centre, averaged over random paths, as published; constraints on heights are ignored, and cells that no path reaches
+    /// have no height.
     Paths,
 }
 
@@ -32,13 +32,13 @@ pub enum Integration {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Stereo {
-    /// Cells between points.
+    /// Spacing of the points, cells.
     pub spacing: usize,
-    /// Cells from the centre of a window to its edge: a window has `2 reach + 1` cells a side.
+    /// Cells from the centre of a window to its edge: a window has `2 reach + 1` cells along a side.
     pub reach: usize,
-    /// Largest offset that is looked for, pixels.
+    /// Largest offset searched, pixels.
     pub search: usize,
-    /// Least normalised correlation of a point that is kept.
+    /// Smallest normalised correlation of an accepted point.
     pub quality: f64,
 }
 
@@ -54,42 +54,42 @@ impl Default for Stereo {
 pub struct Settings {
     /// Cell size of the map, m; the finest pixel of parallel cameras when absent.
     pub cell_m: Option<f64>,
-    /// Window of the map, `[x0, y0, x1, y1]`, m; what all images show when absent.
+    /// Window of the map, `[x0, y0, x1, y1]`, m; the ground common to all images when absent.
     pub window_m: Option<[f64; 4]>,
-    /// Law of brightness; that of the first image when absent.
+    /// Photometric function; that of the first image when absent.
     pub photometry: Option<Photometry>,
     /// Noise of a pixel, for weights and uncertainties; that of the first image when absent, else 1 % and 1e-4 I/F.
     pub noise: Option<Noise>,
-    /// Errors put on what is known of the first image, to see what they do.
+    /// Errors applied to the metadata of the first image, to study their effect.
     pub first_image_errors: FirstImageErrors,
     /// Scale `noise` to the residuals of cells lit in four or more images.
     pub estimate_noise: bool,
-    /// A pixel darker than this share of its image's median (less haze) is in shadow and left out.
+    /// A pixel darker than this share of its image's median (minus haze) counts as shadow and is not used.
     pub shadow: f64,
-    /// Most rounds of re-projection, up to 20.
+    /// Maximum number of re-projection rounds, up to 20.
     pub rounds: usize,
     /// Rounds end when heights change by less than this (rms, cells).
     pub tolerance: f64,
-    /// Albedo of the whole surface, where it is known; otherwise it is found in every cell.
+    /// Albedo of the complete surface, if it is known; otherwise it is estimated in every cell.
     pub albedo: Option<f64>,
-    /// Find the exposure of every image but their common factor.
+    /// Estimate the exposure of every image, up to a common factor.
     pub free_exposure: bool,
-    /// Find the haze of every image.
+    /// Estimate the haze of every image.
     pub free_haze: bool,
-    /// How slopes become heights.
+    /// Method of integrating slopes to heights.
     pub integration: Integration,
-    /// Paths of the published integration, up to 450.
+    /// Number of paths of the published integration, up to 450.
     pub paths: usize,
     /// Correlate windows for stereo points.
     pub stereo: Option<Stereo>,
-    /// Cells whose slopes and albedo are worse conditioned than this get the prior of poorly lit cells.
+    /// Cells whose slopes and albedo have a condition number above this get the prior of poorly lit cells.
     pub condition_max: f64,
-    /// Largest share of the cells that may take their albedo from their neighbours, 0 to 1; an inversion with more is refused. Does not count where
-    /// `albedo` is given.
+    /// Largest share of the cells that may take their albedo from their neighbours, 0 to 1; an inversion with a larger share is refused. Ignored
+    /// if `albedo` is given.
     pub leaning_max: f64,
-    /// Standard deviation of the slopes of poorly lit cells about those of the surface so far.
+    /// Standard deviation of the slopes of poorly lit cells about those of the current surface.
     pub slope_prior: f64,
-    /// Perturbed solutions behind the uncertainty of heights; 0 leaves it out.
+    /// Number of perturbed solutions for the uncertainty of heights; 0 to omit it.
     pub samples: usize,
 }
 

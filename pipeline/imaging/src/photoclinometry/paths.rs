@@ -1,17 +1,18 @@
 //! Heights from slopes along paths, as published: outward from the centre, averaged over many paths.
 //!
-//! One path family visits the cells in rings around the centre (all cells `|dr| + |dc|` steps away). Each takes its height from one of its at most
-//! two neighbours in the ring before, drawn with the odds that make every staircase from the centre equally likely, plus the mean slope of the
-//! two cells. The paper gives the number of paths (up to 450) and that they wind outward; the draw is ours. Errors of slopes add up along a path as
-//! a random walk, and paths share cells: averaging lowers them, but least squares over all cells ([`super::integration`]) lowers them most.
+//! One set of paths visits the cells in rings around the centre (all cells `|dr| + |dc|` steps away). Each cell takes its height from one of its
+//! at most two neighbours in the previous ring, plus the mean slope of the two cells; the neighbour is drawn with the probability that makes
+//! every staircase from the centre equally likely. The paper states the number of paths (up to 450) and that they wind outward; the draw is
+//! our choice. Slope errors accumulate along a path as a random walk, and paths share cells: averaging reduces the errors, but less than least
+//! squares over all cells does ([`super::integration`]).
 
 use rayon::prelude::*;
 use sastrugi_numeric::{Counter, Geometry, Streams, sums};
 
-/// Paths walked at once.
+/// Number of path sets computed in parallel.
 const GROUP: usize = 8;
 
-/// Heights with mean 0 over the cells that some path reaches, NaN elsewhere; `good` cells have slopes.
+/// Heights with mean 0 over the cells reached by some path, NaN elsewhere; `good` marks the cells with slopes.
 pub fn integrate_along_paths(
     g: &Geometry,
     slopes: &[[f64; 2]],
@@ -50,7 +51,7 @@ fn centre(g: &Geometry, good: &[bool]) -> Option<(usize, usize)> {
     (0..g.len()).filter(|&k| good[k]).min_by_key(steps).map(|k| (k / g.cols, k % g.cols))
 }
 
-/// Cells in order of their steps from the centre.
+/// Cells in order of their number of steps from the centre.
 fn rings(g: &Geometry, (row, col): (usize, usize)) -> Vec<usize> {
     let mut cells: Vec<usize> = (0..g.len()).collect();
     cells.sort_by_key(|k| (k / g.cols).abs_diff(row) + (k % g.cols).abs_diff(col));

@@ -16,87 +16,87 @@ use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use sastrugi_schemas::ParameterError;
 
-/// Lights nearer to one plane than this are refused: least over greatest singular value of their unit vectors.
+/// Lights closer to one plane than this are refused: smallest over largest singular value of their unit vectors.
 const COPLANAR: f64 = 0.002;
-/// Condition number on level ground above which a warning is given.
+/// Condition number on level ground above which a warning is issued.
 const CONDITION_WARNING: f64 = 20.0;
-/// Cells around a poorly lit one whose albedo it may take, at most.
+/// Largest distance, in cells, of neighbours from which a poorly lit cell takes its albedo.
 const NEIGHBOURS_MAX: usize = 16;
-/// Least spread of that albedo, as a share of it.
+/// Smallest spread of that albedo, relative to it.
 const ALBEDO_SPREAD_MIN: f64 = 0.05;
-/// Exposures rest when they change by less than this share.
+/// Exposures have converged when their relative change is below this.
 const CALIBRATION_TOLERANCE: f64 = 1e-5;
-/// Degrees of freedom from which residuals tell the noise.
+/// Smallest number of degrees of freedom for estimating the noise from residuals.
 const FREEDOM_MIN: usize = 30;
 
 /// A coarse DEM as a soft constraint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Coarse {
-    /// Heights, m; each cell holds the mean of its ground.
+    /// Heights, m; each cell holds the mean over its area.
     pub dem: Grid,
     /// Standard deviation of a cell's height, m.
     pub sigma_m: f64,
 }
 
-/// What is known of the heights beside the images.
+/// Heights known in addition to the images.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Known {
-    /// Points, as of stereo or an altimeter.
+    /// Points, such as from stereo or an altimeter.
     pub points: Vec<HeightPoint>,
     /// A coarse DEM.
     pub coarse: Option<Coarse>,
 }
 
-/// One round.
+/// Statistics of one round.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Round {
-    /// Rms difference of observed brightness and that of the integrated surface, as a share of the mean brightness.
+    /// Rms difference between the observed brightness and that of the integrated surface, as a share of the mean brightness.
     pub brightness_rms: f64,
     /// Rms change of heights, m.
     pub change_m: f64,
     /// Iterations of the integration (0 along paths).
     pub iterations: usize,
-    /// Stereo points that took part.
+    /// Stereo points used.
     pub stereo_points: usize,
 }
 
-/// What the images tell.
+/// The result of an inversion.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Recovered {
     /// Heights, m; NaN where no image shows the cell, or no path reaches it.
     pub heights: Grid,
-    /// Slopes of the least squares, before they are made one surface.
+    /// Slopes from the least squares, before integration to a surface.
     pub slopes: Vec<[f64; 2]>,
     /// Albedo; NaN where no image shows the cell.
     pub albedo: Grid,
     /// Covariance of `p`, `q` and albedo: `[pp, pq, pa, qq, qa, aa]`; NaN where unknown.
     pub covariances: Vec<[f64; 6]>,
-    /// Standard deviation of heights, m (of heights less their mean, without constraints); `None` where it was not asked for.
+    /// Standard deviation of heights, m (without constraints, of heights minus their mean); `None` if it was not requested.
     pub height_sigma: Option<Grid>,
-    /// Images that show each cell lit.
+    /// Number of images in which each cell is lit.
     pub lit: Grid<u8>,
-    /// 1 in cells whose albedo leans on their neighbours (fewer than three images show them lit, or they are too badly conditioned), 0 in
-    /// others; NaN where no image shows the cell.
+    /// 1 in cells that take their albedo from their neighbours (lit in fewer than three images, or too poorly conditioned), 0 in others; NaN
+    /// where no image shows the cell.
     pub leaning: Grid,
     /// Mean of `leaning` over the cells that an image shows.
     pub share_leaning: f64,
-    /// Condition number of each cell's equations; infinite where they determine too little.
+    /// Condition number of each cell's equations; infinite where they are underdetermined.
     pub condition: Grid,
     /// Multiple correlation of albedo and slopes of each cell.
     pub albedo_slope_correlation: Grid,
     /// Exposure and haze of every image.
     pub calibrations: Vec<Calibration>,
-    /// Noise over the noise assumed, from cells lit in four or more images; 1 where it was not estimated.
+    /// Estimated noise relative to the assumed noise, from cells lit in four or more images; 1 if it was not estimated.
     pub noise_scale: f64,
-    /// Every round.
+    /// Statistics of every round.
     pub rounds: Vec<Round>,
-    /// True when heights rested before the rounds were used up.
+    /// True if the heights converged within the allowed rounds.
     pub converged: bool,
-    /// What the caller should hear of.
+    /// Warnings for the caller.
     pub warnings: Vec<String>,
 }
 
-/// Why nothing can be recovered.
+/// Why the surface could not be recovered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RecoverError {
     /// A setting is out of bounds.
@@ -108,19 +108,19 @@ pub enum RecoverError {
     /// Lights lie in one plane.
     #[error(
         "the suns lie in one plane (smallest over largest singular value: {ratio:.1e}), so the slope across it cannot be separated from albedo; \
-         spread them in azimuth, as 0, 120 and 240 deg"
+         spread them in azimuth, such as 0, 120 and 240 deg"
     )]
     CoplanarLights {
-        /// Least over greatest singular value of the unit vectors to the lights.
+        /// Smallest over largest singular value of the unit vectors to the lights.
         ratio: f64,
     },
-    /// A sun that lights nothing.
+    /// A sun that is not above the horizon.
     #[error("the sun of image {0} is not above the horizon")]
     SunBelowHorizon(usize),
     /// The wrong number of pixels.
-    #[error("image {image} has {found} pixels, its camera {expected}")]
+    #[error("image {image} has {found} pixels, its camera {expected}; they must be equal")]
     Size {
-        /// Which image, from 1.
+        /// Number of the image, from 1.
         image: usize,
         /// Pixels of its camera.
         expected: usize,
@@ -130,49 +130,59 @@ pub enum RecoverError {
     /// Numbers that are not finite.
     #[error("{0} is not finite")]
     NotFinite(String),
-    /// A map too small.
-    #[error("a map of {0} x {1} cells is too small; it takes 4 x 4 or more")]
+    /// The map is too small.
+    #[error("a map of {0} x {1} cells is too small; it must have at least 4 x 4 cells")]
     SmallMap(usize, usize),
     /// No cell is lit in three images.
     #[error(
-        "no cell is lit in three images; look for images that are dark or show other ground, and for a wrong exposure, haze or camera"
+        "no cell is lit in three images; look for images that are dark or show other ground, or have a wrong exposure, haze or camera"
     )]
     NothingLit,
     /// No cell is conditioned well enough.
     #[error(
-        "no cell has a condition number below {condition_max} (the least is {least:.0}): spread the suns in azimuth (0, 120, 240 deg), give `albedo` if \
-         it is known, or raise `condition_max`"
+        "no cell has a condition number below {condition_max} (the smallest is {least:.0}); spread the suns in azimuth (0, 120, 240 deg), give \
+         `albedo` if it is known, or raise `condition_max`"
     )]
     NothingFirm {
-        /// Least condition number of a cell.
+        /// Smallest condition number of a cell.
         least: f64,
-        /// What it must be below.
+        /// Limit of the condition number.
         condition_max: f64,
     },
-    /// Most cells take their albedo from others.
+    /// Too many cells take their albedo from their neighbours.
     #[error(
         "{percent:.1} % of the cells would take their albedo from their neighbours ({dark:.1} % are lit in fewer than three images, {ill:.1} % have a \
-         condition number above {condition_max}), at most {most:.0} % may: use three or more suns spread in azimuth (0, 120, 240 deg) that light most of \
+         condition number above {condition_max}); the limit is {most:.0} %: use three or more suns spread in azimuth (0, 120, 240 deg) that light most of \
          the ground, give `albedo` if it is known, or raise `leaning_max`"
     )]
     MostlyLeaning {
-        /// Share of the cells shown, %.
+        /// Share of the cells that an image shows, %.
         percent: f64,
-        /// Those that fewer than three images show lit, %.
+        /// Share lit in fewer than three images, %.
         dark: f64,
-        /// Those whose equations are badly conditioned, %.
+        /// Share with poorly conditioned equations, %.
         ill: f64,
-        /// Condition number from which equations are.
+        /// Limit of the condition number.
         condition_max: f64,
         /// Largest share allowed, %.
         most: f64,
     },
 }
 
-/// Heights and albedo on the cells of `start`, whose heights are where the rounds begin.
+/// Heights and albedo on the cells of `start`, whose heights are the initial surface.
 ///
 /// # Errors
-/// Images that do not determine slopes and albedo, of the wrong size or with numbers that are not finite; settings out of bounds.
+/// Images that do not determine slopes and albedo, have the wrong size or hold numbers that are not finite; settings out of bounds.
+///
+/// ```
+/// use sastrugi_imaging::photoclinometry::{Known, RecoverError, Settings, recover};
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+///
+/// // An inversion is in the example of the crate; without images there is none.
+/// let start = Grid::filled(Geometry::square(8, 8, 1.0), 0.0);
+/// let found = recover(&[], &start, &Known::default(), &Settings::default(), &Streams::for_seed(1, "example"));
+/// assert_eq!(found.unwrap_err(), RecoverError::TooFewImages(0));
+/// ```
 pub fn recover(
     images: &[Image],
     start: &Grid,
@@ -224,10 +234,19 @@ fn check(images: &[Image], start: &Grid, known: &Known) -> Result<(), RecoverErr
     check_lights(&images.iter().map(|image| image.light).collect::<Vec<_>>())
 }
 
-/// Refuses unit vectors to lights that lie in one plane.
+/// Rejects lights whose unit vectors lie in one plane.
 ///
 /// # Errors
 /// Lights in one plane.
+///
+/// ```
+/// use sastrugi_imaging::direction;
+/// use sastrugi_imaging::photoclinometry::check_lights;
+///
+/// assert!(check_lights(&[0.0, 120.0, 240.0].map(|azimuth| direction(azimuth, 45.0))).is_ok());
+/// // North, south and straight above.
+/// assert!(check_lights(&[direction(0.0, 45.0), direction(180.0, 45.0), direction(0.0, 90.0)]).is_err());
+/// ```
 pub fn check_lights(lights: &[Vector]) -> Result<(), RecoverError> {
     let mut normal = Symmetric3::default();
     lights.iter().for_each(|light| normal.add(*light, 1.0));
@@ -235,7 +254,7 @@ pub fn check_lights(lights: &[Vector]) -> Result<(), RecoverError> {
     if ratio < COPLANAR { Err(RecoverError::CoplanarLights { ratio }) } else { Ok(()) }
 }
 
-/// A cell's solution, and how it was come by.
+/// The solution of a cell.
 #[derive(Clone, Copy, Debug)]
 struct Cell {
     fit: Fit,
@@ -256,7 +275,7 @@ struct Inversion<'a> {
     noise_scale: f64,
     heights_m: Vec<f64>,
     cells: Vec<Option<Cell>>,
-    /// Cells with slopes that no path reached, in any round.
+    /// Cells with slopes that no path reached in some round.
     unreached: Vec<bool>,
     system: Option<System>,
     rounds: Vec<Round>,
@@ -271,7 +290,7 @@ impl<'a> Inversion<'a> {
         let mut warnings = Vec::new();
         let beyond = known.points.len() - constraints.len();
         if beyond > 0 {
-            warnings.push(format!("{beyond} of {} points lie beyond the map", known.points.len()));
+            warnings.push(format!("{beyond} of {} points lie off the map and are ignored", known.points.len()));
         }
         if let Some(coarse) = &known.coarse {
             constraints.extend(Constraint::coarse(&g, &coarse.dem, coarse.sigma_m));
@@ -297,7 +316,7 @@ impl<'a> Inversion<'a> {
         }
     }
 
-    /// Condition number of a level cell in the middle of the map, all images lit.
+    /// Warns if a level cell in the middle of the map, lit in all images, is poorly conditioned.
     fn warn_of_condition(&mut self) {
         let g = &self.geometry;
         let relief = Relief { geometry: g, heights_m: &self.heights_m };
@@ -320,7 +339,7 @@ impl<'a> Inversion<'a> {
         let condition = problem.solve(Some([0.0, 0.0, 1.0])).map_or(f64::INFINITY, |fit| fit.condition);
         if condition > CONDITION_WARNING {
             self.warnings.push(format!(
-                "slopes and albedo are poorly conditioned by these lights: condition number {condition:.0} on level ground"
+                "these suns hardly separate slopes from albedo: the condition number on level ground is {condition:.0}"
             ));
         }
     }
@@ -383,8 +402,8 @@ impl<'a> Inversion<'a> {
         Ok(())
     }
 
-    /// Mean plane that exposures are fitted to: that of the start without constraints; otherwise that of the slopes alone, tilted as the constraints
-    /// ask. `None` where constraints determine no tilt, or hazes alone are free: then the surface stays as it is.
+    /// Mean plane to which exposures are fitted: without constraints that of the start, otherwise that of the slopes alone, tilted to fit the
+    /// constraints. `None` if the constraints determine no tilt, or only hazes are free: then the surface is not tilted.
     fn mean_plane(&self, system: &System, slopes: &[[f64; 2]], information: &[Option<[f64; 3]>]) -> Option<[f64; 2]> {
         if !system.tied() || self.settings.integration == Integration::Paths {
             return Some(calibration::plane(&self.geometry, &self.start.values));
@@ -399,7 +418,7 @@ impl<'a> Inversion<'a> {
         Some([p + tilt[0], q + tilt[1]])
     }
 
-    /// Refuses an inversion that rests on the albedo of a few cells.
+    /// Rejects an inversion in which too many cells take their albedo from their neighbours.
     fn check_leaning(&self, cells: &[Option<Cell>]) -> Result<(), RecoverError> {
         let shown = cells.iter().flatten().count() as f64;
         let percent =
@@ -417,7 +436,7 @@ impl<'a> Inversion<'a> {
         })
     }
 
-    /// Cells lit in three or more images first, then the others with the albedo of these around them.
+    /// Fits first the cells lit in three or more images, then the others with the albedo of such cells around them.
     fn fit_cells(&self, stack: &Stack, relief: Relief) -> Result<Vec<Option<Cell>>, RecoverError> {
         let fixed = self.settings.albedo;
         let solve = |k: usize, samples: &mut Vec<Sample>, prior: Option<Prior>| {
@@ -450,7 +469,7 @@ impl<'a> Inversion<'a> {
             .collect())
     }
 
-    /// Cells lit in three or more images that are conditioned well enough.
+    /// Keeps the cells lit in three or more images that are well enough conditioned.
     fn firm(&self, mut lit: Vec<Option<Cell>>) -> Result<Vec<Option<Cell>>, RecoverError> {
         let condition_max = self.settings.condition_max;
         let least = lit.iter().flatten().map(|c| c.fit.condition).reduce(f64::min).ok_or(RecoverError::NothingLit)?;
@@ -461,7 +480,7 @@ impl<'a> Inversion<'a> {
         Ok(lit)
     }
 
-    /// Root of the sum of squared residuals over its expectation.
+    /// Square root of the sum of squared residuals divided by its expectation.
     fn estimated_noise(&self, cells: &[Option<Cell>]) -> f64 {
         if !self.settings.estimate_noise {
             return 1.0;
@@ -473,7 +492,8 @@ impl<'a> Inversion<'a> {
         if freedom < FREEDOM_MIN { 1.0 } else { (sums::sum(&squares) / freedom as f64).sqrt() }
     }
 
-    /// Stereo points with the albedo and slopes of this round's cells, if they are asked for and something was integrated before.
+    /// Stereo points from the albedo of this round's cells, and from the slopes of the integrated surface once there is one. Empty if not
+    /// requested.
     fn stereo_points(&self, cells: &[Option<Cell>], relief: Relief) -> Vec<HeightPoint> {
         let Some(settings) = &self.settings.stereo else { return Vec::new() };
         let surface = |k: usize| {
@@ -524,17 +544,18 @@ impl<'a> Inversion<'a> {
         let share_leaning = sums::mean(&sums::finite(&leaning.values));
         if share_leaning > 0.0 {
             let percent = 100.0 * share_leaning;
-            self.warnings.push(format!("{percent:.1} % of the cells lean on the albedo of their neighbours"));
+            self.warnings.push(format!("{percent:.1} % of the cells take their albedo from their neighbours"));
         }
         let unreached = self.unreached.iter().filter(|u| **u).count();
         if unreached > 0 {
             self.warnings.push(format!(
-                "no path from the centre reaches {unreached} cells behind holes: they have no height; `integration = \"poisson\"` recovers them"
+                "no path from the centre reaches {unreached} cells behind holes, so they have no height; `integration = \"poisson\"` recovers them"
             ));
         }
         if !self.converged {
             let last = self.rounds.last().map_or(f64::NAN, |r| r.change_m);
-            self.warnings.push(format!("heights still changed by {last:.2e} m in the last round"));
+            self.warnings
+                .push(format!("heights did not converge: they still changed by {last:.2e} m in the last round"));
         }
         Recovered {
             slopes: self.cells.iter().map(|c| c.map_or([f64::NAN; 2], |c| c.fit.slopes)).collect(),
@@ -564,7 +585,8 @@ fn masked(values: Vec<f64>, cells: &[Option<Cell>]) -> Vec<f64> {
     values.into_iter().zip(cells).map(|(v, c)| if c.is_some() { v } else { f64::NAN }).collect()
 }
 
-/// Mean and spread of the albedo of firm cells in the smallest square around a cell (3 to 33 cells a side) with at least three of them.
+/// Mean and spread of the albedo of well-conditioned cells in the smallest square around a cell (3 to 33 cells along a side) that contains
+/// at least three of them.
 fn albedo_around(g: &Geometry, firm: &[Option<Cell>], k: usize) -> Option<[f64; 2]> {
     let (row, col) = (k / g.cols, k % g.cols);
     [1, 2, 4, 8, NEIGHBOURS_MAX].into_iter().find_map(|reach| {
@@ -576,8 +598,8 @@ fn albedo_around(g: &Geometry, firm: &[Option<Cell>], k: usize) -> Option<[f64; 
     })
 }
 
-/// Information of every cell's slopes: the inverse of their covariance and of the variance of slopes within a cell, which one of its edges
-/// may differ by from the cell: the median of the squares of half the differences of neighbours.
+/// Information of every cell's slopes: the inverse of the sum of their covariance and the variance of slopes within a cell, by which the slope
+/// at an edge may differ from that of the cell. That variance is the median of the squared half differences of neighbours.
 fn information(g: &Geometry, cells: &[Option<Cell>]) -> Vec<Option<[f64; 3]>> {
     let halves = |axis: usize, pitch: usize| -> Vec<f64> {
         let pair = |k: usize| {

@@ -1,13 +1,14 @@
-//! Stereo points: where windows of predicted and observed images correlate, and the heights that this means.
+//! Stereo points: heights from the correlation of predicted and observed image windows.
 //!
-//! Around every point of a lattice a window of map cells is shaded as each image should show it. The same cells are read from the image with all
-//! offsets of whole pixels up to `search`; the offset of the greatest normalised correlation, refined by a paraboloid, is how far the
-//! image shows the window from where the surface so far puts it. The offsets of all images together place the window's centre in space by
-//! least squares over the cameras.
+//! Around every point of a lattice, a window of map cells is shaded as predicted for each image. The same cells are read from the image at all
+//! whole-pixel offsets up to `search`. The offset with the largest normalised correlation, refined by a paraboloid, is the displacement of the
+//! window in the image relative to its position predicted by the current surface. The offsets of all images determine the window's centre in
+//! space by least squares over the cameras.
 //!
 //! With a correlation `rho` at the peak, the matrix of its second derivatives `-K` (per square pixel) and `n` cells, an offset has the covariance
 //! `(1 - rho^2) / (n rho) K^-1`: that of the least-squares offset between a signal and a copy with white noise of the residual's strength. A
-//! window with edges in one direction so counts across them only. Added to it are 0.05 pixels, by which resampling alone moves peaks.
+//! window with edges in one direction thus counts only across them. A standard deviation of 0.05 pixels is added, by which resampling alone
+//! shifts peaks.
 
 use super::integration::HeightPoint;
 use super::normal::Symmetric3;
@@ -18,11 +19,11 @@ use rayon::prelude::*;
 
 /// Standard deviation of an offset without noise, pixels.
 const OFFSET_SIGMA_MIN: f64 = 0.05;
-/// Steps of the paraboloids, pixels, one after the other.
+/// Steps of the successive paraboloids, pixels.
 const PARABOLOIDS: [f64; 2] = [1.0, 0.5];
-/// Share of a window that has to be lit and seen.
+/// Share of a window that must be lit and seen.
 const SHARE_MIN: f64 = 0.8;
-/// Greatest ratio of the axes of a point's error ellipsoid: views nearer to each other give no height.
+/// Largest ratio of the axes of a point's error ellipsoid: views that are too similar give no height.
 const CONDITION_MAX: f64 = 40.0;
 /// Largest rms distance of offsets from those of the common point, pixels.
 const DISAGREEMENT_MAX: f64 = 1.0;
@@ -40,7 +41,7 @@ pub struct Offset {
     pub correlation: f64,
 }
 
-/// Points on a lattice over the map. `shade(image, cell)` is the brightness predicted, `None` where the surface is not known well enough.
+/// Points on a lattice over the map. `shade(image, cell)` is the predicted brightness, `None` where the surface is not known well enough.
 pub fn points(
     images: &[Image],
     relief: Relief,
@@ -83,7 +84,7 @@ fn point(
     (!strayed).then_some(HeightPoint { x_m: place[0], y_m: place[1], height_m: place[2], sigma_m })
 }
 
-/// The offset of an image from places and brightness predicted; `None` where the greatest correlation lies at the end of the search.
+/// The offset of an image relative to predicted positions and brightness; `None` if the largest correlation lies at the limit of the search.
 pub fn correlate(image: &Image, cells: &[([f64; 2], f64)], search: usize) -> Option<Offset> {
     let (reach, side) = (search as f64, 2 * search + 1);
     let curve: Vec<f64> = (0..side * side)
@@ -110,8 +111,8 @@ pub fn correlate(image: &Image, cells: &[([f64; 2], f64)], search: usize) -> Opt
     (peak > 0.0).then_some(Offset { pixels, covariance, correlation })
 }
 
-/// Top of the paraboloid through values at the nine places `u`, `v` of -1, 0 and 1 (cross term from the corners), within 1 of the middle, and
-/// its bend: minus the second derivatives by `uu`, `uv`, `vv`. `None` where it has no top there.
+/// Maximum of the paraboloid through values at the nine positions `u`, `v` of -1, 0 and 1 (cross term from the corners), and its curvature: minus
+/// the second derivatives by `uu`, `uv`, `vv`. `None` if it has no maximum within 1 of the centre.
 fn paraboloid(value: impl Fn(f64, f64) -> f64) -> Option<([f64; 2], [f64; 3])> {
     let at = value(0.0, 0.0);
     let [west, east, north, south] = [value(-1.0, 0.0), value(1.0, 0.0), value(0.0, -1.0), value(0.0, 1.0)];
@@ -127,7 +128,7 @@ fn paraboloid(value: impl Fn(f64, f64) -> f64) -> Option<([f64; 2], [f64; 3])> {
     (convex && top.iter().all(|t| t.abs() <= 1.0)).then_some((top, bend))
 }
 
-/// Normalised correlation of predicted brightness and the image at an offset; NaN where pixels are missing.
+/// Normalised correlation of the predicted brightness and the image at an offset; NaN if pixels are missing.
 fn correlation(image: &Image, cells: &[([f64; 2], f64)], [du, dv]: [f64; 2]) -> f64 {
     let pairs: Vec<[f64; 2]> = cells.iter().map(|([u, v], p)| [*p, image.at([u + du, v + dv])]).collect();
     correlation_of(&pairs)
@@ -145,8 +146,8 @@ pub(super) fn correlation_of(pairs: &[[f64; 2]]) -> f64 {
     sums[1] / (sums[0] * sums[2]).sqrt()
 }
 
-/// The point that all images show at their offsets from `centre`, and the standard deviation of its height, m; `None` with fewer than two
-/// images, views too much alike, or offsets that no point explains.
+/// The point that all images show at their offsets from `centre`, and the standard deviation of its height, m; `None` for fewer than two
+/// images, views that are too similar, or offsets that do not fit a common point.
 pub fn triangulate(seen: &[(&Image, Offset)], centre: Vector, step_m: f64) -> Option<(Vector, f64)> {
     if seen.len() < 2 {
         return None;
@@ -190,8 +191,50 @@ pub fn triangulate(seen: &[(&Image, Offset)], centre: Vector, step_m: f64) -> Op
     (agrees && place.iter().all(|v| v.is_finite())).then_some((place, sigma_m))
 }
 
-/// Two combinations of columns and rows that are independent, and their weights: those of the factors of the covariance.
+/// Two uncorrelated combinations of columns and rows with their weights, from the factorisation of the covariance.
 fn whitening([uu, uv, vv]: [f64; 3]) -> [([f64; 2], f64); 2] {
     let across = uv / uu;
     [([1.0, 0.0], 1.0 / uu), ([-across, 1.0], 1.0 / (vv - across * uv))]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The top and the curvature of a paraboloid are exact; a saddle, or a top beyond the neighbours, is none.
+    #[test]
+    fn val_a_paraboloid_is_found_exactly() {
+        let of = |[u0, v0]: [f64; 2], [a, b, c]: [f64; 3]| {
+            paraboloid(move |u, v| {
+                let (du, dv) = (u - u0, v - v0);
+                0.9 - a * du * du - b * du * dv - c * dv * dv
+            })
+        };
+        for top in [[0.0, 0.0], [0.3, -0.8], [-0.9, 0.1]] {
+            let (found, bend) = of(top, [0.2, 0.1, 0.4]).unwrap();
+            assert!((0..2).all(|k| (found[k] - top[k]).abs() < 1e-12), "{found:?} {top:?}");
+            assert!(bend.iter().zip([0.4, 0.1, 0.8]).all(|(a, b)| (a - b).abs() < 1e-12), "{bend:?}");
+        }
+        assert_eq!(of([0.0, 0.0], [0.2, 0.0, -0.4]), None);
+        assert_eq!(of([0.0, 0.0], [-0.2, 0.0, -0.4]), None);
+        assert_eq!(of([1.5, 0.0], [0.2, 0.0, 0.4]), None);
+    }
+
+    /// The weighted sum of the products of both combinations is the inverse of the covariance.
+    #[test]
+    fn val_whitening_inverts_the_covariance() {
+        let mut sum = [0.0; 3];
+        for ([a, b], weight) in whitening([0.04, 0.01, 0.09]) {
+            sum.iter_mut().zip([a * a, a * b, b * b]).for_each(|(s, product)| *s += weight * product);
+        }
+        let inverse = [0.09 / 0.0035, -0.01 / 0.0035, 0.04 / 0.0035];
+        assert!(sum.iter().zip(inverse).all(|(a, b)| (a - b).abs() < 1e-9), "{sum:?} {inverse:?}");
+    }
+
+    #[test]
+    fn val_correlations_of_lines() {
+        assert!((correlation_of(&[[1.0, 2.0], [2.0, 4.0], [4.0, 8.0]]) - 1.0).abs() < 1e-12);
+        assert!((correlation_of(&[[1.0, 5.0], [2.0, 4.0], [4.0, 2.0]]) + 1.0).abs() < 1e-12);
+        assert_eq!(correlation_of(&[[0.0, 0.0], [1.0, 1.0], [2.0, 0.0]]), 0.0);
+    }
 }

@@ -1,9 +1,9 @@
 //! Images of a surface under the sun.
 //!
-//! # What
-//! Every pixel is the mean over `samples` x `samples` rays. A ray ends at the first point of the surface that it meets ([`relief`]); a point
-//! of albedo `alpha` is as bright as [`crate::Photometry`] says for the normal there, the direction to the sun and that back along the ray,
-//! and black where the surface stands between it and the sun. The pixel of the image is
+//! # Model
+//! Every pixel is the mean over `samples` x `samples` rays. A ray ends at its first intersection with the surface ([`relief`]). The
+//! brightness of a point of albedo `alpha` is given by [`crate::Photometry`] for the normal there, the direction to the sun and the
+//! direction back along the ray; it is 0 if the surface blocks the sun. The pixel of the image is
 //!
 //! $$ e \, \overline{I} + h + \sqrt{\sigma_a^2 + (\sigma_r (e \overline{I} + h))^2}\; N(0, 1) $$
 //!
@@ -14,15 +14,15 @@
 //! | `h` | haze | I/F |
 //! | `sigma_a`, `sigma_r` | absolute and relative noise | I/F; 1 |
 //!
-//! Normals are those of the bilinear patches; on lines between patches the slopes of both sides are averaged, so that a single ray through a cell
-//! centre sees the central difference. Albedo is bilinear between cells; where its map has no data the default counts.
+//! Normals are those of the bilinear patches; on lines between patches the slopes of both sides are averaged, so a single ray through a
+//! cell centre sees the central difference. Albedo is bilinear between cells; where its map has no data, the default applies.
 //!
-//! # What is left out
-//! The sun is a point: shadows have no penumbra. Light from the sky and from other ground is missing: shadows are black. The ground beyond the
-//! grid casts no shadow, and holes neither.
+//! # Limitations
+//! The sun is a point, so shadows have no penumbra. There is no light from the sky or from other ground, so shadows are black. Ground
+//! beyond the grid and holes cast no shadows.
 //!
 //! # Cost
-//! One ray to the camera and one to the sun for each sample; rows of the image in parallel, each pixel by one task.
+//! One ray to the camera and one to the sun per sample; rows of the image in parallel, each pixel by one task.
 
 pub mod parameters;
 pub mod relief;
@@ -44,10 +44,10 @@ use sastrugi_schemas::ParameterError;
 /// Purpose of the random stream of the noise.
 pub const NOISE: &str = "image-noise";
 
-/// Why there is no image.
+/// Why an image could not be rendered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RenderError {
-    /// The surface has no patch.
+    /// The surface has no bilinear patch.
     #[error("a surface needs at least 2 x 2 cells with heights; this one has {rows} x {cols} cells")]
     NoSurface {
         /// Rows of the surface.
@@ -55,8 +55,8 @@ pub enum RenderError {
         /// Columns of the surface.
         cols: usize,
     },
-    /// The albedo map has other cells than the heights.
-    #[error("the albedo map has {albedo_rows} x {albedo_cols} cells, the surface {rows} x {cols}")]
+    /// The albedo map and the heights differ in shape.
+    #[error("the albedo map has {albedo_rows} x {albedo_cols} cells, the surface {rows} x {cols}; they must be equal")]
     AlbedoShape {
         /// Rows of the albedo map.
         albedo_rows: usize,
@@ -68,13 +68,13 @@ pub enum RenderError {
         cols: usize,
     },
     /// An albedo below 0 or above 1.
-    #[error("the albedo map holds {value}; albedo lies between 0 and 1")]
+    #[error("the albedo map holds {value}; albedo must lie between 0 and 1")]
     AlbedoValue {
         /// The first such value.
         value: f64,
     },
-    /// No ray of the camera meets the surface.
-    #[error("the camera sees no ground: all its rays pass the surface, or meet holes in it")]
+    /// No ray of the camera hits the surface.
+    #[error("the camera sees no ground: all its rays miss the surface or fall into holes")]
     NothingSeen,
     /// A parameter is out of range, or the camera does not fit the surface.
     #[error(transparent)]
@@ -90,16 +90,17 @@ pub struct Scene<'a> {
     pub albedo: Option<&'a Grid>,
 }
 
-/// What a pixel sees.
+/// A rendered pixel.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pixel {
-    /// Brightness, I/F: with exposure, haze and noise; NaN where no ray sees ground.
+    /// Brightness, I/F, including exposure, haze and noise; NaN if no ray sees ground.
     pub brightness: f64,
     /// Share of the rays that see ground, 0 to 1.
     pub ground: f32,
-    /// Share of those that see ground in shadow, cast or turned away from the sun, 0 to 1.
+    /// Share of those rays whose ground is in cast shadow or faces away from the sun, 0 to 1.
     pub shadow: f32,
-    /// Mean distance of that ground from the pinhole, or from the plane of a parallel image through its centre, m; NaN where there is none.
+    /// Mean distance of that ground from the pinhole, or from the image plane through the centre of a parallel image, m; NaN without
+    /// ground.
     pub range_m: f64,
     /// Mean point of that ground, m.
     pub point_m: Vector,
@@ -108,14 +109,14 @@ pub struct Pixel {
 /// An image of a surface.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Rendering {
-    /// Where the camera stands.
+    /// Pose of the camera.
     pub pose: CameraPose,
     /// Pixels, row by row from the top.
     pub pixels: Vec<Pixel>,
 }
 
 impl Rendering {
-    /// Brightness, I/F; placed in the coordinates of the surface where the image is a map, else in pixels.
+    /// Brightness, I/F; in the coordinates of the surface if the image is a map, else in pixels.
     pub fn image(&self) -> Grid {
         Grid::new(self.pose.geometry(), self.pixels.iter().map(|p| p.brightness).collect())
     }
@@ -142,10 +143,27 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     sum / count as f64
 }
 
-/// Makes an image; noise comes from the stream [`NOISE`] of `streams`.
+/// Renders an image; noise comes from the stream [`NOISE`] of `streams`.
 ///
 /// # Errors
 /// See [`RenderError`].
+///
+/// ```
+/// use sastrugi_imaging::{RenderParameters, Scene, Sun, render};
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // Level ground of albedo 0.25 under a sun at the zenith, seen from there.
+/// let heights = Grid::filled(Geometry::square(8, 10, 1.0), 3.0);
+/// let sun = Sun { azimuth_deg: 0.0, elevation_deg: 90.0 };
+/// let parameters = RenderParameters { sun, albedo: 0.25, ..RenderParameters::default() };
+/// let made = render(&Scene { heights: &heights, albedo: None }, &parameters, &Streams::for_seed(1, "image"))?;
+/// assert_eq!(made.image().geometry, heights.geometry);
+/// assert!(made.pixels.iter().all(|pixel| (pixel.brightness - 0.25).abs() < 1e-12));
+/// assert_eq!(made.share_in_shadow(), 0.0);
+/// # Ok(())
+/// # }
+/// ```
 pub fn render(scene: &Scene<'_>, parameters: &RenderParameters, streams: &Streams) -> Result<Rendering, RenderError> {
     parameters.check()?;
     let (rows, cols) = (scene.heights.rows(), scene.heights.cols());
@@ -180,14 +198,14 @@ fn check_albedo(scene: &Scene<'_>) -> Result<(), RenderError> {
     }
 }
 
-/// Everything that a pixel needs.
+/// Everything needed to render a pixel.
 struct View<'a> {
     relief: &'a Relief<'a>,
     albedo: Option<&'a Grid>,
     parameters: &'a RenderParameters,
     camera: Camera,
     sun: Vector,
-    /// Distance from a ray's origin from which on it sees, m.
+    /// Smallest distance from a ray's origin at which it can hit ground, m.
     nearest_m: f64,
 }
 
@@ -249,7 +267,7 @@ impl<'a> View<'a> {
         Some(Seen { hit, brightness: albedo * photometry.of_slopes(slopes, self.sun, view), shadow: false })
     }
 
-    /// The pixel as the camera stores it.
+    /// Applies exposure, haze and noise.
     fn exposed(&self, pixel: Pixel, noise: Counter) -> Pixel {
         let p = self.parameters;
         let exact = p.exposure * pixel.brightness + p.haze;

@@ -1,4 +1,4 @@
-//! What an image is made with: light, camera, and how the camera answers.
+//! Parameters of an image: light, camera and camera response.
 
 use crate::description::{Noise, check_radiometry};
 use crate::photometry::Photometry;
@@ -8,7 +8,7 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Most rays along a side of a pixel.
+/// Maximum number of rays along a side of a pixel.
 pub const SAMPLES_MAX: u32 = 64;
 
 /// Parameters of an image.
@@ -17,22 +17,22 @@ pub const SAMPLES_MAX: u32 = 64;
 pub struct RenderParameters {
     /// Sun: `{ azimuth_deg, elevation_deg }`.
     pub sun: Sun,
-    /// Camera: `{ kind = "nadir" }` straight down on the whole surface, `{ kind = "parallel", azimuth_deg, elevation_deg }`, or
+    /// Camera: `{ kind = "nadir" }` straight down on the complete surface, `{ kind = "parallel", azimuth_deg, elevation_deg }`, or
     /// `{ kind = "pinhole", position_m, target_m }`.
     pub camera: CameraParameters,
-    /// How a facet reflects.
+    /// Photometric function.
     pub photometry: Photometry,
-    /// Albedo where the surface has no map of it, 0 to 1 (sand of `planetary`).
+    /// Albedo where the surface has no albedo map, 0 to 1 (default: sand of `planetary`).
     pub albedo: f64,
-    /// Factor on the brightness.
+    /// Factor applied to the brightness.
     pub exposure: f64,
-    /// Brightness that is added everywhere (I/F).
+    /// Brightness added to every pixel (I/F).
     pub haze: f64,
     /// Noise of the camera; none when absent.
     pub noise: Noise,
     /// Rays along a side of a pixel: a pixel is the mean of `samples` x `samples` rays.
     pub samples: u32,
-    /// False leaves out cast shadows; facets turned away from the sun stay dark.
+    /// Whether to render cast shadows; facets that face away from the sun are dark either way.
     pub shadows: bool,
 }
 

@@ -1,35 +1,36 @@
-//! Where a ray meets a surface, and what lies in a cast shadow.
+//! Intersection of rays with a surface, and cast shadows.
 //!
-//! Heights lie bilinearly between four neighbouring cell centres. Over such a *patch* the height of a straight ray above the surface is a
+//! Heights are bilinear between four neighbouring cell centres. Over such a *patch* the height of a straight ray above the surface is a
 //! parabola in the distance along the ray,
 //!
 //! $$ F(s) = F_0 + F_1 s + F_2 s^2, \qquad F_2 = -d\,\dot u\,\dot v, $$
 //!
 //! with the patch `z = a + b u + c v + d u v` and the ray's speeds `du/ds`, `dv/ds` in cells per metre. Its first root is the point that a
-//! camera sees; where it falls below 0 on the way to the sun the ray's start lies in shadow. Both are exact up to rounding: no step size.
+//! camera sees; if it falls below 0 on the way to the sun, the start of the ray lies in shadow. Both are exact up to rounding: there is no
+//! step size.
 //!
-//! A ray walks from patch to patch, and over blocks of 2, 4, 8 ... patches as long as it stays above the highest one in them (Tevs,
-//! Ihrke and Seidel, Maximum mipmaps for fast, accurate, and scalable dynamic height field rendering, I3D 2008). Cost of a ray: of the order of
-//! the logarithm of the grid's side. Memory: a third of the heights' own.
+//! A ray proceeds from patch to patch, and skips blocks of 2, 4, 8 ... patches while it stays above their highest point (Tevs, Ihrke and
+//! Seidel, Maximum mipmaps for fast, accurate, and scalable dynamic height field rendering, I3D 2008). Cost of a ray: of the order of the
+//! logarithm of the grid's side. Memory: a third of that of the heights.
 //!
-//! Patches with a corner without data do not exist: rays pass through the hole and meet nothing in it. A ray that comes up to ground from below,
-//! through a hole or through the side of the grid, sees no ground.
+//! A patch with a corner without data is a hole: rays pass through it. A ray that approaches the ground from below, through a hole or
+//! through the side of the grid, sees no ground.
 
 use crate::direction::Vector;
 use sastrugi_numeric::{Geometry, Grid};
 use std::ops::ControlFlow::{self, Break, Continue};
 
-/// What counts as touching, in cells.
+/// Distance that counts as touching, in cells.
 const TOUCH_CELLS: f64 = 1e-9;
 
-/// A surface, ready for rays.
+/// A surface prepared for ray tracing.
 pub struct Relief<'a> {
     heights: &'a Grid,
-    /// Highest point of blocks of patches, 2 along a side, then 4, 8 ...
+    /// Highest points of blocks of patches, with 2, 4, 8 ... patches along a side.
     levels: Vec<Level>,
     /// Lowest and highest height, m.
     range_m: [f64; 2],
-    /// Heights that differ by less are the same, m.
+    /// Heights that differ by less count as equal, m.
     tolerance_m: f64,
 }
 
@@ -39,23 +40,23 @@ struct Level {
     highest: Vec<f64>,
 }
 
-/// A point of the surface that a ray meets.
+/// A point where a ray hits the surface.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Hit {
     /// Distance from the ray's origin, m.
     pub distance_m: f64,
     /// The point, m.
     pub point_m: Vector,
-    /// Where it lies in the grid.
+    /// Its position in the grid.
     pub place: Place,
 }
 
-/// A place on the surface: a patch, and the position in it.
+/// A place on the surface: a patch and the position within it.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Place {
     /// South-west corner of the patch: column, and row counted from the south.
     patch: [usize; 2],
-    /// Position from that corner, 0 to 1 east and north.
+    /// Position relative to that corner, 0 to 1 east and north.
     within: [f64; 2],
 }
 
@@ -98,27 +99,27 @@ impl Parabola {
         f0 + s * (f1 + s * f2)
     }
 
-    /// Where it is lowest if that is neither end.
+    /// Position of the minimum, if it is not at an end.
     fn lowest_inside(&self) -> Option<f64> {
         let [_, f1, f2] = self.terms;
         let s = -0.5 * f1 / f2;
         (f2 > 0.0 && s > 0.0 && s < self.length).then_some(s)
     }
 
-    /// True where it falls below a value.
+    /// True if it falls below a value.
     fn falls_below(&self, value: f64) -> bool {
         let below = |s: f64| self.at(s) < value;
         below(0.0) || below(self.length) || self.lowest_inside().is_some_and(below)
     }
 
-    /// First root of one that begins above 0.
+    /// First root of a parabola that starts above 0.
     fn first_root(&self) -> Option<f64> {
         if !self.falls_below(0.0) && self.at(self.length) > 0.0 {
             return None;
         }
         let [f0, f1, f2] = self.terms;
         let root = (f1 * f1 - 4.0 * f2 * f0).max(0.0).sqrt();
-        // Sums of numbers with one sign lose no digits.
+        // Sums of numbers with the same sign lose no digits.
         let s = if f1 < 0.0 { 2.0 * f0 / (root - f1) } else { -0.5 * (f1 + root) / f2 };
         Some(s.clamp(0.0, self.length))
     }
@@ -137,13 +138,13 @@ impl<'a> Relief<'a> {
         Some(Self { heights, levels: levels(heights), range_m: [low, high], tolerance_m })
     }
 
-    /// Shape and place of the heights.
+    /// Geometry of the heights.
     pub fn geometry(&self) -> &Geometry {
         &self.heights.geometry
     }
 
-    /// The first point that a ray from `origin_m` in the unit direction `direction` meets at a distance of `nearest_m` or more (which may be
-    /// minus infinity, for rays of a parallel camera).
+    /// First hit of a ray from `origin_m` in the unit direction `direction`, at a distance of at least `nearest_m` (minus infinity for rays
+    /// of a parallel camera).
     pub fn first_hit(&self, origin_m: Vector, direction: Vector, nearest_m: f64) -> Option<Hit> {
         let line = self.line(origin_m, direction);
         let [from, to] = self.stretch(&line, nearest_m)?;
@@ -156,14 +157,14 @@ impl<'a> Relief<'a> {
                 _ if f0.is_nan() => Continue(()),
                 _ if f0 < -self.tolerance_m => Break(None),
                 _ if f0 <= 0.0 => Break(Some((patch, s))),
-                Some(further) => Break(Some((patch, s + further))),
+                Some(farther) => Break(Some((patch, s + farther))),
                 None => Continue(()),
             }
         });
         found.flatten().map(|(patch, s)| self.hit(&start, patch, s, from))
     }
 
-    /// True when the surface stands between a place and the sun in the unit direction `sun`.
+    /// True if the surface blocks the sun, in the unit direction `sun`, at a place.
     pub fn is_shadowed(&self, place: &Place, height_m: f64, sun: Vector) -> bool {
         let [i, j] = place.patch.map(|n| n as f64);
         let start = Line { at: [i + place.within[0], j + place.within[1], height_m], by: self.line([0.0; 3], sun).by };
@@ -174,8 +175,8 @@ impl<'a> Relief<'a> {
         met.is_some()
     }
 
-    /// Slopes `dz/dx`, `dz/dy` of the patch at a place. On a line between patches: the mean of both sides, which is the central difference
-    /// at a cell centre.
+    /// Slopes `dz/dx`, `dz/dy` of the patch at a place. On a line between patches it is the mean of both sides; at a cell centre this is
+    /// the central difference.
     pub fn slopes(&self, place: &Place) -> [f64; 2] {
         let corners = self.corners(place.patch);
         let [u, v] = place.within;
@@ -190,7 +191,7 @@ impl<'a> Relief<'a> {
         })
     }
 
-    /// Bilinear value of another grid of the same geometry at a place; NaN beside a cell without data.
+    /// Bilinear value of another grid of the same geometry at a place; NaN next to a cell without data.
     pub fn value(&self, grid: &Grid, place: &Place) -> f64 {
         let [i, j] = place.patch;
         let south = (grid.rows() - 1 - j) * grid.cols() + i;
@@ -206,7 +207,7 @@ impl<'a> Relief<'a> {
         [g.cols - 1, g.rows - 1]
     }
 
-    /// The patch at a position; on a line between patches one that is there, if one is.
+    /// The patch at a position; on a line between patches, one with data if there is any.
     fn patch_at(&self, at: Vector) -> [usize; 2] {
         let count = self.patches();
         let patch = [0, 1].map(|axis| (at[axis] as usize).min(count[axis] - 1));
@@ -232,8 +233,8 @@ impl<'a> Relief<'a> {
         [z[south], z[south + 1], z[north], z[north + 1]]
     }
 
-    /// Difference of heights along an axis, per cell, in the patch on the other side of the line that a place lies on; `None` where it lies on
-    /// no line, or no ground is there.
+    /// Height difference per cell along an axis, in the patch on the other side of the line on which a place lies; `None` if it is not on a
+    /// line, or that patch has no data.
     fn slope_beyond(&self, place: &Place, axis: usize) -> Option<f64> {
         let position = place.within[axis];
         let on_low = position <= TOUCH_CELLS;
@@ -262,7 +263,7 @@ impl<'a> Relief<'a> {
         Line { at, by: [direction[0] / g.cell[0], direction[1] / g.cell[1], direction[2]] }
     }
 
-    /// The stretch of a ray on which it can meet ground.
+    /// The stretch of a ray on which it can hit ground.
     fn stretch(&self, line: &Line, nearest_m: f64) -> Option<[f64; 2]> {
         let [last_u, last_v] = self.patches().map(|n| n as f64);
         let [low, high] = self.range_m;
@@ -283,8 +284,8 @@ impl<'a> Relief<'a> {
         Hit { distance_m: from + s, point_m, place }
     }
 
-    /// Walks along a ray from its start in `patch` to the distance `to`; `visit` gets the patches that it may meet: patch, distance at its
-    /// entry, height of the ray above it.
+    /// Walks along a ray from its start in `patch` to the distance `to`. `visit` is called for the patches that the ray may hit, with the
+    /// patch, the distance at entry and the height of the ray above it.
     fn walk<T>(
         &self,
         line: &Line,
@@ -337,7 +338,7 @@ impl<'a> Relief<'a> {
     }
 }
 
-/// The patch on the other side of the line that a position lies on, along one axis; the same patch where it lies on none.
+/// The patch on the other side of the line on which a position lies, along one axis; the same patch if it is not on a line.
 fn neighbour(at: f64, patch: usize, count: usize) -> usize {
     match at - patch as f64 {
         within if within <= TOUCH_CELLS => patch.saturating_sub(1),
@@ -364,7 +365,7 @@ fn step(block: usize, level: usize, upwards: bool, count: usize) -> Option<usize
     if upwards { Some((block + 1) << level).filter(|n| *n < count) } else { (block << level).checked_sub(1) }
 }
 
-/// Highest points of ever wider blocks, up to one of all patches.
+/// Highest points of blocks of increasing size, up to one block of all patches.
 fn levels(heights: &Grid) -> Vec<Level> {
     let mut all = vec![patch_level(heights)];
     while all.last().is_some_and(|level| level.highest.len() > 1) {
@@ -375,7 +376,7 @@ fn levels(heights: &Grid) -> Vec<Level> {
     all
 }
 
-/// Highest point of every patch, row by row from the south; minus infinity where there is none.
+/// Highest point of every patch, row by row from the south; minus infinity for patches without data.
 fn patch_level(heights: &Grid) -> Level {
     let (rows, cols) = (heights.rows() - 1, heights.cols() - 1);
     let highest = (0..rows).flat_map(|j| {

@@ -1,4 +1,4 @@
-//! Closed forms, slow references, and what must not change an image.
+//! Closed forms, slow references, and invariances of images.
 
 use super::*;
 use crate::description::Noise;
@@ -18,7 +18,7 @@ fn surface(rows: usize, cols: usize, cell_m: f64, z: impl Fn(f64, f64) -> f64) -
     Grid::new(g, (0..rows).flat_map(|r| (0..cols).map(move |c| (g.x(c), g.y(r)))).map(|(x, y)| z(x, y)).collect())
 }
 
-/// Hills with a period of about 6 cells, as steep as 50 degrees, on cells that are not square, and far from the origin.
+/// Hills with a period of about 6 cells and slopes up to 50 degrees, on non-square cells, far from the origin.
 fn hills(rows: usize, cols: usize) -> Grid {
     let g = Geometry { rows, cols, cell: [0.5, 0.75], origin: [1000.0, -300.0] };
     let z = |r: usize, c: usize| {
@@ -37,14 +37,14 @@ fn image(heights: &Grid, parameters: &RenderParameters) -> Rendering {
     render(&Scene { heights, albedo: None }, parameters, &streams()).unwrap()
 }
 
-/// The place below a point seen from straight above.
+/// The place seen from straight above a point.
 fn below(relief: &Relief<'_>, x: f64, y: f64) -> Hit {
     relief.first_hit([x, y, 0.0], [0.0, 0.0, -1.0], f64::NEG_INFINITY).unwrap()
 }
 
 /// Closed form: a plane from straight above, whatever the slope, the sun and the rays per pixel; 1e-12.
 #[test]
-fn val_planes_from_above_are_as_bright_as_the_formula_says() {
+fn val_planes_from_above_match_the_closed_form() {
     for (p, q, sun, samples) in
         [(0.0, 0.0, [30.0, 50.0], 1), (0.3, -0.2, [315.0, 45.0], 2), (-0.1, 0.4, [120.0, 70.0], 3)]
     {
@@ -58,7 +58,7 @@ fn val_planes_from_above_are_as_bright_as_the_formula_says() {
     }
 }
 
-/// A plane just steeper than the sun's rays is dark, one just flatter is lit, down to a sun of 0.1 degrees.
+/// A plane slightly steeper than the sun's rays is dark, one slightly flatter is lit, down to a sun elevation of 0.1 degrees.
 #[test]
 fn val_planes_along_the_rays_are_lit_or_dark() {
     for (elevation, azimuth) in [(0.1, 90.0), (0.1, 37.0), (20.0, 211.0), (60.0, 300.0)] {
@@ -73,9 +73,9 @@ fn val_planes_along_the_rays_are_lit_or_dark() {
     }
 }
 
-/// The shadow of a wall of height h is h / tan(elevation) long, along the sun's azimuth and across it; 1e-6 m by bisection.
+/// The shadow of a wall of height h is h / tan(elevation) long, for suns along and across the wall's normal; 1e-6 m by bisection.
 #[test]
-fn val_the_shadow_of_a_wall_is_as_long_as_it_must_be() {
+fn val_the_shadow_of_a_wall_has_the_closed_form_length() {
     // The wall's foot is at the centre of column 59, its top at that of column 60.
     let wall = surface(50, 100, 0.1, |x, _| if x < 6.0 { 0.0 } else { 1.5 });
     let relief = Relief::new(&wall).unwrap();
@@ -131,7 +131,7 @@ fn conv_normals_of_a_sphere_are_of_second_order() {
             let slopes = [-(x - 4.0) / z, -(y - 4.0) / z];
             0.5 * parameters.photometry.of_slopes(slopes, parameters.sun.direction(), [0.0, 0.0, 1.0])
         };
-        // Over the same part of the cap, without the border, whose cells have one side only.
+        // Over the same part of the cap, without the border, where differences are one-sided.
         let cells = (cells / 8..7 * cells / 8).flat_map(|r| (cells / 8..7 * cells / 8).map(move |c| (r, c)));
         let squares = cells.map(|(r, c)| made.at(r, c) - exact(cap.geometry.x(c), cap.geometry.y(r))).map(|e| e * e);
         mean(squares).sqrt()
@@ -146,8 +146,8 @@ fn above(heights: &Grid, origin: Vector, direction: Vector, s: f64) -> f64 {
     heights.height(x, y).map_or(f64::NAN, |ground| z - ground)
 }
 
-/// First sign change of a march of tiny steps, and the last distance before it; infinite where none comes, `None` where the ray comes up from
-/// below.
+/// First sign change found by marching in tiny steps (the last distance before it); infinite if there is none, `None` if the ray comes
+/// from below the ground.
 fn march(heights: &Grid, origin: Vector, direction: Vector, to: f64, step: f64) -> Option<f64> {
     let mut before = f64::NAN;
     for k in 0..(to / step) as usize {
@@ -170,10 +170,10 @@ fn with_holes(mut heights: Grid) -> Grid {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
-    /// The fast walk meets what a march in steps of 1/2000 of a cell meets, with holes, from inside and outside. Grazing rays are left out: what a
-    /// march steps over lies within a step's fall of the ray.
+    /// The fast walk finds the same hit as a march in steps of 1/2000 of a cell, with holes, from inside and outside. Grazing rays are
+    /// excluded: ground missed by the march lies within one step's change of height of the ray.
     #[test]
-    fn prop_rays_meet_what_a_slow_march_meets(
+    fn prop_rays_hit_what_a_slow_march_hits(
         x in -2.0..10.0f64, y in -2.0..14.0f64, z in 0.5..6.0f64,
         azimuth in 0.0..360.0f64, elevation in -85.0..5.0f64, holes: bool,
     ) {
@@ -193,7 +193,7 @@ proptest! {
         match (hit, slow) {
             (Some(hit), Some(slow)) if slow.is_finite() => {
                 let near = hit.distance_m > slow - 2.0 * step && hit.distance_m < slow + 1e-9;
-                // Else it met what the march stepped over.
+                // Otherwise it hit ground that the march stepped over.
                 prop_assert!(near || lowest(hit.distance_m + step) < 1e-3, "{hit:?} {slow}");
                 let ground = heights.height(hit.point_m[0], hit.point_m[1]).unwrap_or(hit.point_m[2]);
                 prop_assert!((ground - hit.point_m[2]).abs() < 1e-9);
@@ -205,10 +205,10 @@ proptest! {
         }
     }
 
-    /// Shadows against a march to the sun in steps of 0.25 mm, and of 2.5 um around places where the ray is less than 2 mm above the ground: there, or beside
-    /// a hole, steep ground may rise into the ray between two steps.
+    /// Shadows against a march to the sun in steps of 0.25 mm, refined to 2.5 um where the ray is less than 2 mm above the ground: there,
+    /// or next to a hole, steep ground may rise into the ray between two steps.
     #[test]
-    fn prop_shadows_are_those_of_a_slow_march(
+    fn prop_shadows_match_a_slow_march(
         x in 0.6..7.2f64, y in 0.8..12.0f64, azimuth in 0.0..360.0f64, elevation in 0.1..80.0f64, holes: bool,
     ) {
         let heights = hills(18, 16);
@@ -231,7 +231,7 @@ proptest! {
         prop_assert_eq!(fast, lowest < 0.0, "{}", lowest);
     }
 
-    /// What a pixel of any camera sees falls on that pixel, lies on the ground, and as far away as it says.
+    /// For any camera, the point seen by a pixel projects to that pixel, lies on the ground, and is at the stated range.
     #[test]
     fn prop_pixels_see_the_ground_behind_them(
         azimuth in 0.0..360.0f64, elevation in 10.0..90.0f64, x in 1.0..7.0f64, y in 1.0..12.0f64, z in 0.2..4.0f64, pinhole: bool,
@@ -260,9 +260,9 @@ proptest! {
         }
     }
 
-    /// Brightness goes with the albedo, and a map of one albedo is that albedo.
+    /// Brightness is proportional to the albedo, and a uniform map gives the same image as that albedo.
     #[test]
-    fn prop_brightness_goes_with_albedo(albedo in 0.05..1.0f64) {
+    fn prop_brightness_is_proportional_to_albedo(albedo in 0.05..1.0f64) {
         let heights = hills(9, 8);
         let parameters = RenderParameters { samples: 2, ..plain([100.0, 25.0]) };
         let plain = image(&heights, &parameters);
@@ -275,7 +275,7 @@ proptest! {
     }
 }
 
-/// Pinhole over a plane: every pixel sees where its ray meets the plane, or sky.
+/// Pinhole over a plane: every pixel sees the point where its ray hits the plane, or sky.
 #[test]
 fn val_a_pinhole_sees_a_plane_up_to_the_horizon() {
     let plane = surface(400, 400, 0.5, |_, _| 2.0);
@@ -311,14 +311,14 @@ fn val_a_wall_hides_what_is_behind_it() {
         target_m: None,
     };
     let made = image(&wall, &RenderParameters { camera: camera(30.0), ..plain([180.0, 50.0]) });
-    // Ground behind the wall is seen from the top of the wall's line of sight on: 1 m / tan(30 deg) behind it.
+    // Ground behind the wall is visible beyond the line of sight over its top, 1 m / tan(30 deg) behind it.
     let first = 5.3 + 1.0 / libm::tan(30f64.to_radians());
     let behind = made.pixels.iter().filter(|p| p.ground > 0.0 && p.point_m[2] == 0.0 && p.point_m[1] > 5.3);
     let nearest = behind.map(|p| p.point_m[1]).fold(f64::INFINITY, f64::min);
     assert!(nearest > first - 0.25 && nearest < first + 0.25, "{nearest} {first}");
 }
 
-/// One or four threads: the same bits, noise included.
+/// One or four threads give the same bits, including noise.
 #[test]
 fn val_threads_change_no_bit() {
     let noise = Noise { relative: 0.02, absolute: 1e-3 };
@@ -342,7 +342,7 @@ fn val_threads_change_no_bit() {
     assert_eq!(bits(1), bits(4));
 }
 
-/// Holes are seen as nothing, and as nothing else.
+/// Pixels over holes see no ground; all other pixels are unchanged.
 #[test]
 fn val_holes_are_not_ground() {
     let mut plane = surface(12, 12, 1.0, |_, _| 5.0);
@@ -350,14 +350,14 @@ fn val_holes_are_not_ground() {
     plane.values[5 * 12 + 6] = f64::NAN;
     let made = image(&plane, &plain([90.0, 10.0]));
     let seen: Vec<usize> = (0..144).filter(|&k| made.pixels[k].ground == 0.0).collect();
-    // A ray through the centre of a neighbouring cell lies on the border of a patch that is there.
+    // A ray through the centre of a neighbouring cell lies on the border of a patch with data.
     assert_eq!(seen, [5 * 12 + 6]);
     for (a, b) in whole.pixels.iter().zip(&made.pixels).filter(|(_, b)| b.ground > 0.0) {
         assert_eq!(a.brightness, b.brightness);
     }
 }
 
-/// Through a hole in the ground a low camera does not see the underside of what lies behind it.
+/// Through a hole in the ground, a low camera does not see the underside of the ground behind it.
 #[test]
 fn val_nothing_is_seen_from_below() {
     let heights = with_holes(hills(18, 16));
@@ -367,7 +367,7 @@ fn val_nothing_is_seen_from_below() {
 }
 
 #[test]
-fn val_what_cannot_be_rendered_is_refused() {
+fn val_invalid_scenes_are_refused() {
     let parameters = plain([90.0, 45.0]);
     let error = |heights: &Grid, albedo: Option<&Grid>| {
         render(&Scene { heights, albedo }, &parameters, &streams()).unwrap_err()
@@ -414,7 +414,7 @@ fn val_albedo_without_data_is_the_default() {
 
 /// Noise on a plane of brightness m: 40 000 independent pixels have the mean m and the standard deviation sqrt(a^2 + (r m)^2). Bounds are
 /// 5 standard errors of the mean, sigma/200, and of the standard deviation, sigma/(200 sqrt 2): two tests, false alarm below 2e-6. A relative error of
-/// sigma of 2 % would be seen.
+/// sigma of 2 % would be detected.
 #[test]
 fn stat_noise_has_the_stated_deviation() {
     let plane = surface(200, 200, 1.0, |_, _| 0.0);
@@ -431,7 +431,7 @@ fn stat_noise_has_the_stated_deviation() {
     assert!(again.pixels[0].brightness != made.pixels[0].brightness);
 }
 
-/// Slopes on lines between patches are the means of both sides, in patches their own, at the border of the ground one-sided.
+/// Slopes are the mean of both sides on lines between patches, those of the patch inside it, and one-sided at the border of the ground.
 #[test]
 fn val_slopes_at_cell_centres_are_central_differences() {
     let heights = hills(6, 7);
@@ -450,4 +450,21 @@ fn val_slopes_at_cell_centres_are_central_differences() {
     let (_, p, q) = heights.height_and_gradient(x, y).unwrap();
     let own = slopes(x, y);
     assert!((own[0] - p).abs() < 1e-9 && (own[1] - q).abs() < 1e-9);
+}
+
+/// Without cast shadows, level ground behind a wall is as bright as elsewhere; the wall itself, which faces away from the sun, is dark
+/// either way.
+#[test]
+fn val_cast_shadows_can_be_left_out() {
+    let wall = surface(50, 100, 0.1, |x, _| if x < 6.0 { 0.0 } else { 1.5 });
+    let parameters = plain([90.0, 45.0]);
+    let with = image(&wall, &parameters).image();
+    let without = image(&wall, &RenderParameters { shadows: false, ..parameters.clone() }).image();
+    let level = 0.5 * parameters.photometry.of_slopes([0.0; 2], parameters.sun.direction(), [0.0, 0.0, 1.0]);
+    // The shadow reaches from x = 6.05 to 4.55.
+    let at = |grid: &Grid, x: f64| grid.at(25, grid.geometry.cell_at(x, 2.5).unwrap().1);
+    assert_eq!((at(&with, 5.0), at(&with, 5.96), at(&without, 5.96)), (0.0, 0.0, 0.0));
+    for lit in [at(&without, 5.0), at(&with, 4.0), at(&without, 4.0), at(&with, 8.0)] {
+        assert!((lit - level).abs() < 1e-12, "{lit} {level}");
+    }
 }

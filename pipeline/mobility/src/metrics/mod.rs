@@ -1,22 +1,22 @@
-//! Figures of a traverse, from its recorded poses alone, so that the same code judges simulated and foreign logs.
+//! Metrics of a traverse, computed from its recorded poses alone, so the same code evaluates simulated and external logs.
 //!
 //! With heights `z_k` and angles `a_k` sampled at the rate `f`:
 //!
-//! | figure | formula |
+//! | metric | formula |
 //! |---|---|
 //! | vertical acceleration | `(z[k+1] - 2 z[k] + z[k-1]) f^2`, root mean square |
 //! | pitch and roll rate | `(a[k+1] - a[k]) f` of the Euler angles, root mean square |
 //! | body pitch and roll rate | recorded angular velocity about the body's y and x, root mean square |
 //! | path length | sum of plan distances between samples |
-//! | efficiency | plan distance between first and last sample over path length |
-//! | cross-track error | distance from each sample's foot on the line or polyline, root mean square and largest |
+//! | efficiency | plan distance between first and last sample divided by path length |
+//! | cross-track error | distance of each sample from its foot on the line or polyline, root mean square and largest |
 //!
 //! The `gradient` differentiator takes central differences, one-sided at the ends, once for rates and twice for the
-//! acceleration. A heave of frequency `w` is attenuated by `sinc^2(w / 2f)` by second differences and by `sinc^2(w / f)`
-//! by two gradients, `sinc x = sin x / x`: on a vehicle's 0.2 to 8 Hz at 20 Hz the former keep most of it.
+//! acceleration. Second differences attenuate a heave of frequency `w` by `sinc^2(w / 2f)`, two gradients by `sinc^2(w / f)`,
+//! with `sinc x = sin x / x`. In a vehicle's band of 0.2 to 8 Hz sampled at 20 Hz, second differences preserve most of it.
 //!
 //! Euler angles are roll about x forward, pitch about y left (nose down positive), yaw about z up, applied in the order
-//! yaw, pitch, roll. Source: Majhor and Bos, section 2.4, which leaves the differentiator open. Cost: one pass per figure.
+//! yaw, pitch, roll. Source: Majhor and Bos, section 2.4, which leaves the differentiator open. Cost: one pass per metric.
 
 pub mod log;
 mod rows;
@@ -36,7 +36,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Differentiator {
-    /// Differences of neighbours: rates between samples, accelerations by the second difference.
+    /// Differences between neighbouring samples: first differences for rates, second differences for accelerations.
     #[default]
     SecondDifference,
     /// Central differences, applied twice for accelerations.
@@ -56,6 +56,16 @@ pub struct EulerAngles {
 
 impl EulerAngles {
     /// The angles of a unit quaternion `[x, y, z, w]` (map from base_link).
+    ///
+    /// ```
+    /// use sastrugi_mobility::metrics::EulerAngles;
+    /// use std::f64::consts::{FRAC_1_SQRT_2, FRAC_PI_2};
+    ///
+    /// // Facing north: a quarter turn counterclockwise from east.
+    /// let north = EulerAngles::of([0.0, 0.0, FRAC_1_SQRT_2, FRAC_1_SQRT_2]);
+    /// assert!((north.yaw - FRAC_PI_2).abs() < 1e-12);
+    /// assert_eq!((north.roll, north.pitch), (0.0, 0.0));
+    /// ```
     pub fn of([x, y, z, w]: [f64; 4]) -> Self {
         Self {
             roll: libm::atan2(2.0 * (w * x + y * z), 1.0 - 2.0 * (x * x + y * y)),
@@ -65,22 +75,22 @@ impl EulerAngles {
     }
 }
 
-/// Figures of one traverse; NaN where the recording is too short for them.
+/// Metrics of one traverse; NaN where the recording is too short.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Metrics {
     /// Length of the path in plan, m.
     pub path_length_m: f64,
-    /// Plan distance between first and last sample over path length; NaN for a vehicle that did not move.
+    /// Plan distance between first and last sample divided by path length; NaN for a vehicle that did not move.
     pub efficiency: f64,
-    /// m/s2.
+    /// RMS vertical acceleration, m/s2.
     pub rms_vertical_acceleration_m_s2: f64,
-    /// Of the pitch angle, rad/s.
+    /// RMS rate of the pitch angle, rad/s.
     pub rms_pitch_rate_rad_s: f64,
-    /// Of the roll angle, rad/s.
+    /// RMS rate of the roll angle, rad/s.
     pub rms_roll_rate_rad_s: f64,
-    /// About the body's y axis, rad/s.
+    /// RMS angular velocity about the body's y axis, rad/s.
     pub rms_body_pitch_rate_rad_s: f64,
-    /// About the body's x axis, rad/s.
+    /// RMS angular velocity about the body's x axis, rad/s.
     pub rms_body_roll_rate_rad_s: f64,
     /// Largest absolute pitch, rad.
     pub max_pitch_rad: f64,
@@ -89,7 +99,29 @@ pub struct Metrics {
 }
 
 impl Metrics {
-    /// Figures of poses at a fixed rate.
+    /// Metrics of poses at a fixed rate.
+    ///
+    /// ```
+    /// use sastrugi_mobility::metrics::{Differentiator, Metrics};
+    /// use sastrugi_schemas::topics::StateSample;
+    ///
+    /// // East for 2 s at 1 m/s, rising with 1 m/s2, sampled at 10 Hz.
+    /// let state = |k: u32| {
+    ///     let time_s = 0.1 * f64::from(k);
+    ///     StateSample {
+    ///         time_s,
+    ///         position_m: [time_s, 0.0, 0.5 * time_s * time_s],
+    ///         orientation: [0.0, 0.0, 0.0, 1.0],
+    ///         velocity_m_s: [1.0, 0.0, time_s],
+    ///         angular_velocity_rad_s: [0.0; 3],
+    ///     }
+    /// };
+    /// let states: Vec<StateSample> = (0..=20).map(state).collect();
+    /// let metrics = Metrics::of(&states, 10.0, Differentiator::SecondDifference);
+    /// assert!((metrics.path_length_m - 2.0).abs() < 1e-12);
+    /// assert!((metrics.rms_vertical_acceleration_m_s2 - 1.0).abs() < 1e-9);
+    /// assert_eq!(metrics.rms_pitch_rate_rad_s, 0.0);
+    /// ```
     pub fn of(states: &[StateSample], sample_rate_hz: f64, differentiator: Differentiator) -> Self {
         let angles: Vec<EulerAngles> = states.iter().map(|s| EulerAngles::of(s.orientation)).collect();
         let heights: Vec<f64> = states.iter().map(|s| s.position_m[2]).collect();
@@ -130,14 +162,14 @@ impl Differentiator {
     }
 }
 
-/// Central differences, one-sided at the ends; nothing for fewer than two values.
+/// Central differences, one-sided at the ends; empty for fewer than two values.
 fn gradient(series: &[f64], rate_hz: f64) -> Vec<f64> {
     let Some(last) = series.len().checked_sub(1).filter(|&last| last > 0) else { return Vec::new() };
     let between = |low: usize, high: usize| (series[high] - series[low]) * rate_hz / (high - low) as f64;
     (0..=last).map(|k| between(k.saturating_sub(1), (k + 1).min(last))).collect()
 }
 
-/// Angles without the jumps of a full turn.
+/// Unwrapped angles: without jumps of a full turn.
 fn unwrapped(angles: &[f64]) -> Vec<f64> {
     let mut turns = 0.0;
     let jumps = angles.windows(2).map(|w| ((w[0] - w[1]) / std::f64::consts::TAU).round());
@@ -152,7 +184,7 @@ fn unwrapped(angles: &[f64]) -> Vec<f64> {
         .collect()
 }
 
-/// Root mean square; NaN for no values.
+/// Root mean square; NaN without values.
 fn rms(values: &[f64]) -> f64 {
     sums::mean(&values.iter().map(|v| v * v).collect::<Vec<_>>()).sqrt()
 }

@@ -7,28 +7,28 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::{MissionRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{CommandSample, EventKind, Recording, StateSample, WheelSample, WheelState};
 
-/// Steps per unit of what the tables hold about wheels and controller, as in the topics `/wheels` and `/command`: finer than
-/// any sensor's noise, and short to compress. Rates and lengths.
+/// Quantisation of wheel and controller columns, in steps per unit, as in the topics `/wheels` and `/command`: finer than any
+/// sensor's noise, and compressible. This one is for rates and lengths.
 const FINE: f64 = 1024.0;
 /// Slip ratios.
 const SLIP: f64 = 4096.0;
 /// Torques.
 const TORQUE: f64 = 64.0;
-/// Angles, in degrees: half of the topics' step.
+/// Angles in degrees: half the step of the topics.
 const DEGREES: f64 = 32.0;
 /// Forces.
 const COARSE: f64 = 4.0;
 
-/// What the tables say about a mission beside what happened in it.
+/// Labels of a mission in the tables.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct MissionLabels {
     /// Id of the terrain.
     pub terrain_id: String,
     /// Label of the terrain.
     pub group: Option<String>,
-    /// What differs from the study's plain run.
+    /// The parameter that differs from the study's plain run.
     pub variant: Option<String>,
-    /// Name of the start and goal, shared by missions that can be compared one by one.
+    /// Id of the random draws, shared by missions that can be compared in pairs.
     pub pair_id: String,
     /// Id of the traverse stage.
     pub traverse_id: String,
@@ -119,7 +119,7 @@ pub fn replicate_row(
     }
 }
 
-/// The farthest that a sample came along the mission's line or polyline, at most its length, m.
+/// Largest distance that the vehicle reached along the mission's line or polyline, at most its length, m.
 pub fn progress_m(mission: &Mission, recording: &Recording) -> f64 {
     if let Some(line) = &mission.line {
         let feet = line.feet(&recording.states, window_m(recording));
@@ -129,7 +129,7 @@ pub fn progress_m(mission: &Mission, recording: &Recording) -> f64 {
     along.fold(0.0, f64::max).min(mission.length_m())
 }
 
-/// The rows of a mission's samples; `classes` (codes of [`RoughnessClass`](sastrugi_schemas::RoughnessClass)) tells the class
+/// The rows of a mission's samples; `classes` (codes of [`RoughnessClass`](sastrugi_schemas::RoughnessClass)) gives the class
 /// under base_link.
 pub fn sample_rows(terrain_id: &str, mission: &Mission, recording: &Recording, classes: &Grid<u8>) -> Vec<SampleRow> {
     let mission_id = mission.id();
@@ -142,12 +142,12 @@ pub fn sample_rows(terrain_id: &str, mission: &Mission, recording: &Recording, c
     recording.states.iter().enumerate().map(row).collect()
 }
 
-/// The outcome of a recorded mission; empty where nothing ended it.
+/// The outcome of a recorded mission; empty if it has no final event.
 fn outcome_of(recording: &Recording) -> &'static str {
     recording.events.last().map_or("", |event| event.kind.name())
 }
 
-/// What all samples of a mission share.
+/// Labels shared by all samples of a mission.
 #[derive(Clone, Copy)]
 struct SampleLabels<'a> {
     terrain_id: &'a str,
@@ -155,7 +155,7 @@ struct SampleLabels<'a> {
     outcome: &'a str,
 }
 
-/// What a recording holds of one instant.
+/// All messages of a recording at one instant.
 struct Instant<'a> {
     state: &'a StateSample,
     command: Option<&'a CommandSample>,
@@ -163,18 +163,18 @@ struct Instant<'a> {
 }
 
 impl Instant<'_> {
-    /// A figure of the controller in steps; NaN where there is none.
-    fn controller(&self, steps: f64, figure: fn(&CommandSample) -> f64) -> f64 {
-        self.command.map_or(f64::NAN, |c| in_steps(figure(c), steps))
+    /// A quantised value of the controller; NaN if not recorded.
+    fn controller(&self, steps: f64, value: fn(&CommandSample) -> f64) -> f64 {
+        self.command.map_or(f64::NAN, |c| in_steps(value(c), steps))
     }
 
-    fn of_wheels<T>(&self, figure: impl Fn(&WheelState) -> T) -> Vec<T> {
-        self.wheels.map_or_else(Vec::new, |sample| sample.wheels.iter().map(figure).collect())
+    fn of_wheels<T>(&self, value: impl Fn(&WheelState) -> T) -> Vec<T> {
+        self.wheels.map_or_else(Vec::new, |sample| sample.wheels.iter().map(value).collect())
     }
 
-    /// A figure of every wheel in steps.
-    fn wheels(&self, steps: f64, figure: fn(&WheelState) -> f64) -> Vec<f32> {
-        self.of_wheels(|w| in_steps(figure(w), steps) as f32)
+    /// A quantised value of every wheel.
+    fn wheels(&self, steps: f64, value: fn(&WheelState) -> f64) -> Vec<f32> {
+        self.of_wheels(|w| in_steps(value(w), steps) as f32)
     }
 
     /// A coordinate of every wheel's contact point; NaN without contact.
@@ -183,7 +183,7 @@ impl Instant<'_> {
     }
 }
 
-/// The nearest whole step; zero is positive.
+/// Rounds to the nearest step; zero is positive.
 fn in_steps(value: f64, steps: f64) -> f64 {
     (value * steps).round() / steps + 0.0
 }
@@ -234,7 +234,7 @@ fn sample_row(labels: SampleLabels<'_>, sample: i64, instant: Instant<'_>, class
         wheel_contact_y_m: instant.contacts(1),
         wheel_contact_z_m: instant.contacts(2),
         outcome: labels.outcome.to_owned(),
-        // Filled when the release is assembled.
+        // Filled in when the release is assembled.
         split: None,
     }
 }

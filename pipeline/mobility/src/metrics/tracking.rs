@@ -1,7 +1,8 @@
-//! How closely a vehicle kept to what it was to follow.
+//! Cross-track error: how closely a vehicle followed its course.
 //!
-//! The foot of a sample on a polyline ([`Polyline::foot`]) is looked for from the foot of the sample before to three wheelbases beyond, the
-//! usual look-ahead distance: nearer parts of another pass are not mistaken for this one. A straight line is a polyline of two points.
+//! The foot of a sample on a polyline ([`Polyline::foot`]) is searched from the previous sample's foot to three wheelbases
+//! beyond it, the default look-ahead distance, so a nearer part of another pass is not mistaken for the current one. A straight
+//! line is a polyline of two points.
 
 use super::{max_abs, rms};
 use crate::missions::{Mission, Polyline};
@@ -18,7 +19,8 @@ pub struct CrossTrack {
 }
 
 impl CrossTrack {
-    /// Of poses along a polyline, feet looked for within `window_m` (m, at least what the vehicle drives between two samples).
+    /// Cross-track error of poses along a polyline; feet are searched within `window_m` (m, at least the distance driven
+    /// between two samples).
     pub fn of(states: &[StateSample], line: &Polyline, window_m: f64) -> Self {
         let errors: Vec<f64> = line.feet(states, window_m).iter().map(|foot| foot.cross_track_m).collect();
         Self { rms_m: rms(&errors), max_m: max_abs(&errors) }

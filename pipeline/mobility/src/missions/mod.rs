@@ -1,18 +1,18 @@
-//! Missions: random straight ones (Majhor and Bos, section 2.3), and those that follow a polyline.
+//! Missions: random straight ones (Majhor and Bos, section 2.3), and missions along a polyline.
 //!
 //! The start is a cell centre drawn uniformly from the low-roughness cells of the closed class map that lie more than a
 //! border from the edge. The heading is uniform over the circle. The goal lies one mission length away along the heading;
 //! it must lie inside the border, in a cell of low or semi roughness. Otherwise start and heading are drawn again.
 //!
-//! Every mission draws from its own stream (`mission-0001`, `mission-0002`, ...), so that asking for more missions changes
-//! none of those before. The paper does not say what happens on a terrain that allows no mission: here the draws are
-//! counted and end in an error.
+//! Every mission draws from its own stream (`mission-0001`, `mission-0002`, ...), so a larger number of missions leaves the
+//! earlier ones unchanged. The paper does not say what happens on a terrain that allows no mission; here the number of draws
+//! is limited, and exceeding it is an error.
 //!
-//! Terrains that are to be compared line by line share their draws ([`StartCells::All`]): each accepts them by its own map, so
-//! that its missions are what they would be alone, and where two accept the same draw they share the mission.
-//! [`ReplicateSettings`] perturbs the start of a drawn mission.
+//! Terrains whose missions are compared in pairs share their draws ([`StartCells::All`]): each terrain accepts or rejects a
+//! draw by its own map, so its missions do not depend on the other terrains, and two terrains that accept the same draw share
+//! the mission. [`ReplicateSettings`] perturbs the start of a drawn mission.
 //!
-//! [`Mission::along`] makes a mission that follows a [`Polyline`] instead.
+//! [`Mission::along`] creates a mission that follows a [`Polyline`] instead.
 //!
 //! Cost: one pass over the map and a few draws per mission; memory: sixteen bytes per cell
 //! inside the border.
@@ -42,12 +42,12 @@ pub struct Mission {
     pub start_m: [f64; 2],
     /// Goal point `[x, y]`, m.
     pub goal_m: [f64; 2],
-    /// Direction in which the vehicle stands at the start, counterclockwise from east, rad, in [0, 2 pi); of a drawn mission
-    /// that from start to goal.
+    /// Direction the vehicle faces at the start, counterclockwise from east, rad, in [0, 2 pi); for a drawn mission the
+    /// direction from start to goal.
     pub heading_rad: f64,
-    /// Draws of start and heading that were needed, at least 1.
+    /// Number of draws of start and heading until one was accepted, at least 1.
     pub draws: u32,
-    /// What the vehicle follows to the goal; the straight line when absent.
+    /// The polyline that the vehicle follows to the goal; the straight line when absent.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub line: Option<Polyline>,
 }
@@ -59,12 +59,33 @@ impl Mission {
     }
 
     /// The straight mission between two points, facing the goal.
+    ///
+    /// ```
+    /// use sastrugi_mobility::missions::Mission;
+    ///
+    /// let mission = Mission::between(0, [1.0, 2.0], [4.0, 6.0]);
+    /// assert_eq!((mission.id().as_str(), mission.length_m()), ("mission-0001", 5.0));
+    /// // The foot of a point on the line, measured from the start.
+    /// assert!((mission.along_m([4.0, 2.0]) - 1.8).abs() < 1e-12);
+    /// ```
     pub fn between(index: usize, start_m: [f64; 2], goal_m: [f64; 2]) -> Self {
         let bearing = libm::atan2(goal_m[1] - start_m[1], goal_m[0] - start_m[0]);
         Self { index, start_m, goal_m, heading_rad: normalized(bearing), draws: 1, line: None }
     }
 
     /// The mission along a polyline from its first point to its last, facing along it.
+    ///
+    /// ```
+    /// use sastrugi_mobility::missions::{Mission, Polyline};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let corner = Polyline::new(&[[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])?;
+    /// let mission = Mission::along(0, corner);
+    /// assert_eq!((mission.length_m(), mission.course_length_m()), (5.0, 7.0));
+    /// assert_eq!((mission.goal_m, mission.heading_rad), ([3.0, 4.0], 0.0));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn along(index: usize, line: Polyline) -> Self {
         let (start_m, goal_m) = (line.point_at(0.0), line.point_at(line.length_m()));
         Self { index, start_m, goal_m, heading_rad: normalized(line.bearing_rad()), draws: 1, line: Some(line) }
@@ -75,12 +96,12 @@ impl Mission {
         distance(self.start_m, self.goal_m)
     }
 
-    /// Length of what the vehicle follows, m: of the polyline, or the distance from start to goal.
+    /// Length of the course, m: that of the polyline, or the distance from start to goal.
     pub fn course_length_m(&self) -> f64 {
         self.line.as_ref().map_or_else(|| self.length_m(), Polyline::length_m)
     }
 
-    /// The point at a share (0 to 1) of the way that the vehicle follows, m.
+    /// The point at a fraction (0 to 1) of the course, m.
     pub fn course_at(&self, share: f64) -> [f64; 2] {
         match &self.line {
             Some(line) => line.point_at(share * line.length_m()),
@@ -100,36 +121,36 @@ pub fn mission_id(index: usize) -> String {
     format!("mission-{:04}", index + 1)
 }
 
-/// Why a terrain has no missions.
+/// Why no missions could be drawn on a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum MissionError {
     /// The terrain cannot hold the mission at any heading.
     #[error(
-        "place missions of {length_m} m: inside the border of {border_m} m the terrain measures {inside_x_m:.2} x \
-         {inside_y_m:.2} m; take a larger terrain, a shorter `length_m` or a narrower `border_m`"
+        "place missions of {length_m} m: the terrain inside the border of {border_m} m measures {inside_x_m:.2} x \
+         {inside_y_m:.2} m; use a larger terrain, a shorter `length_m` or a narrower `border_m`"
     )]
     LongerThanTerrain {
         /// Mission length, m.
         length_m: f64,
         /// Border, m.
         border_m: f64,
-        /// Extent inside of the border east-west, m (negative when the border covers everything).
+        /// Extent inside the border east-west, m (negative when the border covers everything).
         inside_x_m: f64,
-        /// Extent inside of the border north-south, m.
+        /// Extent inside the border north-south, m.
         inside_y_m: f64,
     },
     /// No low-roughness cell lies inside the border.
-    #[error("find a start: none of the {cells} cells more than {border_m} m from the edge has low roughness")]
+    #[error("find a start: none of the {cells} cells farther than {border_m} m from the edge has low roughness")]
     NoEligibleStart {
-        /// Cells inside of the border.
+        /// Cells inside the border.
         cells: usize,
         /// Border, m.
         border_m: f64,
     },
-    /// No draw met the goal rule.
+    /// No draw satisfied the goal rule.
     #[error(
-        "find a goal for {mission_id}: {draws} draws met none of the {starts} low-roughness cells with a goal {length_m} m \
-         away in low or semi roughness; raise `max_draws` or shorten `length_m`"
+        "find a goal for {mission_id}: in {draws} draws, none of the {starts} low-roughness cells had a goal of low or semi \
+         roughness {length_m} m away; raise `max_draws` or shorten `length_m`"
     )]
     DrawsExhausted {
         /// Id of the mission.
@@ -143,14 +164,14 @@ pub enum MissionError {
     },
 }
 
-/// Which cells starts are drawn from; either way they are uniform over the low-roughness cells.
+/// Which cells starts are drawn from. Either way, starts are uniform over the low-roughness cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]
 pub enum StartCells {
-    /// Those of low roughness.
+    /// The cells of low roughness.
     Low,
-    /// All inside the border, drawn again until one has low roughness: draw k of a mission is then the same start and
-    /// heading on every map with these cells, so that maps which accept the same draw share the mission.
+    /// All cells inside the border, drawn again until one has low roughness. Draw k of a mission is then the same start and
+    /// heading on every map with these cells, so maps that accept the same draw share the mission.
     All,
 }
 
@@ -158,6 +179,27 @@ pub enum StartCells {
 ///
 /// # Errors
 /// [`MissionError`] when the terrain is too small, too rough, or the draws run out.
+///
+/// ```
+/// use sastrugi_mobility::missions::{MissionParameters, MissionSettings, StartCells, draw_missions};
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+/// use sastrugi_schemas::RoughnessClass;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // 60 m square of low roughness.
+/// let classes = Grid::filled(Geometry::square(120, 120, 0.5), RoughnessClass::Low as u8);
+/// let settings = MissionSettings::try_from(MissionParameters { count: 3, ..Default::default() })?;
+/// let missions = draw_missions(&classes, &settings, StartCells::Low, &Streams::for_seed(1, "missions"))?;
+/// assert_eq!(missions.len(), 3);
+/// for mission in &missions {
+///     assert!((mission.length_m() - 35.0).abs() < 1e-9);
+///     // Starts and goals keep a border of 5 m.
+///     let mut ends = mission.start_m.into_iter().chain(mission.goal_m);
+///     assert!(ends.all(|at| at > 5.0 && at < 55.0));
+/// }
+/// # Ok(())
+/// # }
+/// ```
 pub fn draw_missions(
     classes: &Grid<u8>,
     settings: &MissionSettings,
@@ -172,7 +214,7 @@ pub fn draw_missions(
 struct Field<'a> {
     classes: &'a Grid<u8>,
     settings: &'a MissionSettings,
-    /// Row-major indices of the cells that starts are drawn from.
+    /// Row-major indices of the cells from which starts are drawn.
     cells: Vec<usize>,
     /// Number of low-roughness cells among them.
     starts: usize,
@@ -241,7 +283,7 @@ fn is_low(classes: &Grid<u8>, index: usize) -> bool {
     classes.values[index] == RoughnessClass::Low as u8
 }
 
-/// True more than `border_m` from every edge of the grid.
+/// True for points farther than `border_m` from every edge of the grid.
 fn is_inside(geometry: &Geometry, border_m: f64, point_m: [f64; 2]) -> bool {
     let size = geometry.size();
     (0..2).all(|axis| {
@@ -255,7 +297,7 @@ fn centre(classes: &Grid<u8>, index: usize) -> [f64; 2] {
     [classes.geometry.x(index % classes.cols()), classes.geometry.y(index / classes.cols())]
 }
 
-/// An angle less than a turn out of [0, 2 pi) brought there, rad.
+/// Wraps an angle within one turn of [0, 2 pi) into that range, rad.
 fn normalized(angle_rad: f64) -> f64 {
     let turn = std::f64::consts::TAU;
     match angle_rad {

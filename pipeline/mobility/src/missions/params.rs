@@ -10,9 +10,9 @@ pub const DEFAULT_COUNT: u32 = 20;
 pub const DEFAULT_LENGTH_M: f64 = 35.0;
 /// Width of the border without starts and goals (section 2.3), m.
 pub const DEFAULT_BORDER_M: f64 = 5.0;
-/// Draws per mission before giving up (chosen here: the published terrains need fewer than 100).
+/// Maximum number of draws per mission (chosen here: the published terrains need fewer than 100).
 pub const DEFAULT_MAX_DRAWS: u32 = 100_000;
-/// Most missions of one terrain: four digits in their ids.
+/// Maximum number of missions per terrain: their ids have four digits.
 const COUNT_MAX: u32 = 9999;
 
 /// Random straight missions.
@@ -23,9 +23,9 @@ pub struct MissionParameters {
     pub count: u32,
     /// Straight distance from start to goal, m (section 2.3: 35).
     pub length_m: f64,
-    /// Starts and goals lie more than this from the edge of the terrain, m (section 2.3: 5).
+    /// Starts and goals lie farther than this from the edge of the terrain, m (section 2.3: 5).
     pub border_m: f64,
-    /// Draws of start and heading per mission before the terrain is refused.
+    /// Maximum number of draws of start and heading per mission; beyond it the terrain is rejected.
     pub max_draws: u32,
 }
 
@@ -61,7 +61,7 @@ impl MissionSettings {
         self.0.border_m
     }
 
-    /// Draws per mission before giving up.
+    /// Maximum number of draws per mission.
     pub fn max_draws(&self) -> u32 {
         self.0.max_draws
     }

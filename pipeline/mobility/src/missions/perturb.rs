@@ -1,12 +1,12 @@
-//! Starts beside the drawn one: how much of a mission's outcome is chance.
+//! Perturbed starts: how much of a mission's outcome is chance.
 //!
-//! A vehicle on rough ground is chaotic: starts a hair apart can end differently. Replicate `k` of a mission starts uniformly
-//! within a disk about the drawn start and faces uniformly within an interval about the drawn heading; the goal stays. The
-//! first replicate is the drawn mission itself. Each draws from a stream of its own (`mission-0001`, `replicate-0002`, ...),
-//! so that asking for more changes none of those before.
+//! A vehicle on rough ground behaves chaotically: nearly identical starts can end differently. Replicate `k` of a mission starts
+//! uniformly within a disk around the drawn start, with a heading uniform within an interval around the drawn heading; the goal
+//! is unchanged. The first replicate is the drawn mission itself. Each replicate draws from its own stream (`mission-0001`,
+//! `replicate-0002`, ...), so a larger number of replicates leaves the earlier ones unchanged.
 //!
-//! A point uniform in a disk of radius `r` is `r sqrt(u)` away at the angle `2 pi v`, with `u`, `v` uniform in [0, 1).
-//! Cost: three draws per start.
+//! A point uniform in a disk of radius `r` lies `r sqrt(u)` from the centre at the angle `2 pi v`, with `u`, `v` uniform in
+//! [0, 1). Cost: three draws per start.
 
 use super::{Mission, normalized};
 use sastrugi_numeric::Streams;
@@ -15,20 +15,20 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// Starts of one mission (chosen here: only the drawn one).
+/// Starts per mission (chosen here: only the drawn one).
 pub const DEFAULT_REPLICATES: u32 = 1;
-/// Distance of other starts from the drawn one (chosen here: as well as a vehicle can be placed by hand), m.
+/// Largest distance of perturbed starts from the drawn one (chosen here: the accuracy of placing a vehicle by hand), m.
 pub const DEFAULT_START_TOLERANCE_M: f64 = 0.05;
-/// Deviation of their heading from the drawn one (chosen here, likewise), deg.
+/// Largest deviation of their heading from the drawn one (chosen here for the same reason), deg.
 pub const DEFAULT_START_TOLERANCE_DEG: f64 = 2.0;
-/// Most starts of one mission.
+/// Maximum number of starts per mission.
 const REPLICATES_MAX: u32 = 1000;
 
 /// Several starts for each mission.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ReplicateParameters {
-    /// Starts driven of each mission, 1 to 1000: the drawn one, which is recorded, and perturbed ones.
+    /// Starts driven for each mission, 1 to 1000: the drawn one, which is recorded, and perturbed ones.
     pub replicates: u32,
     /// Perturbed starts lie within this distance of the drawn one, m; below the missions' length.
     pub start_tolerance_m: f64,
@@ -55,7 +55,7 @@ impl ReplicateSettings {
     /// Checks the parameters for missions of one length.
     ///
     /// # Errors
-    /// A [`ParameterError`] for a number out of range, or a start that might lie on the goal.
+    /// A [`ParameterError`] for a number out of range, or a tolerance so large that a start might lie on the goal.
     pub fn new(raw: ReplicateParameters, length_m: f64) -> Result<Self, ParameterError> {
         if !(1..=REPLICATES_MAX).contains(&raw.replicates) {
             let message = format!("is {}; it must be 1 to {REPLICATES_MAX}", raw.replicates);
@@ -63,7 +63,7 @@ impl ReplicateSettings {
         }
         if !(0.0..length_m).contains(&raw.start_tolerance_m) {
             let message = format!(
-                "is {}; it must be 0 or above and below the missions' length of {length_m} m",
+                "is {}; it must be at least 0 and less than the mission length of {length_m} m",
                 raw.start_tolerance_m
             );
             return Err(ParameterError::new("start_tolerance_m", message));
@@ -75,7 +75,7 @@ impl ReplicateSettings {
         Ok(Self(raw))
     }
 
-    /// Starts driven of each mission, the drawn one among them.
+    /// Starts driven for each mission, including the drawn one.
     pub fn count(&self) -> usize {
         self.0.replicates as usize
     }
@@ -128,12 +128,12 @@ mod tests {
     }
 
     #[test]
-    fn prop_starts_go_by_name() {
+    fn prop_starts_depend_only_on_mission_and_replicate() {
         let streams = Streams::for_seed(1, "traverse");
         let start = |settings: &ReplicateSettings, k| settings.start(&mission(), k, &streams);
         for k in 1..8 {
             let (a, b) = (start(&settings(8), k), start(&settings(1000), k));
-            assert_eq!(a, b, "the number of replicates changes no start");
+            assert_eq!(a, b, "starts do not depend on the number of replicates");
             assert_eq!((a.index, a.goal_m, a.draws), (4, [55.0, 30.0], 3));
             assert!((1..k).all(|other| start(&settings(8), other) != a));
         }

@@ -1,8 +1,9 @@
-//! Polylines that a vehicle follows, and how far along one it has come.
+//! Polylines that a vehicle follows, and its progress along them.
 //!
-//! Progress is monotone: the foot of a point is the nearest point of the polyline between the foot before it and a window
-//! beyond that, the nearer to the start where two are equally near. So a line may cross itself or close: the vehicle stays on the part
-//! that it follows, as long as its loops are longer than the window. Cost: the segments inside the window.
+//! Progress is monotone: the foot of a point is the nearest point of the polyline between the previous foot and a window
+//! beyond it; of two equally near points, the one nearer to the start. A line may therefore cross itself or close: as long as
+//! its loops are longer than the window, the foot stays on the part that the vehicle is following. Cost: the segments inside
+//! the window.
 
 use sastrugi_schemas::topics::StateSample;
 use serde::{Deserialize, Serialize};
@@ -11,17 +12,17 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(try_from = "Vec<[f64; 2]>", into = "Vec<[f64; 2]>")]
 pub struct Polyline {
-    /// Vertices `[x, y]`, m, no two in succession the same.
+    /// Vertices `[x, y]`, m; consecutive ones differ.
     points_m: Vec<[f64; 2]>,
-    /// Distance of each vertex along the polyline, m; rises from 0.
+    /// Distance of each vertex along the polyline, m; increases from 0.
     along_m: Vec<f64>,
 }
 
-/// Why points are not a polyline.
+/// Why points do not form a polyline.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum PolylineError {
-    /// A coordinate without a value.
-    #[error("make a polyline: point {index} is ({x_m}, {y_m}) m; coordinates must be finite")]
+    /// A coordinate is not finite.
+    #[error("build a polyline: point {index} is ({x_m}, {y_m}) m; coordinates must be finite")]
     NotFinite {
         /// Number of the point, from 0.
         index: usize,
@@ -30,28 +31,28 @@ pub enum PolylineError {
         /// Its y, m.
         y_m: f64,
     },
-    /// No two points lie apart.
-    #[error("make a polyline: {points} points have no length; give at least two that lie apart")]
+    /// All points coincide, or there are fewer than two.
+    #[error("build a polyline: the {points} points span no length; give at least two distinct points")]
     NoLength {
         /// Number of points.
         points: usize,
     },
     /// Points so far apart that their distances are not finite.
-    #[error("make a polyline: its length exceeds every number; give coordinates in m")]
+    #[error("build a polyline: its length overflows; give coordinates in m")]
     TooLong,
 }
 
-/// The point of a polyline that stands for a point beside it.
+/// The point of a polyline that is nearest to a given point.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Foot {
     /// Distance along the polyline, m.
     pub along_m: f64,
-    /// Distance from the foot, m, positive to the left of the polyline.
+    /// Distance to the foot, m, positive to the left of the polyline.
     pub cross_track_m: f64,
 }
 
 impl Polyline {
-    /// The polyline through these points (m) in their order; of points that repeat their predecessor one is kept.
+    /// The polyline through these points (m) in order; a point that repeats its predecessor is dropped.
     ///
     /// # Errors
     /// [`PolylineError`] for a coordinate that is not finite, or a length that is 0 or not finite.
@@ -95,7 +96,7 @@ impl Polyline {
         self.along_m.last().copied().unwrap_or(0.0)
     }
 
-    /// The point at a distance along the polyline (kept to 0 and the length), m.
+    /// The point at a distance along the polyline (clamped to 0 and the length), m.
     pub fn point_at(&self, along_m: f64) -> [f64; 2] {
         let along_m = along_m.clamp(0.0, self.length_m());
         let (from, to) = self.segment(self.segment_at(along_m));
@@ -110,6 +111,18 @@ impl Polyline {
     }
 
     /// The foot of a point (m), from `from_m` to `window_m` beyond it along the polyline.
+    ///
+    /// ```
+    /// use sastrugi_mobility::missions::Polyline;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let corner = Polyline::new(&[[0.0, 0.0], [3.0, 0.0], [3.0, 4.0]])?;
+    /// // Half a metre to the left of the second segment, 2 m up.
+    /// let foot = corner.foot([2.5, 2.0], 1.0, 9.0);
+    /// assert_eq!((foot.along_m, foot.cross_track_m), (5.0, 0.5));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn foot(&self, point_m: [f64; 2], from_m: f64, window_m: f64) -> Foot {
         let from_m = from_m.clamp(0.0, self.length_m());
         let to_m = from_m + window_m.max(0.0);
@@ -121,7 +134,7 @@ impl Polyline {
         })
     }
 
-    /// The feet of a vehicle's poses, each after the one before it.
+    /// The feet of a vehicle's poses; none lies before its predecessor.
     pub fn feet(&self, states: &[StateSample], window_m: f64) -> Vec<Foot> {
         let next = |from_m: &mut f64, state: &StateSample| {
             let foot = self.foot([state.position_m[0], state.position_m[1]], *from_m, window_m);
@@ -131,7 +144,7 @@ impl Polyline {
         states.iter().scan(0.0, next).collect()
     }
 
-    /// The last segment that does not begin beyond a distance along the polyline.
+    /// The last segment that begins at or before a distance along the polyline.
     fn segment_at(&self, along_m: f64) -> usize {
         self.along_m[1..self.along_m.len() - 1].partition_point(|&begin_m| begin_m <= along_m)
     }
@@ -195,17 +208,19 @@ mod tests {
         assert_eq!(foot([9.0, 4.0], 0.0, 9.0), (7.0, -6.0));
     }
 
-    /// Where a line comes back on itself, the window decides which pass a point belongs to.
+    /// Where a line doubles back on itself, the window decides which pass a point belongs to.
     #[test]
-    fn val_progress_keeps_to_the_pass_under_way() {
+    fn val_progress_stays_on_the_current_pass() {
         let there_and_back = line(&[[0.0, 0.0], [10.0, 0.0], [0.0, 0.0]]);
         assert_eq!(there_and_back.foot([4.0, 0.0], 3.0, 2.0).along_m, 4.0);
         assert_eq!(there_and_back.foot([4.0, 0.0], 15.0, 2.0).along_m, 16.0);
         assert_eq!(there_and_back.foot([0.0, 0.0], 0.0, 2.0).along_m, 0.0);
+        // Without a window, the nearest point is the first one.
+        assert_eq!(there_and_back.foot([4.0, 0.0], 0.0, 20.0).along_m, 4.0);
     }
 
     #[test]
-    fn val_points_without_a_line_are_refused() {
+    fn val_degenerate_polylines_are_refused() {
         let error = |points: &[[f64; 2]]| Polyline::new(points).unwrap_err();
         assert_eq!(error(&[]), PolylineError::NoLength { points: 0 });
         assert_eq!(error(&[[1.0, 2.0]; 3]), PolylineError::NoLength { points: 3 });
@@ -215,7 +230,7 @@ mod tests {
     }
 
     proptest! {
-        /// Feet never go back, never pass the window, and are as near as a dense search finds them to be.
+        /// Feet never move back, never pass the window, and are as near as those of a dense search.
         #[test]
         fn prop_feet_are_monotone_and_nearest(
             points in prop::collection::vec(prop::array::uniform2(-5.0..5.0f64), 2..12),
@@ -235,7 +250,7 @@ mod tests {
         }
 
         #[test]
-        fn prop_files_hold_the_same_line(points in prop::collection::vec(prop::array::uniform2(-5.0..5.0f64), 2..12)) {
+        fn prop_json_round_trips(points in prop::collection::vec(prop::array::uniform2(-5.0..5.0f64), 2..12)) {
             let text = serde_json::to_string(&line(&points)).unwrap();
             prop_assert_eq!(serde_json::from_str::<Polyline>(&text).unwrap(), line(&points));
         }

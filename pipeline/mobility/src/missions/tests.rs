@@ -24,7 +24,7 @@ fn streams() -> Streams {
 }
 
 #[test]
-fn val_every_mission_keeps_the_rules_of_the_paper() {
+fn val_every_mission_follows_the_rules_of_the_paper() {
     let classes = checkerboard();
     let missions = draw_missions(&classes, &settings(|p| p.count = 200), StartCells::Low, &streams()).unwrap();
     assert_eq!(missions.len(), 200);
@@ -46,7 +46,7 @@ fn val_every_mission_keeps_the_rules_of_the_paper() {
 }
 
 #[test]
-fn prop_more_missions_change_none_before() {
+fn prop_more_missions_leave_earlier_ones_unchanged() {
     let classes = checkerboard();
     for cells in [StartCells::Low, StartCells::All] {
         let few = draw_missions(&classes, &settings(|p| p.count = 5), cells, &streams()).unwrap();
@@ -55,8 +55,8 @@ fn prop_more_missions_change_none_before() {
     }
 }
 
-/// Null: on an all-low map large against the mission, starts are uniform over the eligible cells and headings over the
-/// circle. n = 9000; thresholds at 5 standard errors of each mean (false alarm 6e-7 each); would catch a mean start that
+/// Null: on an all-low map much larger than the mission, starts are uniform over the eligible cells and headings over the
+/// circle. n = 9000; thresholds at 5 standard errors of each mean (false alarm 6e-7 each); would detect a mean start that
 /// is off by 1.6 % of the extent, or a heading preference of 4 % in cos or sin.
 #[test]
 fn stat_starts_and_headings_are_uniform() {
@@ -72,8 +72,8 @@ fn stat_starts_and_headings_are_uniform() {
     assert!((mean(&|m| m.heading_rad) - PI).abs() < five_se(PI * PI / 3.0));
 }
 
-/// Maps that share their draws: the rules hold on each, the same draw is the same mission, and missions are shared by maps
-/// that differ in a quarter of the rows inside the border.
+/// Maps that share their draws: the rules hold on each map, the same draw gives the same mission, and maps that differ in a
+/// quarter of the rows inside the border share missions.
 #[test]
 fn val_shared_draws_are_shared_missions() {
     let (a, mut b) = (checkerboard(), checkerboard());
@@ -92,9 +92,9 @@ fn val_shared_draws_are_shared_missions() {
     assert!((20..100).contains(&shared), "{shared}");
 }
 
-/// Null: starts drawn from all cells are as uniform over the low ones as those drawn from the low ones. Left half low, right
+/// Null: starts drawn from all cells are as uniform over the low cells as starts drawn from the low cells. Left half low, right
 /// half low in every other column: two thirds of the starts lie in the left half. n = 9000; five standard errors (false alarm
-/// 6e-7); would catch a preference of 3 %.
+/// 6e-7); would detect a preference of 3 %.
 #[test]
 fn stat_starts_from_all_cells_are_uniform_over_the_low_ones() {
     let geometry = Geometry::square(1000, 1000, 1.0);
@@ -116,7 +116,7 @@ fn val_impossible_terrains_are_refused_with_the_reason() {
     assert!(matches!(draw(&small, &border), MissionError::LongerThanTerrain { .. }));
     let rough = Grid::filled(Geometry::square(1009, 1009, 0.05), SEMI);
     assert!(matches!(draw(&rough, &settings(|_| ())), MissionError::NoEligibleStart { .. }));
-    // Low roughness only in the middle: every goal lies outside of the border.
+    // Low roughness only in the middle: every goal lies outside the border.
     let mut pit = Grid::filled(Geometry::square(1009, 1009, 0.05), HIGH);
     pit.values[504 * 1009 + 504] = LOW;
     let error = draw(&pit, &settings(|p| p.max_draws = 77));

@@ -1,28 +1,28 @@
-//! Rocks that a rover met: those higher than its clearance that came under it, above the plane of the sand around the rover.
+//! Rock contacts of a rover: rocks that came under it and stand higher than its clearance above the sand plane around it.
 
 use super::pose::{Chassis, Pose};
 use super::sand::{PlaneSums, SandPlane};
 use sastrugi_numeric::{Ground, GroundClass, NoGround};
 
-/// Half side of the square whose sand makes a plane, m.
+/// Half the side of the square in which the sand plane is fitted, m.
 const AROUND_M: f64 = 0.75;
 
 /// Counts of contacts.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Contacts {
-    /// Rocks above the clearance that came under the rover: between or under its wheels.
+    /// Rocks above the clearance that came under the rover, between or under its wheels.
     pub anywhere: u32,
-    /// Of those, the ones that its centre line passed over.
+    /// Those of them that its centre line passed over.
     pub on_centre_line: u32,
-    /// Whether one is under it now: anywhere, and on the centre line.
+    /// Whether a rock is under it now: anywhere, and on the centre line.
     now: [bool; 2],
 }
 
 impl Contacts {
-    /// Looks under the rover. A rock counts once for as long as it stays there.
+    /// Checks the ground under the rover. A rock counts once, for as long as it stays there.
     ///
     /// # Errors
-    /// Ground that is not known.
+    /// Unknown ground.
     pub fn look(
         &mut self,
         ground: &impl Ground,
@@ -32,7 +32,7 @@ impl Contacts {
     ) -> Result<(), NoGround> {
         let (a, t) = (chassis.axle_m, chassis.track_m);
         let (axes, mut now) = (pose.axes(), [false; 2]);
-        // The sand is asked for only where there is a rock.
+        // The sand plane is fitted only if there is a rock.
         let mut sand = None;
         for left in [-t, -0.5 * t, 0.0, 0.5 * t, t] {
             for ahead in [-a, -0.5 * a, 0.0, 0.5 * a, a] {
@@ -58,16 +58,17 @@ impl Contacts {
     }
 }
 
-/// The plane of the sand around a point, from there; level at the lowest height where there is too little sand.
+/// The plane of the sand around a point, with the origin at that point; a level plane at the lowest height if there is too little
+/// sand.
 ///
 /// # Errors
-/// Ground that is not known.
+/// Unknown ground.
 pub fn sand_plane(ground: &impl Ground, [x, y]: [f64; 2]) -> Result<SandPlane, NoGround> {
     let step_m = ground.cell_m().max(AROUND_M / 10.0);
     let reach = libm::ceil(AROUND_M / step_m) as i32;
     let mut sums = PlaneSums::default();
     let mut lowest = f64::INFINITY;
-    // Heights near 0, where squares lose no digits.
+    // Heights relative to the centre, so that squares lose no digits.
     let level_m = ground.at(x, y)?.height_m;
     for i in -reach..=reach {
         for j in -reach..=reach {

@@ -1,11 +1,11 @@
-//! What a rover draws, by name. The words below a rover's key are frozen: another order is other noise.
+//! Random numbers of a rover, by purpose. The numbers of the purposes are frozen: changing them changes the noise.
 
 use sastrugi_numeric::Counter;
 
-/// What is drawn in a cycle.
+/// Purpose of a random number in a cycle.
 #[derive(Clone, Copy, Debug)]
 pub enum Purpose {
-    /// Turns of a policy that are drawn.
+    /// Random turns of a policy.
     Turn = 0,
     /// Error of a turn.
     Heading = 1,
@@ -13,26 +13,26 @@ pub enum Purpose {
     Drift = 2,
     /// Slip of a drive.
     Slip = 3,
-    /// Error of a sensed height, with the number of the ray or pixel below.
+    /// Error of a sensed height, keyed by the number of the ray or pixel.
     Height = 4,
 }
 
-/// The draws of one rover in one cycle.
+/// The random numbers of one rover in one cycle.
 #[derive(Clone, Copy, Debug)]
 pub struct CycleDraws(Counter);
 
 impl CycleDraws {
-    /// Those of a cycle, from 0, of the rover with this key.
+    /// The random numbers of a cycle, counted from 0, of the rover with this key.
     pub fn new(rover: Counter, cycle: u32) -> Self {
         Self(rover.at(i64::from(cycle)))
     }
 
-    /// A standard normal number.
+    /// A standard normal variate.
     pub fn normal(&self, purpose: Purpose) -> f64 {
         self.0.at(purpose as i64).normal()
     }
 
-    /// A standard normal number for each of many.
+    /// A standard normal variate for each of many items.
     pub fn normal_of(&self, purpose: Purpose, number: usize) -> f64 {
         self.0.at(purpose as i64).at(number as i64).normal()
     }

@@ -1,26 +1,27 @@
-//! Rovers that find their own way: they sense the ground around them, decide, and move, until they reach a goal or give up.
+//! Rovers that find their own way: they sense the ground around them, decide, and move until they reach the goal or give up.
 //!
-//! * [`sensing`] turns ground and pose into a [`View`]: five strips of rays, or four rectangles, safe or not.
-//! * [`policies`] decide on a view: the trait [`Policy`], and two navigators that know nothing else. (A planner to compare with is made elsewhere: its
-//!   search is not of this room.)
-//! * [`motion`] carries out what was decided, with slip and drift where they are asked for.
-//! * [`trial`] drives one rover from a start to a goal; [`starts`] places starts and goals; [`contacts`] counts the rocks met;
-//!   [`efficiency`](mod@efficiency) judges.
-//! * [`obstacles`] maps what a rover that knows everything would keep clear of, to tell hard ground from a poor navigator.
-//! * [`track`] and [`recorder`] keep what tables and recordings show of a way, [`surroundings`] the ground around it.
-//! * [`quantised`] finds heights that come in steps too coarse for rovers.
-//! * [`parameters`] holds every number with its source.
+//! * [`sensing`] computes a [`View`] from ground and pose: five strips of rays, or four rectangles, each safe or not.
+//! * [`policies`] turn a view into a command: the trait [`Policy`], and two navigators that use only the current view. (The
+//!   planner used for comparison is implemented outside this module.)
+//! * [`motion`] executes commands, with slip and drift if noise is enabled.
+//! * [`trial`] drives one rover from a start to a goal; [`starts`] places starts and goals; [`contacts`] counts rock contacts;
+//!   [`efficiency`](mod@efficiency) rates a drive.
+//! * [`obstacles`] maps the obstacles that a rover with complete knowledge would avoid, to separate hard terrain from a poor
+//!   navigator.
+//! * [`track`] and [`recorder`] keep a drive for tables and recordings, [`surroundings`] the ground around it.
+//! * [`quantised`] detects heights quantised too coarsely for rovers.
+//! * [`parameters`] holds every parameter with its source.
 //!
 //! # Source
-//! The paper in `docs/papers/jpl.md`, sections 3 and 4. The flight code was not available to us: what the paper says of the two navigators
-//! is followed, the rest is ours, and marked so.
+//! The paper in `docs/papers/jpl.md`, sections 3 and 4. The flight code was not available: the implementation follows what the
+//! paper states about the two navigators; the rest is our choice and marked as such.
 //!
-//! # Draws
-//! Every draw of a rover is a function of its own key, the cycle and the purpose ([`draws`]): one more turn reshuffles nothing, and two
-//! designs on the same ground share their noise.
+//! # Random numbers
+//! Every random number of a rover is a function of its own key, the cycle and the purpose ([`draws`]): one more turn does not
+//! reshuffle the others, and two designs on the same ground share their noise.
 //!
 //! # Cost
-//! A cycle of rays asks for about 700 points of the ground, one of rectangles for 5000 at cells of 2 cm.
+//! A cycle with rays samples about 700 points of the ground, one with rectangles 5000 at cells of 2 cm.
 
 pub mod contacts;
 pub mod draws;

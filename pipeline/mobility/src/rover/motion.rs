@@ -1,4 +1,4 @@
-//! How a command is carried out: exactly, unless noise is asked for.
+//! Execution of commands: exact, unless noise is enabled.
 
 use super::draws::{CycleDraws, Purpose};
 use super::policies::Command;
@@ -7,24 +7,24 @@ use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Greatest deviation of moves: beyond it nothing is left of a command.
+/// Largest standard deviation of motion noise: beyond it, the motion is independent of the command.
 const DEVIATION_MAX: f64 = 10.0;
 
-/// Noise of sensing and moving; without any by default.
+/// Noise of sensing and motion; none by default.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseParameters {
     /// Standard deviation of sensed heights, m.
     pub height_m: f64,
-    /// Share of a commanded drive that is lost to slip, below 1.
+    /// Share of a commanded distance that is lost to slip, below 1.
     pub slip: f64,
     /// Standard deviation of that share from cycle to cycle.
     pub slip_deviation: f64,
-    /// Standard deviation of a turn over the turn.
+    /// Relative standard deviation of a turn.
     pub turn: f64,
-    /// Standard deviation of the drift of the heading over 1 m of driving, rad; it grows with the square root of the distance.
+    /// Standard deviation of the heading drift over 1 m of driving, rad; it grows with the square root of the distance.
     pub drift_rad: f64,
-    /// Whether the rover knows its place by its own commands alone: errors of turns, drift and slip go unnoticed.
+    /// Whether the rover estimates its position from its own commands alone, so turn errors, drift and slip go unnoticed.
     pub dead_reckoning: bool,
 }
 
@@ -34,27 +34,27 @@ impl NoiseParameters {
     pub fn check(&self) -> Result<(), ParameterError> {
         ParameterError::not_negative("height_m", self.height_m)?;
         if !(0.0..1.0).contains(&self.slip) {
-            return Err(ParameterError::new("slip", format!("is {}; it must be 0 or above and below 1", self.slip)));
+            return Err(ParameterError::new("slip", format!("is {}; it must be at least 0 and below 1", self.slip)));
         }
         let rest = [("slip_deviation", self.slip_deviation), ("turn", self.turn), ("drift_rad", self.drift_rad)];
         rest.into_iter().try_for_each(|(key, value)| {
             ParameterError::not_negative(key, value)?;
-            let most = format!("is {}; it must be {DEVIATION_MAX} or below", shown(value));
-            if value > DEVIATION_MAX { Err(ParameterError::new(key, most)) } else { Ok(()) }
+            let message = format!("is {}; it must be at most {DEVIATION_MAX}", shown(value));
+            if value > DEVIATION_MAX { Err(ParameterError::new(key, message)) } else { Ok(()) }
         })
     }
 }
 
-/// Where a rover truly is, and where it believes to be.
+/// The true pose of a rover and the pose it believes it has.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Poses {
-    /// In truth.
+    /// True pose.
     pub real: Pose,
-    /// By its own reckoning.
+    /// Pose by its own estimate.
     pub believed: Pose,
 }
 
-/// What was carried out of a command.
+/// The actual motion of a cycle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Moved {
     /// Turn to the left, rad.
@@ -64,7 +64,7 @@ pub struct Moved {
 }
 
 impl Poses {
-    /// Carries out a command.
+    /// Executes a command.
     pub fn carry_out(&mut self, command: &Command, noise: &NoiseParameters, draws: &CycleDraws) -> Moved {
         let error = if noise.turn > 0.0 { noise.turn * draws.normal(Purpose::Heading) } else { 0.0 };
         let turn_rad = command.turn_rad * (1.0 + error);

@@ -1,32 +1,32 @@
-//! What a rover that knows the whole map would keep clear of: cells with rocks that it cannot pass over, and sand that is too steep.
+//! Obstacle map for a rover that knows the complete terrain: cells with rocks that it cannot pass over, and sand that is too steep.
 //!
-//! The sand is known by its plane around every half metre of ground ([`super::contacts::sand_plane`]). Obstacles are samples of rock that stand
-//! higher above it than the obstacle height, and the ground where the plane is too steep or nothing is known.
+//! The sand is approximated by a plane around every half metre of ground ([`super::contacts::sand_plane`]). Obstacles are samples of
+//! rock higher above this plane than the obstacle height, and ground where the plane is too steep or the ground is unknown.
 
 use super::contacts::sand_plane;
 use super::sensing::Sensor;
 use super::trial::Task;
 use sastrugi_numeric::{Geometry, Ground, GroundClass, NoGround};
 
-/// Distance between places where the plane of the sand is found, m.
+/// Spacing of the sand planes, m.
 const BLOCK_M: f64 = 0.5;
 /// Cells of the map along the side of such a block.
 const CELLS: usize = 5;
 
-/// What stops a rover.
+/// Limits beyond which ground is an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ObstacleLimits {
-    /// Rocks may stand this high above the sand, m.
+    /// Largest passable height of rocks above the sand, m.
     pub height_m: f64,
-    /// Steepest sand, m per m.
+    /// Steepest passable sand, m per m.
     pub slope_max: f64,
-    /// How far the centre of the rover stays from what stops it, m.
+    /// Distance that the centre of the rover keeps from obstacles, m.
     pub margin_m: f64,
 }
 
 impl Task {
-    /// What the rover's body cannot do: drive nearer than its wheels are to rocks above its clearance, and to sand steeper than its sensor
-    /// lets it drive on.
+    /// Limits of the rover: its centre keeps at least the distance of its wheels from rocks above its clearance and from sand
+    /// steeper than its sensor accepts.
     pub fn obstacle_limits(&self) -> ObstacleLimits {
         let slope_max = match &self.sensor {
             Sensor::Rays(rays) => libm::tan(rays.tilt_max_rad),
@@ -36,7 +36,7 @@ impl Task {
     }
 }
 
-/// Shape and place of a map that holds a rectangle `[west, south, east, north]`, m: whole blocks of cells of 0.1 m.
+/// Geometry of a map that covers a rectangle `[west, south, east, north]`, m, in whole blocks of cells of 0.1 m.
 pub fn map_geometry([west, south, east, north]: [f64; 4]) -> Geometry {
     let first = |at: f64| libm::floor(at / BLOCK_M);
     let count = |low: f64, high: f64| ((libm::ceil(high / BLOCK_M) - first(low)).max(1.0)) as usize;
@@ -54,8 +54,9 @@ pub fn block_rows(map: &Geometry) -> usize {
     map.rows / CELLS
 }
 
-/// Numbers of the cells that one row of blocks, counted from the north, blocks: those whose centre lies within the margin of an obstacle in it,
-/// and those that hold one. Ways over cells that nothing blocks pass an obstacle at the margin less half of a cell's diagonal, or farther off.
+/// Indices of the cells blocked by the obstacles in one row of blocks, counted from the north: cells whose centre lies within the
+/// margin of an obstacle, and cells that contain one. Paths over free cells keep at least the margin minus half a cell diagonal from
+/// every obstacle.
 pub fn blocked(ground: &impl Ground, map: &Geometry, block_row: usize, limits: &ObstacleLimits) -> Vec<usize> {
     let mut cells = Blocked::new(map, block_row, limits.margin_m);
     let north = map.y(block_row * CELLS) + 0.5 * map.cell[1];
@@ -86,7 +87,7 @@ impl<'a> Blocked<'a> {
         Self { map, margin_m, reach, first_row, marked: vec![false; (last_row - first_row) * map.cols] }
     }
 
-    /// Blocks the cells around an obstacle.
+    /// Marks the cells around an obstacle as blocked.
     fn mark(&mut self, [x, y]: [f64; 2]) {
         let Some((row, col)) = self.map.cell_at(x, y) else { return };
         let Self { map, reach, first_row, .. } = *self;
@@ -113,7 +114,7 @@ fn centres([west, south]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
     (0..CELLS * CELLS).map(move |k| [west + at(k % CELLS), south + at(k / CELLS)])
 }
 
-/// Visits what stops a rover in the block with this south-west corner.
+/// Visits the obstacles in the block with this south-west corner.
 fn obstacles(
     ground: &impl Ground,
     [west, south]: [f64; 2],

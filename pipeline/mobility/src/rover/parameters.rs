@@ -1,4 +1,4 @@
-//! Every number of a rover and of its trial, as a study writes it.
+//! Parameters of a rover and of its trial, as written in a study.
 
 use super::motion::NoiseParameters;
 use super::policies::{Policy, SchoppersLike, SchoppersRules, SojournerLike, SojournerRules};
@@ -11,57 +11,58 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Most rovers of a trial: four digits in their ids.
+/// Maximum number of rovers of a trial: their ids have four digits.
 const ROVERS_MAX: u32 = 9999;
-/// Longest part of a body, its sensor or a step, m.
+/// Largest length of a body, its sensor or a step, m.
 const LENGTH_MAX_M: f64 = 20.0;
-/// Greatest scale.
+/// Largest scale.
 const SCALE_MAX: f64 = 10.0;
-/// Most rays or rectangles along a side of a sensor.
+/// Maximum number of rays or rectangles along a side of a sensor.
 const PARTS_MAX: usize = 64;
 
-/// The Sojourner-like navigator: rays, hazards, turning away and back to the goal.
+/// The Sojourner-like navigator: senses along rays, turns away from hazards and back to the goal.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SojournerParameters {
-    /// Factor of all lengths of body, sensor and drives; not of the hazard heights and the clearance, nor of the task: tolerance of the goal and limit of the
-    /// distance.
+    /// Scale factor of all lengths of body, sensor and drives. It does not apply to the hazard heights, the clearance, the
+    /// goal tolerance and the distance limit.
     pub scale: f64,
-    /// Axles ahead of and behind the centre, m (our choice, about the flight rover's).
+    /// Distance of the axles from the centre, m (our choice, approximately that of the flight rover).
     pub axle_m: f64,
-    /// Wheels beside the centre line, m (our choice).
+    /// Distance of the wheels from the centre line, m (our choice).
     pub track_m: f64,
-    /// Nose ahead of the centre, m (our choice).
+    /// Distance of the nose ahead of the centre, m (our choice).
     pub nose_m: f64,
-    /// Height of the sensor above the plane of the wheels' contacts, m (our choice).
+    /// Height of the sensor above the plane of the wheel contacts, m (our choice).
     pub sensor_height_m: f64,
-    /// Columns of rays to the left of the centre line, from left to right, m (the paper: 20 rays; their places are our choice).
+    /// Lateral offsets of the ray columns from the centre line, left positive, from left to right, m (the paper: 20 rays; their
+    /// positions are our choice).
     pub columns_m: Vec<f64>,
-    /// Where the rays of a column are aimed, beyond the nose, m (our choice).
+    /// Distances beyond the nose at which the rays of a column are aimed, m (our choice).
     pub rows_m: Vec<f64>,
-    /// Hazard height, m (our choice: the radius of a wheel).
+    /// Hazard height, m (our choice: the wheel radius).
     pub hazard_step_m: f64,
-    /// Largest difference of heights in a view without a hazard, m (our choice: the diameter of a wheel).
+    /// Largest height difference in a view without a hazard, m (our choice: the wheel diameter).
     pub hazard_span_m: f64,
     /// Largest tilt, deg (our choice).
     pub tilt_max_deg: f64,
-    /// Turn of a cycle, deg (our choice).
+    /// Turn per cycle, deg (our choice).
     pub turn_deg: f64,
     /// Standard deviation of a turn away from a hazard, rad (our choice).
     pub turn_noise_rad: f64,
-    /// Drive straight on after a hazard, m (our choice).
+    /// Distance driven straight on after a hazard, m (our choice).
     pub pass_m: f64,
-    /// Drive of a cycle, m (the paper: at most the radius of a wheel, 65 mm).
+    /// Distance driven per cycle, m (the paper: at most the wheel radius, 65 mm).
     pub step_m: f64,
-    /// Error of the bearing to the goal that is let be, rad (our choice).
+    /// Bearing error to the goal that is not corrected, rad (our choice).
     pub bearing_tolerance_rad: f64,
-    /// Distance from the goal at which a rover of any `scale` has arrived, m (our choice).
+    /// Distance from the goal within which a rover has arrived, whatever its `scale`, m (our choice).
     pub goal_tolerance_m: f64,
-    /// Rocks that stand higher above the sand count as contacts when they come under the rover, m (our choice: the diameter of a wheel).
+    /// Height above the sand over which a rock under the rover counts as a contact, m (our choice: the wheel diameter).
     pub clearance_m: f64,
-    /// Farthest drive, m (our choice; the longest of the paper: 902.5).
+    /// Largest distance driven, m (our choice; the longest in the paper: 902.5).
     pub distance_limit_m: f64,
-    /// Most cycles (our choice).
+    /// Maximum number of cycles (our choice).
     pub cycle_limit: u32,
 }
 
@@ -91,51 +92,51 @@ impl Default for SojournerParameters {
     }
 }
 
-/// The Schoppers-like navigator: four rectangles, safe or unsafe, by perfect sensing.
+/// The Schoppers-like navigator: perfect sensing classifies four rectangles as safe or unsafe.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SchoppersParameters {
-    /// Factor of all lengths of body, sensor and drives, `progress_m` among them; not of the clearance, nor of the task: tolerance of the goal and limit of
-    /// the distance.
+    /// Scale factor of all lengths of body, sensor and drives, including `progress_m`. It does not apply to the clearance, the
+    /// goal tolerance and the distance limit.
     pub scale: f64,
-    /// Axles ahead of and behind the centre, m (our choice).
+    /// Distance of the axles from the centre, m (our choice).
     pub axle_m: f64,
-    /// Wheels beside the centre line, m (our choice).
+    /// Distance of the wheels from the centre line, m (our choice).
     pub track_m: f64,
-    /// Near edge of the sensor ahead of the centre, m (our choice).
+    /// Distance of the near edge of the sensor ahead of the centre, m (our choice).
     pub sensor_near_m: f64,
-    /// Extent of the sensor ahead, m (the paper: 1).
+    /// Length of the sensed area, m (the paper: 1).
     pub sensor_length_m: f64,
-    /// Extent of the sensor to both sides together, m (the paper: 2).
+    /// Total width of the sensed area, m (the paper: 2).
     pub sensor_width_m: f64,
     /// Rectangles of the sensor, side by side, at least 2 (the paper: 4).
     pub rectangles: u32,
-    /// Rocks that stand higher above the sand make a rectangle unsafe, and count as contacts when they come under the rover, m (our choice:
-    /// the diameter of a wheel).
+    /// Height above the sand over which a rock makes a rectangle unsafe, and counts as a contact under the rover, m (our choice:
+    /// the wheel diameter).
     pub clearance_m: f64,
     /// Steepest safe sand, deg (our choice).
     pub slope_max_deg: f64,
     /// Largest tilt of the rover itself, deg (our choice).
     pub tilt_max_deg: f64,
-    /// Turn of a cycle, deg (our choice).
+    /// Turn per cycle, deg (our choice).
     pub turn_deg: f64,
-    /// Drive of a cycle, m (our choice).
+    /// Distance driven per cycle, m (our choice).
     pub step_m: f64,
-    /// Error of the bearing at which it turns to the goal whatever is beside it, rad (our choice).
+    /// Bearing error below which it turns to the goal even if the outer rectangle on that side is unsafe, rad (our choice).
     pub bearing_tolerance_rad: f64,
-    /// Drive after a turn away before it turns to the goal again, m (our choice).
+    /// Commitment: distance driven after turning away before it turns to the goal again, m (our choice).
     pub commit_m: f64,
-    /// Factor of that after a full turn without a way (our choice).
+    /// Growth factor of the commitment after a full turn without finding a way (our choice).
     pub commit_growth: f64,
-    /// Largest such drive, m (our choice).
+    /// Largest commitment, m (our choice).
     pub commit_max_m: f64,
-    /// Nearer to the goal by this, the drive is the first one again, m (our choice).
+    /// Progress towards the goal after which the commitment is reset to `commit_m`, m (our choice).
     pub progress_m: f64,
-    /// Distance from the goal at which a rover of any `scale` has arrived, m (our choice).
+    /// Distance from the goal within which a rover has arrived, whatever its `scale`, m (our choice).
     pub goal_tolerance_m: f64,
-    /// Farthest drive, m (our choice).
+    /// Largest distance driven, m (our choice).
     pub distance_limit_m: f64,
-    /// Most cycles (our choice).
+    /// Maximum number of cycles (our choice).
     pub cycle_limit: u32,
 }
 
@@ -166,21 +167,21 @@ impl Default for SchoppersParameters {
     }
 }
 
-/// The planner to compare with: it searches a way over what its sensor has shown of the ground, and knows nothing else.
+/// The planner for comparison: it searches a path over the ground seen so far by its sensor, and knows nothing else.
 #[derive(Clone, Debug, Serialize)]
 pub struct PlannerParameters {
-    /// The navigator whose body and sensor it has; the rules of that one do not count.
+    /// The navigator whose body and sensor it uses; that navigator's rules do not apply.
     #[serde(flatten)]
     pub eyes: PlannerEyes,
-    /// What it plans with.
+    /// The map on which it plans.
     #[serde(flatten)]
     pub map: PlannerMap,
-    /// Its search, which is not of this room.
+    /// Its search, implemented outside this module.
     #[serde(skip)]
     pub mind: fn(&PlannerParameters) -> Box<dyn Policy>,
 }
 
-/// What a planner sees with.
+/// Body and sensor of a planner.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 #[serde(untagged)]
 pub enum PlannerEyes {
@@ -190,7 +191,7 @@ pub enum PlannerEyes {
     Rectangles(SchoppersParameters),
 }
 
-/// Name of the sensor of a planner.
+/// Sensor of a planner, by name.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum PlannerSensor {
@@ -201,16 +202,16 @@ pub enum PlannerSensor {
     Rectangles,
 }
 
-/// The map that a planner keeps of what it has seen.
+/// The planner's map of the ground seen so far.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct PlannerMap {
-    /// What it sees with: the sensor of the Sojourner-like or of the Schoppers-like navigator, with the body and the limits of that one.
+    /// Sensor: that of the Sojourner-like or of the Schoppers-like navigator, with the body and limits of that navigator.
     #[serde(skip_serializing)]
     pub sensor: PlannerSensor,
-    /// Side of the cells of its map, m (our choice: that of the oracle's).
+    /// Cell size of its map, m (our choice: that of the oracle's map).
     pub map_cell_m: f64,
-    /// How far its map reaches beyond start and goal at first, m; it grows where a way needs more (our choice).
+    /// Initial margin of its map around start and goal, m; the map grows if a path needs more (our choice).
     pub map_beyond_m: f64,
 }
 
@@ -220,7 +221,7 @@ impl Default for PlannerMap {
     }
 }
 
-/// A navigator with its numbers.
+/// A navigator with its parameters.
 #[derive(Clone, Debug, Serialize)]
 #[serde(untagged)]
 pub enum Navigator {
@@ -228,7 +229,7 @@ pub enum Navigator {
     Sojourner(SojournerParameters),
     /// Rectangles.
     Schoppers(SchoppersParameters),
-    /// A search over what has been seen.
+    /// A search over the ground seen so far.
     Planner(PlannerParameters),
 }
 
@@ -239,11 +240,11 @@ pub enum Starts {
     /// At equal angles on a circle about the common goal.
     #[default]
     Circle,
-    /// At drawn places in a disk, with goals `distance_m` away in drawn directions; drawn again where there is no ground.
+    /// At random points in a disk, with goals `distance_m` away in random directions; drawn again off the known ground.
     Drawn,
 }
 
-/// A trial: what is the same whatever the navigator.
+/// A trial: the parameters that do not depend on the navigator.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RoverParameters {
@@ -251,23 +252,23 @@ pub struct RoverParameters {
     pub rovers: u32,
     /// Where they start.
     pub starts: Starts,
-    /// Centre of the circle or disk, m; for circles the goal.
+    /// Centre of the circle or disk, m; on a circle it is the goal.
     pub centre_m: [f64; 2],
     /// Radius of the circle or disk, m (the paper: 25).
     pub radius_m: f64,
     /// Distance from drawn starts to their goals, m.
     pub distance_m: f64,
-    /// Which way rovers face at the start (our choice; those that face the goal come out better).
+    /// Which way rovers face at the start (our choice; rovers that face the goal do better).
     pub facing: Facing,
-    /// Radius around starts and goals that is kept free of rocks, m (our choice); on planetary worlds alone.
+    /// Radius around starts and goals that is kept free of rocks, m (our choice); on planetary worlds only.
     pub clear_m: f64,
-    /// Distance of the samples of the ground, m (the paper: 0.02); on planetary worlds alone, other terrains have their cells.
+    /// Sample spacing of the ground, m (the paper: 0.02); on planetary worlds only, other terrains use their own cells.
     pub cell_m: f64,
-    /// Speed of a drive, m/s (our choice).
+    /// Driving speed, m/s (our choice).
     pub speed_m_s: f64,
-    /// Speed of a turn, deg/s (our choice).
+    /// Turn rate, deg/s (our choice).
     pub turn_rate_deg_s: f64,
-    /// Noise of sensing and moving.
+    /// Noise of sensing and motion.
     pub noise: NoiseParameters,
 }
 
@@ -291,7 +292,7 @@ impl Default for RoverParameters {
 
 impl RoverParameters {
     /// # Errors
-    /// A value out of range, or starts that are their goals.
+    /// A value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
         if !(1..=ROVERS_MAX).contains(&self.rovers) {
             return Err(ParameterError::new("rovers", format!("is {}; it must be 1 to {ROVERS_MAX}", self.rovers)));
@@ -303,13 +304,13 @@ impl RoverParameters {
         ParameterError::positive("distance_m", self.distance_m)?;
         ParameterError::not_negative("clear_m", self.clear_m)?;
         ParameterError::positive("cell_m", self.cell_m)?;
-        // Poses are judged once a second.
+        // Poses are sampled once a second.
         ParameterError::between("speed_m_s", self.speed_m_s, 1e-5, 1e3)?;
         ParameterError::between("turn_rate_deg_s", self.turn_rate_deg_s, 1e-3, 1e5)?;
         self.noise.check().map_err(|e| e.within("noise"))
     }
 
-    /// Starts and goals; draws are those of the streams. Drawn ones lie on the ground, if any are found there.
+    /// Starts and goals, drawn from the streams. Drawn starts and goals lie on known ground if any such place is found.
     pub fn starts(&self, streams: &Streams, on_ground: impl Fn([f64; 2]) -> bool) -> Vec<Start> {
         let Self { rovers, centre_m, radius_m, distance_m, facing, .. } = *self;
         match self.starts {
@@ -320,10 +321,10 @@ impl RoverParameters {
         }
     }
 
-    /// Starts and goals must be farther apart than the tolerance within which a rover has arrived.
+    /// Starts and goals must be farther apart than the goal tolerance.
     ///
     /// # Errors
-    /// A radius or distance that is not.
+    /// A radius or distance within the goal tolerance.
     pub fn check_apart(&self, goal_tolerance_m: f64) -> Result<(), ParameterError> {
         let straight_m = self.straight_m();
         if straight_m > goal_tolerance_m {
@@ -334,7 +335,7 @@ impl RoverParameters {
             Starts::Drawn => "distance_m",
         };
         let message = format!(
-            "is {straight_m} m; it must exceed the {goal_tolerance_m} m within which a rover has arrived (`goal_tolerance_m`)"
+            "is {straight_m} m; it must exceed `goal_tolerance_m`, {goal_tolerance_m} m, within which a rover has arrived"
         );
         Err(ParameterError::new(key, message))
     }
@@ -352,7 +353,7 @@ fn all_positive(values: &[(&str, f64)]) -> Result<(), ParameterError> {
     values.iter().try_for_each(|(key, value)| ParameterError::positive(key, *value).map(|_| ()))
 }
 
-/// Lengths of a body, its sensor and its steps: up to what samples and recordings have room for.
+/// Checks lengths of a body, its sensor and its steps: they are limited by what samples and recordings can hold.
 fn lengths(values: &[(&str, f64)]) -> Result<(), ParameterError> {
     values.iter().try_for_each(|(key, value)| ParameterError::between(key, *value, 0.0, LENGTH_MAX_M).map(|_| ()))
 }
@@ -361,19 +362,19 @@ fn angle(key: &str, value_deg: f64) -> Result<(), ParameterError> {
     ParameterError::between(key, value_deg, 0.0, 90.0).map(|_| ())
 }
 
-/// A list of 1 to 64 lengths that goes one way.
-fn in_order(key: &str, values: &[f64], rising: bool) -> Result<(), ParameterError> {
-    let goes = |w: &[f64]| if rising { w[0] < w[1] } else { w[0] > w[1] };
-    let ordered = values.iter().all(|v| v.is_finite()) && values.windows(2).all(goes);
+/// Checks a list of 1 to 64 strictly monotone lengths.
+fn monotone(key: &str, values: &[f64], rising: bool) -> Result<(), ParameterError> {
+    let in_order = |w: &[f64]| if rising { w[0] < w[1] } else { w[0] > w[1] };
+    let ordered = values.iter().all(|v| v.is_finite()) && values.windows(2).all(in_order);
     if ordered && (1..=PARTS_MAX).contains(&values.len()) {
         return Ok(());
     }
-    let way = if rising { "rise" } else { "fall" };
-    Err(ParameterError::new(key, format!("must hold 1 to {PARTS_MAX} numbers that {way}")))
+    let order = if rising { "increasing" } else { "decreasing" };
+    Err(ParameterError::new(key, format!("must hold 1 to {PARTS_MAX} finite numbers in {order} order")))
 }
 
 fn cycles(limit: u32) -> Result<(), ParameterError> {
-    if limit > 0 { Ok(()) } else { Err(ParameterError::new("cycle_limit", "is 0; it must be 1 or more")) }
+    if limit > 0 { Ok(()) } else { Err(ParameterError::new("cycle_limit", "is 0; it must be at least 1")) }
 }
 
 impl SojournerParameters {
@@ -395,14 +396,14 @@ impl SojournerParameters {
             ("clearance_m", self.clearance_m),
             ("distance_limit_m", self.distance_limit_m),
         ])?;
-        in_order("columns_m", &self.columns_m, false)?;
-        in_order("rows_m", &self.rows_m, true)?;
+        monotone("columns_m", &self.columns_m, false)?;
+        monotone("rows_m", &self.rows_m, true)?;
         ParameterError::positive("rows_m.0", self.rows_m[0])?;
         let reach_m = self.columns_m.iter().chain(&self.rows_m).fold(0.0, |far: f64, at| far.max(at.abs()));
         if reach_m >= LENGTH_MAX_M {
             return Err(ParameterError::new(
                 "rows_m",
-                format!("and `columns_m` reach {reach_m} m; they must end below {LENGTH_MAX_M}"),
+                format!("and `columns_m` reach {reach_m} m; they must stay below {LENGTH_MAX_M} m"),
             ));
         }
         angle("tilt_max_deg", self.tilt_max_deg)?;
@@ -469,7 +470,7 @@ impl SchoppersParameters {
         angle("turn_deg", self.turn_deg)?;
         ParameterError::not_negative("bearing_tolerance_rad", self.bearing_tolerance_rad)?;
         if !(self.commit_growth >= 1.0 && self.commit_growth.is_finite()) {
-            let message = format!("is {}; it must be a finite number, 1 or above", self.commit_growth);
+            let message = format!("is {}; it must be a finite number of at least 1", self.commit_growth);
             return Err(ParameterError::new("commit_growth", message));
         }
         cycles(self.cycle_limit)
@@ -502,11 +503,11 @@ impl SchoppersParameters {
 }
 
 impl Navigator {
-    /// Name of the Sojourner-like one in studies and tables.
+    /// Name of the Sojourner-like navigator in studies and tables.
     pub const SOJOURNER: &str = "sojourner_like";
-    /// Name of the Schoppers-like one.
+    /// Name of the Schoppers-like navigator.
     pub const SCHOPPERS: &str = "schoppers_like";
-    /// Name of the one that plans.
+    /// Name of the planner.
     pub const PLANNER: &str = "planner";
 
     /// Name in studies and tables.
@@ -528,7 +529,7 @@ impl Navigator {
         }
     }
 
-    /// A policy at the start.
+    /// A policy in its initial state.
     pub fn policy(&self) -> Box<dyn Policy> {
         match self {
             Self::Sojourner(p) => Box::new(SojournerLike::new(p.rules())),
@@ -537,7 +538,7 @@ impl Navigator {
         }
     }
 
-    /// The task of its rovers in a trial.
+    /// The task of a rover in a trial.
     pub fn task(&self, trial: &RoverParameters) -> Task {
         match self {
             Self::Sojourner(p) => p.task(trial),
@@ -558,7 +559,7 @@ impl PlannerParameters {
         all_positive(&[("map_cell_m", self.map.map_cell_m), ("map_beyond_m", self.map.map_beyond_m)])
     }
 
-    /// The task of its rovers in a trial.
+    /// The task of a rover in a trial.
     pub fn task(&self, trial: &RoverParameters) -> Task {
         match &self.eyes {
             PlannerEyes::Rays(p) => p.task(trial),
@@ -566,7 +567,7 @@ impl PlannerParameters {
         }
     }
 
-    /// Turn of a cycle, rad.
+    /// Turn per cycle, rad.
     pub fn turn_rad(&self) -> f64 {
         match &self.eyes {
             PlannerEyes::Rays(p) => p.turn_deg.to_radians(),
@@ -574,7 +575,7 @@ impl PlannerParameters {
         }
     }
 
-    /// Drive of a cycle, m.
+    /// Distance driven per cycle, m.
     pub fn step_m(&self) -> f64 {
         match &self.eyes {
             PlannerEyes::Rays(p) => p.step_m * p.scale,

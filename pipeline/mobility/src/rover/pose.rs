@@ -1,14 +1,14 @@
-//! Where a rover is, and how it stands.
+//! Position, heading and attitude of a rover.
 
 use sastrugi_numeric::{Ground, NoGround};
 use std::f64::consts::{PI, TAU};
 
-/// Place and heading in plan.
+/// Position and heading in plan.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Pose {
     /// Centre, m.
     pub position_m: [f64; 2],
-    /// From east to north, rad.
+    /// Counterclockwise from east, rad.
     pub heading_rad: f64,
 }
 
@@ -19,17 +19,17 @@ impl Pose {
         Axes { origin_m: self.position_m, sin, cos }
     }
 
-    /// A point of the rover's own axes (ahead, left), m, in those of the terrain.
+    /// Transforms a point from the rover's own axes (ahead, left), m, to those of the terrain.
     pub fn to_ground(&self, point: [f64; 2]) -> [f64; 2] {
         self.axes().to_ground(point)
     }
 
-    /// The same place after a turn to the left.
+    /// The pose after a turn to the left.
     pub fn turned(&self, angle_rad: f64) -> Self {
         Self { heading_rad: wrapped(self.heading_rad + angle_rad), ..*self }
     }
 
-    /// The pose after a drive ahead, or back.
+    /// The pose after a drive ahead; back if negative.
     pub fn driven(&self, distance_m: f64) -> Self {
         Self { position_m: self.to_ground([distance_m, 0.0]), ..*self }
     }
@@ -46,7 +46,7 @@ impl Pose {
     }
 }
 
-/// Axes of a rover (ahead, left): for many points of one pose, whose heading is turned into sine and cosine once.
+/// Axes of a rover (ahead, left), for transforming many points of one pose: sine and cosine of the heading are computed once.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Axes {
     origin_m: [f64; 2],
@@ -55,7 +55,7 @@ pub struct Axes {
 }
 
 impl Axes {
-    /// A point (ahead, left), m, in the axes of the terrain.
+    /// Transforms a point (ahead, left), m, to the axes of the terrain.
     #[inline]
     pub fn to_ground(&self, [ahead, left]: [f64; 2]) -> [f64; 2] {
         let Self { origin_m: [x, y], sin, cos } = *self;
@@ -63,13 +63,13 @@ impl Axes {
     }
 }
 
-/// An angle in -pi to pi.
+/// An angle wrapped to -pi to pi.
 pub fn wrapped(angle_rad: f64) -> f64 {
     let turns = (angle_rad / TAU).round();
     (angle_rad - turns * TAU).clamp(-PI, PI)
 }
 
-/// What a rover stands on, and what it is wide.
+/// Wheel geometry of a rover.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Chassis {
     /// Distance of the axles from the centre, m.
@@ -78,7 +78,7 @@ pub struct Chassis {
     pub track_m: f64,
 }
 
-/// How a rover stands: the plane nearest to its four wheels' heights.
+/// Height and attitude of a rover: the least-squares plane through the heights of its four wheels.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Body {
     /// Height of the plane at the centre, m.
@@ -91,7 +91,7 @@ impl Body {
     /// A rover on its four wheels.
     ///
     /// # Errors
-    /// A wheel over ground that is not known.
+    /// A wheel over unknown ground.
     pub fn standing(ground: &impl Ground, pose: &Pose, chassis: &Chassis) -> Result<Self, NoGround> {
         let Chassis { axle_m: a, track_m: t } = *chassis;
         let axes = pose.axes();

@@ -1,4 +1,4 @@
-//! What a recording shows of a rover's way: every cycle with what it saw, plans, events.
+//! Recording of a rover's drive: every cycle with its view, plans and events.
 
 use super::pose::{Body, Pose};
 use super::sensing::{Area, Ray, View};
@@ -7,22 +7,22 @@ use sastrugi_schemas::topics::{
     RoverCycle, RoverEvent, RoverEventKind, RoverPlan, RoverRecording, SeenArea, SeenRay, StateSample,
 };
 
-/// A recording as it comes.
+/// A recording in progress.
 pub struct Recorder<'a> {
     task: &'a Task,
     recording: RoverRecording,
-    /// Whether the cycle before saw a hazard, and whether it turned.
+    /// Whether the previous cycle saw a hazard, and whether it turned.
     before: [bool; 2],
 }
 
 impl<'a> Recorder<'a> {
-    /// A recording of a rover that stands at its start.
+    /// An empty recording.
     pub fn new(task: &'a Task) -> Self {
         let (axle_m, track_m) = (task.chassis.axle_m, task.chassis.track_m);
         Self { task, recording: RoverRecording { axle_m, track_m, ..RoverRecording::default() }, before: [false; 2] }
     }
 
-    /// Takes a cycle of a rover that makes for a goal, m.
+    /// Adds a cycle of a rover on its way to a goal, m.
     pub fn add(&mut self, cycle: &Cycle<'_>, goal_m: [f64; 2]) {
         self.add_events(cycle, goal_m);
         let height_m = cycle.body.height_m;
@@ -73,27 +73,27 @@ impl<'a> Recorder<'a> {
         if now[0] && !self.before[0] {
             let areas = cycle.view.areas.iter().filter(|area| area.hazard).count();
             let text = match cycle.view.tilted {
-                true => format!("tilts by {:.1} deg, over its limit", cycle.body.tilt_rad().to_degrees()),
+                true => format!("tilts by {:.1} deg, beyond its limit", cycle.body.tilt_rad().to_degrees()),
                 false => format!("sees a hazard in {areas} of {} areas", cycle.view.areas.len()),
             };
             self.event(cycle.time_s, RoverEventKind::Hazard, text);
         }
         if now[1] && !self.before[1] {
             let side = if cycle.moved.turn_rad > 0.0 { "left" } else { "right" };
-            self.event(cycle.time_s, RoverEventKind::Turn, format!("turns to the {side}: {}", cycle.state));
+            self.event(cycle.time_s, RoverEventKind::Turn, format!("turns {side}: {}", cycle.state));
         }
         if cycle.moved.drive_m < 0.0 {
-            self.event(cycle.time_s, RoverEventKind::Reversal, format!("drives back by {:.3} m", -cycle.moved.drive_m));
+            self.event(cycle.time_s, RoverEventKind::Reversal, format!("drives back {:.3} m", -cycle.moved.drive_m));
         }
         self.before = now;
     }
 
-    /// Contacts beyond those that are recorded.
+    /// Adds the contacts that are not yet recorded.
     fn add_contacts(&mut self, time_s: f64, contacts: u32, [x, y]: [f64; 2]) {
         let known = self.recording.events.iter().filter(|event| event.kind == RoverEventKind::Contact).count();
         for number in known + 1..=contacts as usize {
             let limit_m = self.task.clearance_m;
-            let text = format!("rock {number} above {limit_m} m comes under the rover at ({x:.2}, {y:.2}) m");
+            let text = format!("contact {number}: a rock above {limit_m} m under the rover at ({x:.2}, {y:.2}) m");
             self.event(time_s, RoverEventKind::Contact, text);
         }
     }
@@ -102,7 +102,8 @@ impl<'a> Recorder<'a> {
         self.recording.events.push(RoverEvent { time_s, kind, text });
     }
 
-    /// The recording of a finished drive; `states` are its poses at [`RoverRecording::RATE_HZ`], `note` says why it went no farther.
+    /// The recording of a finished drive; `states` are its poses at [`RoverRecording::RATE_HZ`], `note` is the reason why it did not
+    /// arrive.
     pub fn finish(mut self, drive: &Drive, states: Vec<StateSample>, note: Option<&str>) -> RoverRecording {
         self.add_contacts(drive.time_s, drive.contacts.anywhere, drive.last.position_m);
         let arrived =
@@ -113,7 +114,7 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// What tells two plans apart: the way points beyond the place of the rover.
+/// The waypoints beyond the position of the rover, by which two plans are compared.
 fn ends(points_m: &[[f64; 3]]) -> Vec<[f64; 2]> {
     points_m.iter().skip(1).map(|[x, y, _]| [*x, *y]).collect()
 }
@@ -138,7 +139,7 @@ fn seen_area(area: &Area, pose: &Pose, body: &Body) -> SeenArea {
     SeenArea { corners_m: area.corners_m.map(corner), hazard: area.hazard }
 }
 
-/// Rays with the hazard of their column.
+/// Rays with the hazard flag of their column.
 fn seen_rays(view: &View) -> Vec<SeenRay> {
     let rows = view.rays.len().checked_div(view.areas.len()).unwrap_or(0).max(1);
     let seen = |(k, ray): (usize, &Ray)| SeenRay {

@@ -1,6 +1,6 @@
-//! The sand around a rock: the least-squares plane through points of sand.
+//! The sand around a rock: the least-squares plane through sand points.
 
-/// Fewest points that make a plane.
+/// Smallest number of points for a plane.
 const SAND_MIN: f64 = 10.0;
 
 /// A plane `z = level + slopes . (ahead, left)`.
@@ -28,7 +28,7 @@ impl PlaneSums {
         [x * x, x * y, y * y, x * z, y * z].iter().zip(&mut self.second).for_each(|(v, sum)| *sum += v);
     }
 
-    /// The sums of both.
+    /// Adds the sums of another set of points.
     pub fn plus(mut self, other: &Self) -> Self {
         self.count += other.count;
         self.first.iter_mut().zip(other.first).for_each(|(a, b)| *a += b);
@@ -36,7 +36,7 @@ impl PlaneSums {
         self
     }
 
-    /// The plane; `None` for too few points, or points on a line.
+    /// The plane; `None` for too few or collinear points.
     pub fn plane(&self) -> Option<SandPlane> {
         let n = self.count;
         let [x, y, z] = self.first.map(|sum| sum / n);

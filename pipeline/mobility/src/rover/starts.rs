@@ -1,4 +1,4 @@
-//! Where rovers start, and where they are to go.
+//! Starts and goals of rovers.
 
 use super::pose::Pose;
 use sastrugi_numeric::{Stream, Streams};
@@ -6,7 +6,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::{PI, TAU};
 
-/// How often a start is drawn before one off the ground is kept.
+/// Maximum number of draws of a start; the last one is kept even if it is off the ground.
 pub const DRAWS_MAX: u32 = 1000;
 
 /// A start and its goal.
@@ -24,10 +24,10 @@ pub struct Start {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Facing {
-    /// Any way: headings are drawn.
+    /// In a random direction.
     #[default]
     Drawn,
-    /// To the goal.
+    /// Towards the goal.
     Goal,
 }
 
@@ -43,7 +43,7 @@ impl Start {
         Pose { position_m: self.start_m, heading_rad: self.heading_rad }
     }
 
-    /// The same with the heading that is asked for.
+    /// The same start with the heading given by `facing`.
     fn turned(self, facing: Facing, stream: &mut Stream) -> Self {
         match facing {
             Facing::Drawn => Self { heading_rad: stream.uniform_in(-PI, PI), ..self },
@@ -52,12 +52,22 @@ impl Start {
     }
 }
 
-/// The draws of a start: each has a stream of its own, so that more rovers move none.
+/// The random stream of a start: each start has its own, so a larger number of rovers leaves the earlier ones unchanged.
 fn stream(streams: &Streams, k: u32) -> Stream {
     streams.stream(&format!("start-{:04}", k + 1))
 }
 
-/// Rovers at equal angles on a circle, the first in the east, on to the north; the goal is its centre.
+/// Starts at equal angles on a circle, counterclockwise from the east; the goal is its centre.
+///
+/// ```
+/// use sastrugi_mobility::rover::starts::{Facing, on_circle};
+/// use sastrugi_numeric::Streams;
+///
+/// let starts = on_circle(4, [0.0, 0.0], 25.0, Facing::Goal, &Streams::for_seed(1, "rover"));
+/// let [x, y] = starts[1].start_m;
+/// assert!(x.abs() < 1e-12 && (y - 25.0).abs() < 1e-12);
+/// assert!(starts[1].pose().bearing_error_rad([0.0, 0.0]).abs() < 1e-12);
+/// ```
 pub fn on_circle(count: u32, centre_m: [f64; 2], radius_m: f64, facing: Facing, streams: &Streams) -> Vec<Start> {
     let start = |k: u32| {
         let (sin, cos) = libm::sincos(TAU * f64::from(k) / f64::from(count));
@@ -67,14 +77,14 @@ pub fn on_circle(count: u32, centre_m: [f64; 2], radius_m: f64, facing: Facing, 
     (0..count).map(start).collect()
 }
 
-/// Where starts and goals are drawn.
+/// The disk in which starts are drawn, and the distance to their goals.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disk {
-    /// Its centre, m.
+    /// Centre, m.
     pub centre_m: [f64; 2],
-    /// Its radius, m.
+    /// Radius, m.
     pub radius_m: f64,
-    /// From start to goal, m.
+    /// Distance from start to goal, m.
     pub distance_m: f64,
 }
 
@@ -88,7 +98,8 @@ impl Disk {
     }
 }
 
-/// Starts at drawn places in a disk, and goals in drawn directions. Each is drawn again, up to [`DRAWS_MAX`] times, until both are `on_ground`.
+/// Starts at random points in a disk, with goals in random directions. Each pair is drawn again, up to [`DRAWS_MAX`] times, until
+/// both points are `on_ground`.
 pub fn drawn(
     count: u32,
     disk: &Disk,

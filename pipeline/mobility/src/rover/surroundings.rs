@@ -1,25 +1,25 @@
-//! The ground around a rover's way as a grid, for recordings: heights, and what is rock.
+//! The ground around a rover's path as a grid, for recordings: heights, and rock or sand.
 
 use sastrugi_numeric::{Geometry, Grid, Ground, GroundClass};
 use sastrugi_schemas::topics::{RoverRecording, SeenArea};
 
-/// Most cells of a grid.
+/// Maximum number of cells of a grid.
 const CELLS_MAX: f64 = 262_144.0;
-/// How far the grid reaches beyond the way and what was seen from it, m.
+/// Margin of the grid around the path and the areas seen from it, m.
 const BEYOND_M: f64 = 1.0;
 
-/// The ground around a way.
+/// The ground around a path.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Surroundings {
-    /// Heights, m; NaN where the ground is not known.
+    /// Heights, m; NaN where the ground is unknown.
     pub heights: Grid,
-    /// Whether it is rock, cell by cell; `None` where it is not known.
+    /// Class of each cell, rock or sand; `None` where it is unknown.
     pub classes: Grid<Option<GroundClass>>,
 }
 
 impl Surroundings {
-    /// Samples of the ground around the way of a recording and around its ends, m: as fine as the ground, or two, four ... times coarser where
-    /// that would be too many.
+    /// Samples of the ground around the path of a recording and around its ends, m: at the resolution of the ground, or coarser by a
+    /// power of two if that would be too many cells.
     pub fn of(ground: &impl Ground, recording: &RoverRecording, ends_m: [[f64; 2]; 2]) -> Self {
         let seen = recording.cycles.iter().flat_map(|cycle| &cycle.areas).flat_map(|area: &SeenArea| &area.corners_m);
         let way = recording.states.iter().map(|state| &state.position_m);
@@ -42,7 +42,7 @@ impl Surroundings {
     }
 }
 
-/// Cells at whole multiples of their side that hold a rectangle.
+/// A grid aligned to multiples of its cell size that covers a rectangle.
 fn geometry(ground_cell_m: f64, low: [f64; 2], high: [f64; 2]) -> Geometry {
     let mut cell = ground_cell_m;
     while (high[0] - low[0]) * (high[1] - low[1]) > CELLS_MAX * cell * cell {

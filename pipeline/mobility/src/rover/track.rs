@@ -1,4 +1,4 @@
-//! What is kept of a rover's way: samples every so far, and poses at a fixed rate for the figures that judge vehicles.
+//! Track of a rover's drive: samples at a fixed spacing, and poses at a fixed rate for the vehicle metrics.
 
 use super::motion::Moved;
 use super::pose::{Body, Pose};
@@ -11,17 +11,17 @@ use sastrugi_schemas::topics::{RoverRecording, StateSample};
 /// Rate of the poses for metrics, Hz.
 pub const METRICS_RATE_HZ: f64 = RoverRecording::RATE_HZ;
 
-/// What is kept of a finished drive.
+/// Track of a finished drive.
 pub struct Tracked {
-    /// Samples, without the names of terrain and rover.
+    /// Samples, without the ids of terrain and rover.
     pub samples: Vec<RoverSampleRow>,
-    /// The figures that judge vehicles.
+    /// The vehicle metrics.
     pub metrics: Metrics,
     /// Poses at [`METRICS_RATE_HZ`].
     pub states: Vec<StateSample>,
 }
 
-/// A rover's way as it comes.
+/// The track of a drive in progress.
 pub struct Track<'a, G> {
     ground: &'a G,
     task: &'a Task,
@@ -32,12 +32,12 @@ pub struct Track<'a, G> {
 }
 
 impl<'a, G: Ground> Track<'a, G> {
-    /// A track with a sample every `sample_m` metres of driving; one every cycle for 0.
+    /// A track with one sample every `sample_m` metres of driving; if 0, one per cycle.
     pub fn new(ground: &'a G, task: &'a Task, sample_m: f64) -> Self {
         Self { ground, task, sample_m, next_m: 0.0, samples: Vec::new(), states: Vec::new() }
     }
 
-    /// Takes a cycle.
+    /// Adds a cycle.
     pub fn add(&mut self, cycle: &Cycle<'_>) {
         if cycle.distance_m >= self.next_m {
             self.next_m = if self.sample_m > 0.0 { cycle.distance_m + self.sample_m } else { 0.0 };
@@ -47,7 +47,7 @@ impl<'a, G: Ground> Track<'a, G> {
         self.add_states(cycle);
     }
 
-    /// Poses at the fixed rate while the cycle's command is carried out: the turn, then the drive.
+    /// Adds poses at the fixed rate while the command of the cycle is executed: first the turn, then the drive.
     fn add_states(&mut self, cycle: &Cycle<'_>) {
         let Moved { turn_rad, drive_m } = cycle.moved;
         let turn_s = turn_rad.abs() / self.task.turn_rate_rad_s;
@@ -55,7 +55,7 @@ impl<'a, G: Ground> Track<'a, G> {
         loop {
             let time_s = self.states.len() as f64 / METRICS_RATE_HZ;
             let since_s = time_s - cycle.time_s;
-            // The last instant belongs to the next cycle; a rover that stops stands there.
+            // The last instant belongs to the next cycle; a rover that does not move keeps its pose.
             if since_s >= turn_s + drive_s && since_s > 0.0 {
                 return;
             }
@@ -72,14 +72,14 @@ impl<'a, G: Ground> Track<'a, G> {
         }
     }
 
-    /// What was kept of a finished drive.
+    /// The track of the finished drive.
     pub fn finish(self) -> Tracked {
         let metrics = Metrics::of(&self.states, METRICS_RATE_HZ, Differentiator::SecondDifference);
         Tracked { samples: self.samples, metrics, states: self.states }
     }
 }
 
-/// A state that moves ahead on the plane of the body (m/s) or turns to the left (rad/s).
+/// The state of a rover that moves ahead on the plane of the body (m/s) or turns to the left (rad/s).
 fn state(time_s: f64, pose: &Pose, body: &Body, [speed_m_s, turn_rate_rad_s]: [f64; 2]) -> StateSample {
     let (sin, cos) = libm::sincos(pose.heading_rad);
     StateSample {

@@ -1,4 +1,4 @@
-//! One rover from a start to a goal: look, decide, move, until it stops or a limit is reached.
+//! Drives one rover from a start to a goal: sense, decide, move, until it stops or reaches a limit.
 
 use super::contacts::Contacts;
 use super::draws::CycleDraws;
@@ -9,43 +9,43 @@ use super::sensing::{Sensor, View};
 use super::starts::Start;
 use sastrugi_numeric::{Counter, Ground, NoGround};
 
-/// What all rovers of a trial share.
+/// Body, sensor and limits shared by all rovers of a trial.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Task {
-    /// What they stand on.
+    /// Wheel geometry.
     pub chassis: Chassis,
-    /// What they see with.
+    /// Sensor.
     pub sensor: Sensor,
-    /// Their noise.
+    /// Noise of sensing and motion.
     pub noise: NoiseParameters,
-    /// Distance from the goal at which one has arrived, m.
+    /// Distance from the goal within which a rover has arrived, m.
     pub goal_tolerance_m: f64,
-    /// Rocks higher than this are contacts, m.
+    /// Rocks higher than this count as contacts, m.
     pub clearance_m: f64,
-    /// Farthest drive, m.
+    /// Largest distance driven, m.
     pub distance_limit_m: f64,
-    /// Most cycles.
+    /// Maximum number of cycles.
     pub cycle_limit: u32,
-    /// Speed of a drive, m/s.
+    /// Driving speed, m/s.
     pub speed_m_s: f64,
-    /// Speed of a turn, rad/s.
+    /// Turn rate, rad/s.
     pub turn_rate_rad_s: f64,
 }
 
-/// How a rover ended.
+/// How a rover's drive ended.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Ending {
-    /// At the goal.
+    /// It reached the goal.
     Reached,
-    /// It believed to be at the goal, and was not.
+    /// It stopped where it wrongly believed the goal to be.
     Lost,
-    /// It knew of no way on.
+    /// It found no way to continue.
     NoWay,
-    /// It drove as far as it may.
+    /// It reached the distance limit.
     DistanceLimit,
-    /// It took as many cycles as it may.
+    /// It reached the cycle limit.
     CycleLimit,
-    /// It looked or went beyond the ground that is known.
+    /// It looked or drove beyond the known ground.
     OffGround(NoGround),
 }
 
@@ -66,65 +66,84 @@ impl Ending {
     }
 }
 
-/// One cycle, as it was when the rover had looked and decided.
+/// One cycle, after sensing and the decision.
 #[derive(Clone, Copy, Debug)]
 pub struct Cycle<'a> {
     /// Number, from 0.
     pub number: u32,
-    /// Time at its beginning, s.
+    /// Time at the beginning of the cycle, s.
     pub time_s: f64,
-    /// Driven before, m.
+    /// Distance driven before the cycle, m.
     pub distance_m: f64,
-    /// Where the rover is and believes to be.
+    /// True and believed pose.
     pub poses: Poses,
-    /// How it stands.
+    /// Height and tilt of the body.
     pub body: Body,
-    /// What it sees.
+    /// Sensor view.
     pub view: &'a View,
-    /// What it is at.
+    /// State of the policy.
     pub state: &'static str,
-    /// The way that it plans to take, m; empty for policies without plans.
+    /// The planned path, m; empty for policies that do not plan.
     pub plan: &'a [[f64; 2]],
-    /// What it does; nothing at the end.
+    /// The motion of the cycle; zero in the last one.
     pub moved: Moved,
     /// Contacts so far.
     pub contacts: Contacts,
 }
 
-/// What a rover did.
+/// Summary of a rover's drive.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Drive {
     /// How it ended.
     pub ending: Ending,
-    /// Distance from start to goal, m.
+    /// Straight distance from start to goal, m.
     pub straight_m: f64,
-    /// Distance driven, back included, m.
+    /// Distance driven, including reversals, m.
     pub distance_m: f64,
     /// Distance to the goal at the end, m.
     pub residual_m: f64,
-    /// Distance to the goal when half of the distance limit was driven, m; that at the end for shorter drives.
+    /// Distance to the goal once half of the distance limit was driven, m; for shorter drives, the distance at the end.
     pub residual_half_m: f64,
     /// Time, s.
     pub time_s: f64,
-    /// Cycles.
+    /// Number of cycles.
     pub cycles: u32,
-    /// Cycles with a turn.
+    /// Number of cycles with a turn.
     pub turns: u32,
-    /// Sum of all turns, rad.
+    /// Sum of the absolute turns, rad.
     pub turned_rad: f64,
-    /// Drives back.
+    /// Number of reversals.
     pub reversals: u32,
-    /// Cycles with a hazard in view.
+    /// Number of cycles with a hazard in view.
     pub hazards: u32,
-    /// Rocks met.
+    /// Rock contacts.
     pub contacts: Contacts,
     /// Largest tilt, rad.
     pub tilt_max_rad: f64,
-    /// Where it ended.
+    /// Final pose.
     pub last: Pose,
 }
 
-/// Drives a rover. `rover` is the key of its draws, `each` is shown every cycle.
+/// Drives a rover. `rover` is the key of its random numbers; `each` is called with every cycle.
+///
+/// ```
+/// use sastrugi_mobility::rover::{Navigator, RoverParameters, SojournerParameters, Start, drive};
+/// use sastrugi_numeric::{Counter, Geometry, Grid, GroundGrid, Streams};
+///
+/// // Level sand, 4 x 8 m, and a rover that faces its goal 4 m ahead.
+/// let ground = GroundGrid::of_heights(Grid::filled(Geometry::square(80, 160, 0.05), 0.0_f32));
+/// let navigator = Navigator::Sojourner(SojournerParameters::default());
+/// let task = navigator.task(&RoverParameters::default());
+/// let start = Start::facing([1.0, 2.0], [5.0, 2.0]);
+/// let key = Counter::new(&mut Streams::for_seed(1, "rover").stream("noise"));
+///
+/// let mut cycles = 0;
+/// let drive = drive(&ground, &task, navigator.policy().as_mut(), &start, key, |_| cycles += 1);
+/// assert!(drive.reached());
+/// // Straight on to within the tolerance of 0.5 m, in steps of 65 mm.
+/// assert!(drive.distance_m >= 3.5 - 1e-9 && drive.distance_m < 3.6);
+/// assert_eq!(cycles, drive.cycles + 1, "the last cycle stops");
+/// ```
 pub fn drive(
     ground: &impl Ground,
     task: &Task,
@@ -149,7 +168,7 @@ pub fn drive(
         match run.cycle(policy, rover, &mut each) {
             Ok(None) => {}
             Ok(Some(ending)) => break ending,
-            Err(nowhere) => break Ending::OffGround(nowhere),
+            Err(no_ground) => break Ending::OffGround(no_ground),
         }
     };
     run.finish(ending)
@@ -187,13 +206,13 @@ impl Drive {
         super::efficiency(self.straight_m, self.distance_m, self.residual_m)
     }
 
-    /// Efficiency in means over rovers: 0 for one that ended off the ground. It has shown none, and must not lift a mean, as the 1 of a rover
-    /// that looked off the ground at its start would.
+    /// Efficiency for means over rovers: 0 for a rover that ended off the ground. Otherwise a rover that looked off the ground at
+    /// its start would raise the mean with an efficiency of 1.
     pub fn counted_efficiency(&self) -> f64 {
         if matches!(self.ending, Ending::OffGround(_)) { 0.0 } else { self.efficiency() }
     }
 
-    /// The same had the distance limit been half of `distance_limit_m`.
+    /// The efficiency if the distance limit had been half of `distance_limit_m`.
     pub fn efficiency_at_half(&self, distance_limit_m: f64) -> f64 {
         super::efficiency(self.straight_m, self.distance_m.min(0.5 * distance_limit_m), self.residual_half_m)
     }
@@ -205,7 +224,7 @@ struct Run<'a, G> {
     goal_m: [f64; 2],
     poses: Poses,
     drive: Drive,
-    /// Distance to the goal when half of the distance limit had been driven, m.
+    /// Distance to the goal once half of the distance limit was driven, m.
     halfway: Option<f64>,
 }
 
@@ -217,7 +236,7 @@ impl<G: Ground> Run<'_, G> {
         (self.drive.cycles >= self.task.cycle_limit).then_some(Ending::CycleLimit)
     }
 
-    /// One cycle; how it ended when it is the last.
+    /// One cycle; returns the ending if it is the last.
     fn cycle(
         &mut self,
         policy: &mut dyn Policy,

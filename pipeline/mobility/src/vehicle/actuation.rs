@@ -1,16 +1,16 @@
-//! From the commands of the steering to wheel speeds and steering angles.
+//! Wheel speeds and steering angles from the commanded speed and yaw rate.
 //!
-//! *Skid steering*: both sides are driven at `(v -+ w b / 2) / r`, with the track `b` widened by the multiplier.
+//! *Skid steering*: the sides are driven at `(v -+ w b / 2) / r`, with the track `b` widened by the multiplier.
 //!
-//! *Ackermann*: the hub at `(x, y)` from the centre of turning's axle shall move with `(v - w y, w x)`. Its steering angle is
-//! the direction of that velocity (backwards where that needs the smaller angle), within the limit; its speed is the part of
-//! that velocity along where the wheel points now.
+//! *Ackermann*: a hub at `(x, y)`, relative to the point of the chassis about which the turn is commanded, must move with
+//! `(v - w y, w x)`. Its steering angle is the direction of that velocity (or its reverse, if that needs the smaller angle),
+//! within the limit; its speed is the component of that velocity along the current direction of the wheel.
 
 use super::drive::Servo;
 use super::model::{Vehicle, Wheel};
 use super::params::{AckermannParameters, DriveParameters};
 
-/// Commands and what they come from.
+/// Commands and the errors from which they are computed.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Command {
     pub speed_m_s: f64,
@@ -20,14 +20,14 @@ pub(crate) struct Command {
     pub distance_to_goal_m: f64,
 }
 
-/// Limits that the steering has to keep.
+/// Limits of the commands.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Limits {
     pub speed_m_s: f64,
     pub acceleration_m_s2: f64,
     pub yaw_rate_rad_s: f64,
     pub yaw_acceleration_rad_s2: f64,
-    /// Smallest radius of turning, m; 0 for a vehicle that turns on the spot.
+    /// Smallest turning radius, m; 0 for a vehicle that turns on the spot.
     pub turn_radius_m: f64,
 }
 
@@ -52,14 +52,14 @@ impl Limits {
     }
 }
 
-/// Radius of the smallest circle, at which the inner one of the farthest steered wheels is at its limit, m.
+/// Smallest turning radius, m, at which the inner one of the farthest steered wheels reaches its limit.
 fn turn_radius_m(vehicle: &Vehicle, drive: &AckermannParameters) -> f64 {
     let steered = vehicle.wheels.iter().filter(|wheel| wheel.steered);
     let tan = libm::tan(drive.steering_limit_deg.to_radians());
     steered.map(|wheel| wheel.turning_arm_m[0].abs() / tan + wheel.turning_arm_m[1].abs()).fold(0.0, f64::max)
 }
 
-/// Steering angles that a command asks for, rad; a vehicle that is told to stand keeps its angles.
+/// Steering angles required by a command, rad; a vehicle commanded to stand still keeps its angles.
 pub(crate) fn steering_angles(vehicle: &Vehicle, command: &Command, angles: &mut [f64]) {
     let DriveParameters::Ackermann(drive) = &vehicle.parameters().drive else { return };
     let limit = drive.steering_limit_deg.to_radians();
@@ -72,7 +72,7 @@ pub(crate) fn steering_angles(vehicle: &Vehicle, command: &Command, angles: &mut
     }
 }
 
-/// Servos of all channels for a command, with the wheels at those steering angles.
+/// Servos of all channels for a command, with the wheels at the given steering angles.
 pub(crate) fn servos(vehicle: &Vehicle, command: &Command, steering: &[f64], servos: &mut Vec<Servo>) {
     servos.clear();
     let wheels = &vehicle.parameters().wheels;
@@ -99,7 +99,7 @@ pub(crate) fn servos(vehicle: &Vehicle, command: &Command, steering: &[f64], ser
     }
 }
 
-/// Velocity in plan that a command asks of a hub, m/s.
+/// Horizontal velocity of a hub required by a command, m/s.
 fn hub_velocity(wheel: &Wheel, command: &Command) -> [f64; 2] {
     let [x, y] = wheel.turning_arm_m;
     [command.speed_m_s - command.yaw_rate_rad_s * y, command.yaw_rate_rad_s * x]

@@ -1,6 +1,6 @@
-//! The chassis with wheels on joints: rigid masses on a moving body.
+//! Dynamics of a chassis with wheels on joints: rigid masses on a moving body.
 //!
-//! Unknowns are the acceleration `a` of the chassis' reference point, its angular acceleration `A` and the joints'
+//! The unknowns are the acceleration `a` of the chassis' reference point, its angular acceleration `A` and the joint
 //! accelerations `q''`, all in the body frame. A mass `m` at `r`, which the joints move by the levers `L` (columns `dr/dq`),
 //! accelerates by `J u + b` with `u = (a, A, q'')`, `J = [1, -r x, L]` and
 //!
@@ -8,11 +8,11 @@
 //! b = w x (w x r) + 2 w x (L q') + drift
 //! ```
 //!
-//! d'Alembert's principle over the chassis and all wheels (as points with the moments of inertia of a disc about x and z)
-//! gives `M u = f`, with `M = sum m J^T J + I` symmetric and positive definite, solved by Cholesky's factorisation. Without
-//! joints this is the rigid body of `body.rs`, which a test asks for.
+//! d'Alembert's principle applied to the chassis and all wheels (points with the moments of inertia of a disc about x and z)
+//! gives `M u = f`, with `M = sum m J^T J + I` symmetric and positive definite, solved by Cholesky factorisation. Without
+//! joints it reduces to the rigid body of `body.rs`; a test checks this.
 //!
-//! Cost: some 2000 operations for six wheels and three joints.
+//! Cost: about 2000 operations for six wheels and three joints.
 
 use super::body::Body;
 use super::linkage::{Carrier, Joints};
@@ -20,9 +20,9 @@ use super::model::{GRAVITY_M_S2, Vehicle};
 use super::params::AXLES_MAX;
 use super::vector::{Axes, Vec3, add, add_scaled, cross, dot, scale, sub};
 
-/// Most joints of a vehicle.
+/// Maximum number of joints of a vehicle.
 const JOINTS_MAX: usize = 2 * AXLES_MAX;
-/// Most unknowns.
+/// Maximum number of unknowns.
 const UNKNOWNS_MAX: usize = 6 + JOINTS_MAX;
 
 /// The equations of motion of one time step.
@@ -33,7 +33,7 @@ struct Equations {
     right: [f64; UNKNOWNS_MAX],
 }
 
-/// Loads on the vehicle besides gravity, in the body frame.
+/// Loads on the vehicle other than gravity, in the body frame.
 pub(crate) struct Loads<'a> {
     /// N.
     pub force: Vec3,
@@ -43,7 +43,7 @@ pub(crate) struct Loads<'a> {
     pub joints: &'a [f64],
 }
 
-/// Advances body and joints by a step: velocities first, then positions.
+/// Advances body and joints by one step: velocities first, then positions.
 pub(crate) fn step(
     body: &mut Body,
     joints: &mut Joints,
@@ -90,7 +90,7 @@ impl Equations {
         let moved = carrier.velocity(r, &joints.rate);
         let bias = add(add(cross(rate, cross(rate, r)), scale(cross(rate, moved), 2.0)), carrier.drift);
         let pull = scale(sub(gravity, bias), mass_kg);
-        // Columns of J, sparse: three of the shift, three of the turn, and those of the joints that carry the mass.
+        // Columns of J, sparse: three for translation, three for rotation, and one per joint that carries the mass.
         let mut columns: [(usize, Vec3); 8] = [
             (0, [1.0, 0.0, 0.0]),
             (1, [0.0, 1.0, 0.0]),
@@ -124,7 +124,7 @@ impl Equations {
         }
     }
 
-    /// The unknowns, in place of matrix and right side.
+    /// Solves for the unknowns, overwriting matrix and right-hand side.
     fn solve(mut self) -> [f64; UNKNOWNS_MAX] {
         for j in 0..self.size {
             for i in j..self.size {

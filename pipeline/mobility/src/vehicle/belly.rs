@@ -1,15 +1,15 @@
-//! Contact of the chassis with the ground: points under the bottom plate and on the bumpers.
+//! Contact between chassis and ground: points under the bottom plate and on the bumpers.
 //!
-//! A point at `P` with velocity `v` has the depth `d = (h - P_z) n_z` below the local bilinear plane. It feels
+//! A point at `P` with velocity `v` has the depth `d = (h - P_z) n_z` below the local bilinear plane. The forces on it are
 //!
 //! ```text
 //! N = k d (1 - a v.n)      (at least 0; Hunt and Crossley, 1975)
 //! F = -k s - c v_t,        |F| <= mu N; where clipped, s = -F / k
 //! ```
 //!
-//! along and across the normal `n`, with a bristle of deflection `s` in the tangent plane of its own (`ds/dt = v_t`), so
-//! that a hung vehicle stays where it hangs. Points lie in rectangular tiles no wider than a wheel; a tile above the
-//! ceiling of the ground is left out as a whole, and so is one that cannot have come down since it was last looked at.
+//! along and perpendicular to the normal `n`. Each point has its own bristle with deflection `s` in the tangent plane
+//! (`ds/dt = v_t`), so a hung-up vehicle does not slide. Points are grouped in rectangular tiles no wider than a wheel; a tile
+//! above the ceiling of the ground is skipped, and so is one that cannot have reached the ground since it was last checked.
 
 use super::clearance::Clearance;
 use super::contact::CULLING_MARGIN_M;
@@ -24,12 +24,12 @@ const BUMPER_POINTS: u32 = 3;
 /// Contact points of a chassis.
 #[derive(Clone, Debug)]
 pub(crate) struct Belly {
-    /// Points from the centre of mass, m, tile by tile.
+    /// Points relative to the centre of mass, m, tile by tile.
     points: Vec<Vec3>,
     tiles: Vec<Tile>,
-    /// Farthest point from the centre of its tile, m.
+    /// Largest distance of a point from the centre of its tile, m.
     pub reach_m: f64,
-    /// Farthest point from the centre of mass, m.
+    /// Largest distance of a point from the centre of mass, m.
     pub extent_m: f64,
 }
 
@@ -79,12 +79,12 @@ impl Belly {
         self.tiles.push(Tile { points: range, centre, half_size });
     }
 
-    /// Points from the centre of mass.
+    /// Points relative to the centre of mass, m.
     pub(crate) fn points(&self) -> &[Vec3] {
         &self.points
     }
 
-    /// No deflection at any point.
+    /// Bristles without deflection.
     pub(crate) fn at_rest(&self) -> Bristles {
         Bristles {
             deflections: vec![[0.0; 3]; self.points.len()],
@@ -94,7 +94,7 @@ impl Belly {
     }
 }
 
-/// Splits `count` points over a length into runs whose half length times the square root of 2 is within `reach_m`.
+/// Splits `count` points over a length into runs whose half length times the square root of 2 is at most `reach_m`.
 fn chunks(count: u32, length_m: f64, reach_m: f64) -> Vec<Range<u32>> {
     let spacing_m = length_m / f64::from(count - 1);
     let per_chunk = ((std::f64::consts::SQRT_2 * reach_m / spacing_m) as u32).saturating_add(1).min(count);
@@ -121,7 +121,7 @@ pub(crate) struct Motion {
     pub axes: Axes,
 }
 
-/// What the ground does to the chassis.
+/// Load of the ground on the chassis.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Load {
     /// N.
@@ -133,7 +133,7 @@ pub(crate) struct Load {
 }
 
 impl Belly {
-    /// Forces of all points over a time step; moves the bristles on.
+    /// Forces of all points over a time step; updates the bristles.
     pub(crate) fn press(
         &self,
         ground: &Ground,
@@ -160,7 +160,7 @@ impl Belly {
                 clearance.found(index, above_m);
                 continue;
             }
-            // Next to the edge of the ground a small move may leave it.
+            // Near the edge of the ground, a small move may leave it.
             let mut least_m = if above_m == f64::NEG_INFINITY { above_m } else { f64::INFINITY };
             for (&point, deflection) in self.points[tile.points.clone()].iter().zip(deflections) {
                 let arm = motion.axes.to_map(point);
@@ -187,8 +187,8 @@ impl Belly {
 }
 
 impl Tile {
-    /// How far all points of the tile are above the highest ground near them at least, m; minus infinity where that is not
-    /// known.
+    /// Lower bound on the height of the tile's points above the highest ground near them, m; minus infinity where the ground
+    /// is unknown.
     fn above_ceiling_m(&self, ground: &Ground, motion: &Motion) -> f64 {
         let centre = add(motion.position, motion.axes.to_map(self.centre));
         let Axes { x, y, z } = motion.axes;
@@ -210,7 +210,7 @@ impl Spot {
         Self { normal: [-hx * up, -hy * up, up], depth_m: overlap * up }
     }
 
-    /// Force on the point; moves its bristle on.
+    /// Force on the point; updates its bristle.
     #[inline(always)]
     fn push(
         &self,
@@ -237,5 +237,80 @@ impl Spot {
             clipped
         };
         add_scaled(tangential, self.normal, normal_n)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Contact of the equations below: k = 20 kN/m, a = 3 s/m, c = 40 N s/m.
+    const CONTACT: BellyParameters = BellyParameters {
+        points: [2, 2],
+        bumper_z_m: 0.1,
+        stiffness_n_m: 20_000.0,
+        dissipation_s_m: 3.0,
+        tangential_damping_n_s_m: 40.0,
+    };
+
+    fn near(a: Vec3, b: Vec3, tolerance: f64) -> bool {
+        norm(sub(a, b)) < tolerance
+    }
+
+    /// A point 1 mm deep in level ground that sinks at 0.1 m/s: `N = k d (1 + 0.1 a)` = 26 N. At 0.01 m/s its bristle bends by
+    /// 20 um in 2 ms and pushes back with 0.4 N, the damper with another 0.4 N.
+    #[test]
+    fn val_a_point_pushes_as_the_header_says() {
+        let spot = Spot::new(1e-3, (0.0, 0.0));
+        let mut bent = [0.0; 3];
+        let force = spot.push([0.01, 0.0, -0.1], &CONTACT, 0.5, 0.002, &mut bent);
+        assert!(near(force, [-0.8, 0.0, 26.0], 1e-12), "{force:?}");
+        assert!(near(bent, [2e-5, 0.0, 0.0], 1e-18), "{bent:?}");
+        // The next step adds to the bristle.
+        let force = spot.push([0.0, 0.02, 0.0], &CONTACT, 0.5, 0.002, &mut bent);
+        assert!(near(force, [-0.4, -1.6, 20.0], 1e-12), "{force:?}");
+        assert!(near(bent, [2e-5, 4e-5, 0.0], 1e-18), "{bent:?}");
+    }
+
+    /// At 1 m/s the friction of `mu N` = 13 N is all there is, and the bristle keeps what it can carry: `13 N / k`.
+    #[test]
+    fn val_a_sliding_point_has_the_friction_of_its_load() {
+        let mut bent = [0.0; 3];
+        let force = Spot::new(1e-3, (0.0, 0.0)).push([0.6, -0.8, -0.1], &CONTACT, 0.5, 0.002, &mut bent);
+        assert!(near(force, [-7.8, 10.4, 26.0], 1e-12), "{force:?}");
+        assert!(near(bent, [3.9e-4, -5.2e-4, 0.0], 1e-15), "{bent:?}");
+    }
+
+    /// A point that leaves the ground faster than `1 / a` is not held by it.
+    #[test]
+    fn val_a_rising_point_is_not_held() {
+        let mut bent = [1e-4, 0.0, 0.0];
+        let force = Spot::new(1e-3, (0.0, 0.0)).push([0.1, 0.0, 0.5], &CONTACT, 0.5, 0.002, &mut bent);
+        assert!(near(force, [0.0; 3], 1e-12) && near(bent, [0.0; 3], 1e-15), "{force:?} {bent:?}");
+    }
+
+    /// On a slope of 3 in 4 the depth is 0.8 of the vertical overlap, along the normal (-0.6, 0, 0.8); motion along the normal does
+    /// not bend the bristle.
+    #[test]
+    fn val_depth_is_measured_along_the_normal() {
+        let mut bent = [0.0; 3];
+        let force = Spot::new(1e-3, (0.75, 0.0)).push([0.06, 0.0, -0.08], &CONTACT, 0.5, 0.002, &mut bent);
+        // 20 kN/m x 0.8 mm x (1 + 3 s/m x 0.1 m/s).
+        assert!(near(force, [-12.48, 0.0, 16.64], 1e-12), "{force:?}");
+        assert!(near(bent, [0.0; 3], 1e-18), "{bent:?}");
+    }
+
+    /// Every point belongs to exactly one run, in order, and no run is longer than stated.
+    #[test]
+    fn prop_runs_of_points_cover_all_of_them() {
+        for (count, length_m, reach_m) in [(21, 0.9874, 0.175), (13, 0.5709, 0.175), (2, 4.0, 0.1), (101, 1.0, 9.0)] {
+            let runs = chunks(count, length_m, reach_m);
+            let points: Vec<u32> = runs.iter().cloned().flatten().collect();
+            assert_eq!(points, (0..count).collect::<Vec<_>>());
+            let spacing_m = length_m / f64::from(count - 1);
+            let longest = runs.iter().map(|run| f64::from(run.end - run.start - 1) * spacing_m).fold(0.0, f64::max);
+            assert!(longest <= std::f64::consts::SQRT_2 * reach_m + 1e-12, "{count}: {longest}");
+        }
+        assert_eq!(chunks(101, 1.0, 9.0).len(), 1);
     }
 }

@@ -3,22 +3,22 @@
 use super::model::Vehicle;
 use super::vector::{Axes, Quaternion, Vec3, add, add_scaled, cross, scale, sub, turned};
 
-/// State of the chassis. Map frame unless said otherwise.
+/// State of the chassis, in the map frame unless stated otherwise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(crate) struct Body {
     /// Reference point, m: the centre of mass of the vehicle with all joints at zero.
     pub position: Vec3,
-    /// Of the reference point, m/s.
+    /// Velocity of the reference point, m/s.
     pub velocity: Vec3,
-    /// Map from body.
+    /// Rotation from the body to the map frame.
     pub orientation: Quaternion,
-    /// In the body frame, rad/s.
+    /// Angular velocity in the body frame, rad/s.
     pub rate: Vec3,
 }
 
 impl Body {
-    /// Advances by a step under a force and a moment about the centre of mass (both without gravity). The gyroscopic term
-    /// is explicit; velocities come first.
+    /// Advances by one step under a force and a moment about the centre of mass (both without gravity). The gyroscopic term
+    /// is explicit; velocities are updated first.
     pub(crate) fn step(&mut self, vehicle: &Vehicle, axes: &Axes, force: Vec3, moment: Vec3, step_s: f64) {
         let acceleration = sub(scale(force, 1.0 / vehicle.mass_kg), [0.0, 0.0, super::model::GRAVITY_M_S2]);
         self.velocity = add_scaled(self.velocity, acceleration, step_s);
@@ -29,7 +29,7 @@ impl Body {
         self.advance(step_s);
     }
 
-    /// Moves on for a step with the present velocities.
+    /// Advances position and orientation by one step with the current velocities.
     pub(crate) fn advance(&mut self, step_s: f64) {
         self.position = add_scaled(self.position, self.velocity, step_s);
         self.orientation = turned(self.orientation, scale(self.rate, step_s));

@@ -1,23 +1,23 @@
-//! Contact of a wheel with the ground: a fan of rays on several discs, after the multi-disc tyre models of Project Chrono
+//! Contact between wheel and ground: a fan of rays on several discs, after the multi-disc tyre models of Project Chrono
 //! (Tasora et al., 2016).
 //!
-//! Every disc `d` of a wheel carries rays at angles `t` to either side of the body's down direction. The tip of a ray,
+//! Every disc `d` of a wheel carries rays at angles `t` on both sides of the body's down direction. The tip of a ray,
 //!
 //! ```text
 //! P = hub + d y + r (sin t x - cos t z)
 //! ```
 //!
 //! meets the local bilinear plane of height `h` and gradient `(hx, hy)`. With unit normal `n = (-hx, -hy, 1) / sqrt(1 +
-//! hx^2 + hy^2)` its depth is `(h - P_z) n_z`, and it pushes with `k depth` along `n`. The rays' forces add up to one
-//! normal force `N0` in the direction `n`. As each of them passes through the axle of a round wheel, so does their sum: it
+//! hx^2 + hy^2)` its depth is `(h - P_z) n_z`, and it pushes with `k depth` along `n`. The forces of the rays add up to one
+//! normal force `N0` in the direction `n`. Each of them passes through the axle of a round wheel, and so does their sum: it
 //! acts on the rim point where `n` leaves the wheel, on the load-weighted mean disc. A damper along `n` completes the
-//! normal force, `N = max(0, N0 - c v_n)`. On a plane of any slope the direction is exact; with one bump under the fan it
+//! normal force, `N = max(0, N0 - c v_n)`. On a plane of any slope the direction is exact; with a bump under the fan it
 //! is that of the planes around the touching tips.
 //!
-//! Stiffness of a ray: on level ground the static load `W` must sag the wheel by `W / stiffness`, so `k` is `W` over the
-//! summed depths of all tips at that sag, whatever their number.
+//! Stiffness of a ray: on level ground, the static load `W` must make the wheel sag by `W / stiffness`, so `k` is `W` divided
+//! by the summed depths of all tips at that sag, whatever their number.
 //!
-//! Symbols: `x`, `y`, `z` body axes; `r` wheel radius, m. Cost: one height per ray that reaches below the ceiling of the
+//! Symbols: `x`, `y`, `z` body axes; `r` wheel radius, m. Cost: one height lookup per ray that reaches below the ceiling of the
 //! ground around the wheel.
 
 use super::ground::Ground;
@@ -29,18 +29,18 @@ use sastrugi_schemas::ParameterError;
 #[derive(Clone, Debug)]
 pub(crate) struct Tyre {
     pub radius_m: f64,
-    /// Sine and cosine of the rays' angles times the radius, m.
+    /// Sine and cosine of the rays' angles, times the radius, m.
     rays: Vec<[f64; 2]>,
-    /// Discs across the wheel, left positive, m.
+    /// Lateral offsets of the discs, left positive, m.
     discs: Vec<f64>,
     ray_stiffness_n_m: f64,
-    /// Farthest ray tip from the hub, m.
+    /// Distance of the farthest ray tip from the hub, m.
     pub reach_m: f64,
 }
 
 impl Tyre {
     /// # Errors
-    /// When no ray touches level ground at the sag that stiffness and load ask for.
+    /// If no ray touches level ground at the sag that follows from stiffness and load.
     pub(crate) fn new(parameters: &VehicleParameters, static_load_n: f64) -> Result<Self, ParameterError> {
         let (tyre, wheels) = (&parameters.tyre, &parameters.wheels);
         let radius_m = wheels.radius_m;
@@ -54,8 +54,10 @@ impl Tyre {
         let sag_m = static_load_n / tyre.stiffness_n_m;
         let depths: f64 = rays.iter().map(|[_, down]| (sag_m - (radius_m - down)).max(0.0)).sum();
         if depths <= 0.0 {
-            let message =
-                format!("{} rays miss the ground at a sag of {sag_m:.2e} m; take more, or an odd number", tyre.rays);
+            let message = format!(
+                "is {}: all rays miss the ground at a sag of {sag_m:.2e} m; use more, or an odd number",
+                tyre.rays
+            );
             return Err(ParameterError::new("tyre.rays", message));
         }
         let ray_stiffness_n_m = static_load_n / (depths * discs.len() as f64);
@@ -64,7 +66,7 @@ impl Tyre {
         Ok(Self { radius_m, rays, discs, ray_stiffness_n_m, reach_m })
     }
 
-    /// Stiffness of a wheel with all rays in the ground, N/m: the largest that the time step has to stand.
+    /// Stiffness of a wheel with all rays in the ground, N/m: the largest for which the time step must be stable.
     pub(crate) fn stiffness_max_n_m(&self) -> f64 {
         self.ray_stiffness_n_m * (self.rays.len() * self.discs.len()) as f64
     }
@@ -75,12 +77,12 @@ impl Tyre {
         rim.extend(self.rays.iter().map(|&[forward, down]| add_scaled(scale(axes.x, forward), axes.z, -down)));
     }
 
-    /// All ray tips of a wheel with that hub.
+    /// All ray tips of a wheel with its hub at `hub`.
     pub(crate) fn tips<'a>(&'a self, hub: Vec3, left: Vec3, rim: &'a [Vec3]) -> impl Iterator<Item = Vec3> + 'a {
         self.discs.iter().flat_map(move |&offset| rim.iter().map(move |&ray| add(add_scaled(hub, left, offset), ray)))
     }
 
-    /// What the ground does to a wheel with that hub; `rim` as made by [`Self::rim`] for these axes.
+    /// Normal force of the ground on a wheel with its hub at `hub`; `rim` comes from [`Self::rim`] for the same axes.
     pub(crate) fn press(&self, ground: &Ground, hub: Vec3, axes: &Axes, rim: &[Vec3]) -> Pressing {
         let ceiling = ground.ceiling(hub[0], hub[1]);
         let mut total = Pressing::default();
@@ -119,7 +121,7 @@ impl Tyre {
     }
 }
 
-/// A group of points counts as clear of the ground only by more than this, so that rounding decides nothing, m.
+/// A group of points counts as clear of the ground only by more than this, so that rounding errors do not matter, m.
 pub(crate) const CULLING_MARGIN_M: f64 = 1e-6;
 
 /// Sum of the normal forces of a wheel's rays.
@@ -134,7 +136,7 @@ pub(crate) struct Pressing {
 }
 
 impl Pressing {
-    /// Adds a ray: `k (h - z)` shared out over the plane's normal, `k (h - z) n_z n`.
+    /// Adds a ray: `k (h - z)` projected on the plane's normal, `k (h - z) n_z n`.
     #[inline(always)]
     fn add(&mut self, stiff_overlap: f64, (hx, hy): (f64, f64), offset: f64) {
         let vertical = stiff_overlap / (1.0 + hx * hx + hy * hy);
@@ -144,7 +146,7 @@ impl Pressing {
         self.offset_moment += vertical * offset;
     }
 
-    /// Where and how the ground touches the wheel; `None` off the ground, or when the wheel lies on its side.
+    /// The resultant contact; `None` off the ground, or when the wheel lies on its side.
     pub(crate) fn touch(&self, hub: Vec3, axes: &Axes, radius_m: f64) -> Option<Touch> {
         let elastic_n = norm(self.force);
         if elastic_n <= 0.0 {
@@ -167,7 +169,7 @@ impl Pressing {
 /// Sine of the smallest angle between contact normal and axle at which a wheel still rolls.
 const IN_PLANE_MIN: f64 = 0.05;
 
-/// The one contact of a wheel.
+/// The resultant contact of a wheel.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Touch {
     /// Elastic part of the normal force, N.
@@ -180,4 +182,67 @@ pub(crate) struct Touch {
     pub left: Vec3,
     /// Point of action in the map frame, m.
     pub point: Vec3,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::TraverseParameters;
+    use super::*;
+    use sastrugi_numeric::{Geometry, Grid};
+
+    /// The Husky and a plane of gradient `(p, q)`, 6 m square.
+    fn plane(p: f64, q: f64) -> (super::super::Vehicle, Ground) {
+        let (vehicle, _) = TraverseParameters::default().prepare().unwrap();
+        let g = Geometry::square(120, 120, 0.05);
+        let heights = (0..g.len()).map(|k| p * g.x(k % g.cols) + q * g.y(k / g.cols)).collect();
+        let ground = Ground::new(&Grid::new(g, heights), &vehicle).unwrap();
+        (vehicle, ground)
+    }
+
+    const LEVEL: Axes = Axes { x: [1.0, 0.0, 0.0], y: [0.0, 1.0, 0.0], z: [0.0, 0.0, 1.0] };
+
+    fn pressed(tyre: &Tyre, ground: &Ground, hub: Vec3) -> Pressing {
+        let mut rim = Vec::new();
+        tyre.rim(&LEVEL, &mut rim);
+        tyre.press(ground, hub, &LEVEL, &rim)
+    }
+
+    /// At the static sag of 3.468 mm on level ground a wheel carries a quarter of the vehicle, straight up, on the point below its hub.
+    /// Rays 13.3 deg to either side end 4.5 mm higher, so the middle ray of each disc carries all of it, and half at half the sag;
+    /// above the ground there is no force.
+    #[test]
+    fn val_a_wheel_carries_its_load_at_its_sag() {
+        let (vehicle, ground) = plane(0.0, 0.0);
+        let load_n = 56.582 * 9.80665 / 4.0;
+        let sag_m = load_n / 40_000.0;
+        let at = |sag_m: f64| pressed(&vehicle.tyre, &ground, [3.01, 3.02, 0.1651 - sag_m]);
+        let touch = at(sag_m).touch([3.01, 3.02, 0.1651 - sag_m], &LEVEL, 0.1651).unwrap();
+        assert!((touch.elastic_n / load_n - 1.0).abs() < 1e-9, "{touch:?}");
+        for (found, expected) in [(touch.normal, LEVEL.z), (touch.forward, LEVEL.x), (touch.left, LEVEL.y)] {
+            assert!(norm(add_scaled(found, expected, -1.0)) < 1e-12, "{touch:?}");
+        }
+        assert!(norm(add_scaled(touch.point, [3.01, 3.02, -sag_m], -1.0)) < 1e-12, "{touch:?}");
+        let half_n = norm(at(0.5 * sag_m).force);
+        assert!((half_n / load_n - 0.5).abs() < 1e-9, "{half_n}");
+        assert!(at(-1e-4).touch([3.01, 3.02, 0.1652], &LEVEL, 0.1651).is_none());
+    }
+
+    /// On a plane of 3 in 4 ahead, or to the left, the force is along the normal of the plane and the wheel rolls along it.
+    #[test]
+    fn val_a_wheel_is_pushed_along_the_normal() {
+        let (vehicle, ground) = plane(0.75, 0.0);
+        let hub = [3.0, 3.0, 2.25 + 0.1651];
+        let touch = pressed(&vehicle.tyre, &ground, hub).touch(hub, &LEVEL, 0.1651).unwrap();
+        assert!(norm(add_scaled(touch.normal, [-0.6, 0.0, 0.8], -1.0)) < 1e-4, "{touch:?}");
+        assert!(norm(add_scaled(touch.forward, [0.8, 0.0, 0.6], -1.0)) < 1e-4, "{touch:?}");
+        // The rim point where the normal leaves the wheel.
+        assert!(norm(add_scaled(touch.point, add_scaled(hub, touch.normal, -0.1651), -1.0)) < 1e-4, "{touch:?}");
+        let (vehicle, ground) = plane(0.0, 0.75);
+        let hub = [3.0, 3.0, 2.25 + 0.15];
+        let touch = pressed(&vehicle.tyre, &ground, hub).touch(hub, &LEVEL, 0.1651).unwrap();
+        assert!(norm(add_scaled(touch.normal, [0.0, -0.6, 0.8], -1.0)) < 1e-4, "{touch:?}");
+        assert!(norm(add_scaled(touch.left, [0.0, 0.8, 0.6], -1.0)) < 1e-4, "{touch:?}");
+        // The uphill disc, on the left, carries more.
+        assert!(touch.point[1] > 3.0 + 1e-3, "{touch:?}");
+    }
 }

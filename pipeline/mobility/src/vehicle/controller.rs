@@ -1,14 +1,13 @@
-//! Pure pursuit of what a mission follows (Coulter 1992, CMU-RI-TR-92-01): the straight line from start to goal, or a polyline.
+//! Pure pursuit (Coulter 1992, CMU-RI-TR-92-01) of the mission's course: the straight line from start to goal, or a polyline.
 //!
-//! The look-ahead point lies on the line, `lookahead` beyond the foot of the vehicle along it, and not beyond the goal. (Coulter takes
-//! the point of the path at that distance from the vehicle; measured along the path there is always just one.) With `a`
-//! the bearing of that point relative to the vehicle and `d` its distance, the arc through it asks for the yaw rate
-//! `gain * speed * 2 sin a / d`. When the point falls behind the vehicle (`|a|` above `turn_start`) the vehicle turns on
-//! the spot, or on its smallest circle where it cannot, always in the direction in which it began, until `|a|` is below
-//! `turn_stop`. Speed and yaw rate change no
-//! faster than the vehicle's limits allow.
+//! The look-ahead point lies on the course, `lookahead` beyond the vehicle's foot as measured along the course, but not beyond
+//! the goal. (Coulter takes the point of the path at that distance from the vehicle; measured along the path, there is always
+//! exactly one such point.) With `a` the bearing of that point relative to the vehicle and `d` its distance, the arc through it
+//! requires the yaw rate `gain * speed * 2 sin a / d`. When the point falls behind the vehicle (`|a|` above `turn_start`), the
+//! vehicle turns on the spot, or on its smallest circle if it cannot turn on the spot, without changing direction, until `|a|`
+//! is below `turn_stop`. The vehicle's limits bound the rates of change of speed and yaw rate.
 //!
-//! The foot on a polyline never goes back, and never beyond the look-ahead point of the one before ([`Polyline::foot`]).
+//! The foot on a polyline never moves back, and never beyond the look-ahead point of the previous foot ([`Polyline::foot`]).
 
 use super::actuation::{Command, Limits};
 use super::settings::TraverseSettings;
@@ -23,7 +22,7 @@ pub(crate) struct PlanPose {
     pub yaw: f64,
 }
 
-/// What a vehicle follows.
+/// The course that a vehicle follows.
 #[derive(Clone, Debug)]
 enum Course {
     Straight {
@@ -31,7 +30,7 @@ enum Course {
         direction: [f64; 2],
         length: f64,
     },
-    /// A polyline, and the foot of the vehicle on it.
+    /// A polyline and the vehicle's foot on it.
     Along {
         line: Polyline,
         foot_m: f64,
@@ -64,7 +63,7 @@ impl Course {
         }
     }
 
-    /// Takes the vehicle to be at a point from now on.
+    /// Advances the foot for a vehicle at a point.
     fn advance(&mut self, at: [f64; 2], lookahead_m: f64) {
         if let Self::Along { line, foot_m } = self {
             *foot_m = line.foot(at, *foot_m, lookahead_m).along_m;
@@ -72,14 +71,14 @@ impl Course {
     }
 }
 
-/// Steering of one mission.
+/// Controller of one mission.
 #[derive(Clone, Debug)]
 pub(crate) struct Controller {
     course: Course,
     goal: [f64; 2],
-    /// Sign of the turn on the spot that is under way; 0 while following the line.
+    /// Sign of the current turn on the spot; 0 while following the course.
     turning: f64,
-    /// Commands in force.
+    /// Current commands.
     pub command: Command,
 }
 
@@ -88,7 +87,7 @@ impl Controller {
         Self { course: Course::of(mission), goal: mission.goal_m, turning: 0.0, command: Command::default() }
     }
 
-    /// Looks at the pose without changing the commands in force; returns the distance of the look-ahead point, m.
+    /// Updates the errors for a pose without changing the commands; returns the distance of the look-ahead point, m.
     pub(crate) fn observe(&mut self, pose: PlanPose, settings: &TraverseSettings) -> f64 {
         let at = [pose.x, pose.y];
         let (aim, cross_track_m) = self.course.aim(at, self.lookahead_m(settings));
@@ -104,7 +103,7 @@ impl Controller {
         length([self.goal[0] - at[0], self.goal[1] - at[1]])
     }
 
-    /// What is left of the way from a point to the goal, m: the distance, or more of a polyline that leads round.
+    /// Remaining distance from a point to the goal, m: the straight distance or the rest of the polyline, whichever is longer.
     pub(crate) fn left_m(&self, at: [f64; 2], settings: &TraverseSettings) -> f64 {
         let distance_m = self.distance_to_goal_m(at);
         match &self.course {
@@ -120,7 +119,7 @@ impl Controller {
         settings.lookahead_m(self.command.speed_m_s)
     }
 
-    /// Looks at the pose and sets the commands for the coming `period_s`.
+    /// Updates the errors for a pose and sets the commands for the next `period_s`.
     pub(crate) fn update(&mut self, pose: PlanPose, settings: &TraverseSettings, limits: &Limits, period_s: f64) {
         let lookahead_m = self.lookahead_m(settings);
         self.course.advance([pose.x, pose.y], lookahead_m);
@@ -135,7 +134,7 @@ impl Controller {
         command.yaw_rate_rad_s = towards(command.yaw_rate_rad_s, yaw_rate, yaw_step);
     }
 
-    /// Starts and ends turns on the spot.
+    /// Starts or ends a turn on the spot.
     fn switch(&mut self, settings: &TraverseSettings) {
         let error = self.command.heading_error_rad;
         if self.turning == 0.0 && error.abs() > settings.turn_start_rad() {
@@ -145,7 +144,7 @@ impl Controller {
         }
     }
 
-    /// Speed and yaw rate before the vehicle's limits of speed and acceleration.
+    /// Desired speed and yaw rate, before the vehicle's limits apply.
     fn wanted(&self, distance_m: f64, settings: &TraverseSettings, limits: &Limits) -> (f64, f64) {
         let controller = settings.controller();
         let speed = settings.speed_m_s().min(limits.speed_m_s);
@@ -162,7 +161,7 @@ impl Controller {
     }
 }
 
-/// The look-ahead point is never taken nearer than this, m.
+/// Smallest distance assumed for the look-ahead point, m.
 const DISTANCE_MIN_M: f64 = 0.1;
 
 fn length(v: [f64; 2]) -> f64 {
@@ -174,7 +173,7 @@ fn towards(value: f64, target: f64, change: f64) -> f64 {
     value + (target - value).clamp(-change, change)
 }
 
-/// An angle brought to [-pi, pi].
+/// An angle wrapped to [-pi, pi].
 pub(crate) fn wrapped(angle: f64) -> f64 {
     let turns = ((angle + PI) / TAU).floor();
     angle - turns * TAU

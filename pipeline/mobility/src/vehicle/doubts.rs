@@ -1,37 +1,39 @@
-//! What makes no sense in a vehicle's numbers though each of them is in range: said before hours are spent on driving it.
+//! Plausibility checks of a vehicle's parameters: combinations that make no sense although each value is in range. They warn
+//! before hours are spent on driving.
 
 use super::model::GRAVITY_M_S2;
 use super::params::VehicleParameters;
 use std::fmt::Write;
 
-/// Share of the wheel's radius by which a tyre may sink under the vehicle's weight.
+/// Largest plausible tyre sag under the vehicle's weight, as a share of the wheel radius.
 const SAG_SHARE_MAX: f64 = 0.2;
-/// Moments of inertia of a chassis over those of a full box of its mass and size: lowest and highest that are believed. A shell of that size has up to 3.
+/// Plausible range of a chassis' moments of inertia, relative to a solid box of the same mass and size. A shell of that size
+/// reaches 3.
 const OVER_BOX: [f64; 2] = [0.2, 4.0];
 
-/// Share by which a mass may change before its moments of inertia must.
+/// Relative change of a mass above which its moments of inertia must change too.
 const MASS_CHANGE_MAX: f64 = 0.1;
-/// Rounding of moments of inertia, as a share.
+/// Relative rounding error of moments of inertia.
 const ROUNDING: f64 = 1e-9;
 
-/// Doubts about a vehicle, a sentence each; `base` is the one that its numbers are changes of.
+/// Warnings about a vehicle, one sentence each; `base` is the vehicle whose parameters were changed.
 pub(crate) fn doubts(vehicle: &VehicleParameters, base: Option<&VehicleParameters>) -> Vec<String> {
     let mut doubts = Vec::new();
     doubts.extend(clearance(vehicle));
     doubts.extend(sag(vehicle));
     doubts.extend(inertia(vehicle));
-    doubts.extend(base.map(|base| left_behind(vehicle, base)).unwrap_or_default());
+    doubts.extend(base.map(|base| not_rescaled(vehicle, base)).unwrap_or_default());
     doubts
 }
 
-/// Wheels that do not reach below the chassis.
+/// Wheels that do not reach below the chassis once the tyres sag.
 fn clearance(vehicle: &VehicleParameters) -> Option<String> {
     let (chassis, wheels) = (&vehicle.chassis, &vehicle.wheels);
     let clearance_m = chassis.bottom_z_m - (wheels.axle_z_m - wheels.radius_m);
     (clearance_m <= sag_m(vehicle)).then(|| {
         format!(
-            "the bottom plate is {:.3} m above the lowest point of the wheels before the tyres sink by {:.3} m, so the vehicle will rest on its belly \
-             in every mission: chassis.bottom_z_m = {}, wheels.axle_z_m = {}, wheels.radius_m = {}",
+            "the bottom plate is {:.3} m above the lowest point of the wheels and the tyres sink by {:.3} m, so the vehicle will \
+             rest on its belly in every mission: chassis.bottom_z_m = {}, wheels.axle_z_m = {}, wheels.radius_m = {}",
             clearance_m, sag_m(vehicle), chassis.bottom_z_m, wheels.axle_z_m, wheels.radius_m
         )
     })
@@ -55,7 +57,7 @@ fn sag(vehicle: &VehicleParameters) -> Option<String> {
     })
 }
 
-/// Moments of inertia that no body has, or none of that mass and size.
+/// Moments of inertia that are unphysical, or implausible for that mass and size.
 fn inertia(vehicle: &VehicleParameters) -> Option<String> {
     let chassis = &vehicle.chassis;
     let [x, y, z] = chassis.inertia_kg_m2;
@@ -79,8 +81,8 @@ fn inertia(vehicle: &VehicleParameters) -> Option<String> {
     ))
 }
 
-/// Numbers that follow from a changed one and were not changed with it.
-fn left_behind(vehicle: &VehicleParameters, base: &VehicleParameters) -> Vec<String> {
+/// Parameters that should have been rescaled with a changed one.
+fn not_rescaled(vehicle: &VehicleParameters, base: &VehicleParameters) -> Vec<String> {
     let (chassis, wheels, old, old_wheels) = (&vehicle.chassis, &vehicle.wheels, &base.chassis, &base.wheels);
     let scaled = |factor: f64, values: &[f64]| {
         values.iter().fold(String::new(), |mut text, value| {
@@ -94,7 +96,8 @@ fn left_behind(vehicle: &VehicleParameters, base: &VehicleParameters) -> Vec<Str
     if chassis.inertia_kg_m2 == old.inertia_kg_m2 {
         if (chassis.mass_kg / old.mass_kg - 1.0).abs() > MASS_CHANGE_MAX {
             doubts.push(format!(
-                "chassis.mass_kg is changed to {} but inertia_kg_m2 still belongs to a mass of {} kg; scaled in proportion: [{}]",
+                "chassis.mass_kg is changed to {} but inertia_kg_m2 still belongs to a mass of {} kg; scaled in proportion it \
+                 would be [{}]",
                 chassis.mass_kg,
                 old.mass_kg,
                 scaled(chassis.mass_kg / old.mass_kg, &old.inertia_kg_m2)
@@ -111,7 +114,7 @@ fn left_behind(vehicle: &VehicleParameters, base: &VehicleParameters) -> Vec<Str
     if body(wheels) != body(old_wheels) && moments(wheels) == moments(old_wheels) {
         let [mass, radius, width] = body(wheels);
         doubts.push(format!(
-            "mass, radius or width of the wheels are changed but not their moments of inertia; solid cylinders would have \
+            "mass, radius or width of the wheels is changed but their moments of inertia are not; solid cylinders would have \
              spin_inertia_kg_m2 = {:.4} and transverse_inertia_kg_m2 = {:.4}",
             0.5 * mass * radius * radius,
             mass / 12.0 * (3.0 * radius * radius + width * width)
@@ -130,9 +133,9 @@ mod tests {
         doubts("husky_a200", &changes)
     }
 
-    /// None of the shipped ones, as they are and as vehicles of a user's own.
+    /// Shipped vehicles raise no warnings, neither by name nor as custom vehicles.
     #[test]
-    fn val_shipped_vehicles_are_beyond_doubt() {
+    fn val_shipped_vehicles_raise_no_warnings() {
         for kind in kinds().iter().filter(|kind| kind.family == "vehicle") {
             assert_eq!(doubts(kind.kind, &Map::new()), Vec::<String>::new(), "{}", kind.kind);
             let all = kind.values().and_then(Value::as_object).unwrap();
@@ -141,14 +144,14 @@ mod tests {
     }
 
     #[test]
-    fn val_each_doubt_is_told() {
+    fn val_each_inconsistency_is_reported() {
         let one = |changes: Value, words: &str| {
             let doubts = of(changes);
             assert!(doubts.len() == 1 && doubts[0].contains(words), "{words}: {doubts:?}");
         };
         one(
             json!({ "chassis": { "mass_kg": 60.0 } }),
-            "still belongs to a mass of 46.034 kg; scaled in proportion: [0.7849, 2.2661, 2.6453]",
+            "still belongs to a mass of 46.034 kg; scaled in proportion it would be [0.7849, 2.2661, 2.6453]",
         );
         one(json!({ "chassis": { "size_m": [1.1, 0.6, 0.25] } }), "size_m is changed");
         one(json!({ "wheels": { "radius_m": 0.15 } }), "spin_inertia_kg_m2 = 0.0297");

@@ -1,24 +1,24 @@
-//! The ground under a vehicle: stored heights, bilinear between cell centres, and an upper bound of them.
+//! The ground under a vehicle: stored heights, bilinear between cell centres, and an upper bound on them.
 //!
-//! All missions of one terrain share a [`Ground`]. Beside the heights it holds their *ceiling*: for every bilinear cell
-//! the largest height of any cell centre that a point of it can reach within the vehicle's `reach`, widened by one more
-//! cell for the interpolation. A group of contact points whose lowest point lies above the ceiling at its centre touches
-//! nothing, so it can be left out without changing a bit of the result. Where a reachable centre holds no data, or lies
-//! beyond the terrain, the ceiling is infinite and nothing is left out.
+//! All missions on one terrain share a [`Ground`]. In addition to the heights it holds their *ceiling*: for every bilinear
+//! cell, the largest height of any cell centre within the vehicle's `reach` of a point of the cell, widened by one more cell
+//! for the interpolation. A group of contact points whose lowest point lies above the ceiling at its centre touches nothing
+//! and can be skipped; the result is bit for bit the same. Where a centre within reach has no data, or lies beyond the
+//! terrain, the ceiling is infinite and nothing is skipped.
 //!
-//! Memory: eight bytes per cell and a rim of one vehicle length; cost of building: two running maxima over the grid.
+//! Memory: eight bytes per cell and a rim of one vehicle length. Cost of building: two running maxima over the grid.
 
 use super::Vehicle;
 use super::surface::{Friction, SurfaceMap};
 use sastrugi_numeric::Grid;
 
-/// Why a terrain cannot carry a vehicle.
+/// Why a vehicle cannot drive on a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum GroundError {
     /// The cells are coarser than the vehicle.
     #[error(
-        "drive `{vehicle}` on cells of {cell_m} m: they are larger than its wheelbase of {wheelbase_m} m; add detail \
-         below the cell with an `elaborate` terrain first"
+        "drive `{vehicle}` on cells of {cell_m} m: they are larger than its wheelbase of {wheelbase_m} m; first add detail \
+         below the cell size with an `elaborate` terrain"
     )]
     CellTooLarge {
         /// Larger side of a cell, m.
@@ -28,14 +28,14 @@ pub enum GroundError {
         /// Name of the vehicle.
         vehicle: String,
     },
-    /// The cells are so fine (or their size so odd) that a vehicle covers too many.
+    /// The cells are so fine that a vehicle covers too many of them, or their size is not a finite positive number.
     #[error(
-        "drive `{vehicle}` on cells of {cell_m} m: it reaches over more than {limit} of them; resample the terrain first"
+        "drive `{vehicle}` on cells of {cell_m} m: the vehicle extends over more than {limit} cells; resample the terrain first"
     )]
     CellTooSmall {
         /// Smaller side of a cell, m.
         cell_m: f64,
-        /// Most cells from the vehicle's centre to its farthest contact point.
+        /// Largest number of cells allowed between the vehicle's centre and its farthest contact point.
         limit: f64,
         /// Name of the vehicle.
         vehicle: String,
@@ -62,7 +62,7 @@ pub struct Ground {
     bounds: [f64; 4],
     /// Heights, south row first, NaN in the rim and where there is no data.
     heights: Vec<f32>,
-    /// Upper bound of the heights in reach of a point of the bilinear cell that starts here.
+    /// Upper bound on the heights within reach of the bilinear cell whose south-west corner is here.
     ceiling: Vec<f32>,
     /// See [`Ground::steepness`].
     steepness: f64,
@@ -72,7 +72,7 @@ pub struct Ground {
     warnings: Vec<String>,
 }
 
-/// Refuses cells, m, that are larger than a vehicle: what it would feel is not there.
+/// Rejects cells, m, that are larger than the vehicle: they do not resolve the relief that excites it.
 ///
 /// # Errors
 /// [`GroundError::CellTooLarge`].
@@ -84,7 +84,7 @@ pub fn check_scale(cell_m: f64, vehicle: &Vehicle) -> Result<(), GroundError> {
     Err(GroundError::CellTooLarge { cell_m, wheelbase_m, vehicle: vehicle.name().to_owned() })
 }
 
-/// Most cells from a vehicle's centre to its farthest contact point.
+/// Largest number of cells between a vehicle's centre and its farthest contact point.
 const EXTENT_MAX_CELLS: f64 = 1000.0;
 
 impl Ground {
@@ -93,6 +93,21 @@ impl Ground {
     ///
     /// # Errors
     /// [`GroundError`] for cells larger than the wheelbase or far too fine, and for terrains without a bilinear cell.
+    ///
+    /// ```
+    /// use sastrugi_mobility::vehicle::{Ground, GroundError, TraverseParameters};
+    /// use sastrugi_numeric::{Geometry, Grid};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let (husky, _) = TraverseParameters::default().prepare()?;
+    /// let terrain = |cell_m: f64| Grid::filled(Geometry::square(40, 40, cell_m), 0.0);
+    /// assert!(Ground::new(&terrain(0.05), &husky)?.warnings().is_empty());
+    /// // Cells larger than a wheel are warned of; cells larger than the wheelbase are refused.
+    /// assert_eq!(Ground::new(&terrain(0.3), &husky)?.warnings().len(), 1);
+    /// assert!(matches!(Ground::new(&terrain(1.0), &husky), Err(GroundError::CellTooLarge { .. })));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn new(dem: &Grid, vehicle: &Vehicle) -> Result<Self, GroundError> {
         let geometry = dem.geometry;
         let coarse_m = geometry.cell[0].max(geometry.cell[1]);
@@ -127,24 +142,24 @@ impl Ground {
         })
     }
 
-    /// The same ground with a surface that changes from place to place.
+    /// The same ground with a spatially varying surface.
     pub fn with_surface(mut self, surface: SurfaceMap) -> Self {
         self.surface = Some(surface);
         self
     }
 
-    /// True when the ground says what it is made of.
+    /// True when the ground has a surface map.
     pub(crate) fn has_surface(&self) -> bool {
         self.surface.is_some()
     }
 
-    /// Coefficients at a point, where the ground has a surface of its own.
+    /// Coefficients at a point, if the ground has a surface map.
     #[inline(always)]
     pub(crate) fn friction(&self, x: f64, y: f64) -> Option<Friction> {
         self.surface.as_ref().map(|surface| surface.at(x, y))
     }
 
-    /// What a reader of the results should know about this terrain.
+    /// Warnings about this terrain, for readers of the results.
     pub fn warnings(&self) -> &[String] {
         &self.warnings
     }
@@ -180,27 +195,27 @@ impl Ground {
         (dx, dy)
     }
 
-    /// No point within `reach_m` of this one (in plan) is higher, m; infinite where a height may be undefined.
+    /// Upper bound on the heights within `reach_m` of this point in plan, m; infinite where a height may be undefined.
     #[inline(always)]
     pub(crate) fn ceiling(&self, x: f64, y: f64) -> f64 {
         let (k, _, _) = self.locate(x, y);
         self.ceiling.get(k).map_or(f64::INFINITY, |&z| f64::from(z))
     }
 
-    /// What a point that moves by 1 m can lose of its height above the ground, m; infinite for ground with holes.
+    /// Largest loss of height above the ground of a point that moves by 1 m, m; infinite for ground with holes.
     #[inline(always)]
     pub(crate) fn steepness(&self) -> f64 {
         self.steepness
     }
 
-    /// The same ground without a bound: every contact point is looked at.
+    /// The same ground without a ceiling: every contact point is checked.
     #[cfg(test)]
     pub(crate) fn without_ceiling(mut self) -> Self {
         self.ceiling.fill(f32::INFINITY);
         self
     }
 
-    /// Index of the south-west corner of the bilinear cell around a point, and the place in the cell (0 to 1).
+    /// Index of the south-west corner of the bilinear cell that contains a point, and the position within the cell (0 to 1).
     #[inline(always)]
     fn locate(&self, x: f64, y: f64) -> (usize, f64, f64) {
         let u = (x - self.origin[0]) * self.inverse_cell[0];
@@ -220,9 +235,9 @@ impl Ground {
     }
 }
 
-/// The whole cells below a position, as index and as number. Adding 3 x 2^51 leaves a whole number in the low bits of the
-/// sum, for positions up to 2^31 (the rim keeps them positive near the terrain); a position half a rounding error below a
-/// cell counts to it or to its neighbour, where the bilinear surface is the same.
+/// Floor of a position in cells, as index and as number. Adding 3 x 2^51 leaves an integer in the low bits of the sum, for
+/// positions up to 2^31 (the rim keeps them positive near the terrain). A position half a rounding error below a cell is
+/// assigned to that cell or to its neighbour; the bilinear surface is the same there.
 #[inline(always)]
 fn floor(position: f64) -> (usize, f64) {
     const SHIFT: f64 = 6_755_399_441_055_744.0;
@@ -234,8 +249,8 @@ fn cell_warning(cell_m: f64, vehicle: &Vehicle) -> Option<String> {
     let radius_m = vehicle.parameters().wheels.radius_m;
     (cell_m > radius_m).then(|| {
         format!(
-            "cells of {cell_m} m are larger than the wheel radius of {radius_m} m: bumps that the wheels would feel are \
-             missing, and vibration is understated"
+            "cells of {cell_m} m are larger than the wheel radius of {radius_m} m: bumps at the scale of the wheels are missing, \
+             and vibration is underestimated"
         )
     })
 }
@@ -247,7 +262,7 @@ fn framed(dem: &Grid, rim: [usize; 2]) -> (Vec<f32>, usize) {
     let south_first = (0..dem.rows()).rev().map(|row| dem.row(row));
     for (target, source) in heights.chunks_exact_mut(cols).skip(rim[1]).zip(south_first) {
         for (t, &s) in target[rim[0]..].iter_mut().zip(source) {
-            // What overflows single precision is no height.
+            // A value that overflows single precision becomes no data.
             *t = Some(s as f32).filter(|z| z.is_finite()).unwrap_or(f32::NAN);
         }
     }
@@ -261,7 +276,7 @@ fn steepness(dem: &Grid) -> f64 {
         return f64::INFINITY;
     }
     let [cell_x, cell_y] = dem.geometry.cell;
-    // What overflows single precision is infinite here too.
+    // A value that overflows single precision is infinite here too.
     let steepest = |a: &[f64], b: &[f64], cell: f64| {
         a.iter().zip(b).fold(0.0f64, |most, (&a, &b)| most.max((f64::from(a as f32) - f64::from(b as f32)).abs()))
             / cell

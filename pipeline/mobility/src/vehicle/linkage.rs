@@ -1,15 +1,15 @@
-//! How the wheels hang on the chassis: joints, where they put the wheels, and the forces of springs, dampers and stops.
+//! Suspension kinematics: joints, the wheel positions that follow from them, and the forces of springs, dampers and stops.
 //!
-//! Everything is in the body frame, seen from the chassis' reference point (the centre of mass of the whole vehicle with all
-//! joints at zero). A wheel is carried by at most two joints, each of which either lets it slide along z or turns it about
+//! Everything is in the body frame, relative to the chassis' reference point (the centre of mass of the complete vehicle with
+//! all joints at zero). A wheel is carried by at most two joints, each of which either lets it slide along z or turns it about
 //! the transverse axis y:
 //!
-//! * *rigid*: no joint;
+//! * *rigid*: no joints;
 //! * *independent*: one sliding joint per wheel, up positive;
-//! * *rocker-bogie* (three axles): joint 0 is the differential, `+q` on the left and `-q` on the right rocker, joints 1 and
-//!   2 turn the left and right bogie against their rockers. The front wheels hang on the rockers, the others on the bogies.
+//! * *rocker-bogie* (three axles): joint 0 is the differential, `+q` on the left and `-q` on the right rocker; joints 1 and
+//!   2 turn the left and right bogie relative to its rocker. The rockers carry the front wheels, the bogies the others.
 //!
-//! The links have no mass of their own: it belongs to the chassis or the wheels.
+//! The links are massless; their mass is included in the chassis or the wheels.
 
 use super::params::{IndependentParameters, RockerBogieParameters, SuspensionParameters, VehicleParameters};
 use super::vector::{Vec3, add, add_scaled, norm, sub};
@@ -31,7 +31,7 @@ pub(crate) enum Lever {
 }
 
 impl Lever {
-    /// Velocity of a carried point per rate of the joint.
+    /// Velocity of a carried point per unit rate of the joint.
     #[inline(always)]
     pub(crate) fn velocity(&self, point: Vec3) -> Vec3 {
         match self {
@@ -40,7 +40,7 @@ impl Lever {
         }
     }
 
-    /// Rate of turn about y per rate of the joint.
+    /// Angular rate about y per unit rate of the joint.
     #[inline(always)]
     pub(crate) fn turning(&self) -> f64 {
         match self {
@@ -50,18 +50,18 @@ impl Lever {
     }
 }
 
-/// What holds one wheel.
+/// Mount of one wheel.
 #[derive(Clone, Debug)]
 pub(crate) struct Carrier {
     pub hub: Vec3,
     /// The joints that move it.
     pub levers: Vec<(usize, Lever)>,
-    /// Acceleration of the hub against the chassis with all joints at constant rate.
+    /// Acceleration of the hub relative to the chassis at constant joint rates.
     pub drift: Vec3,
 }
 
 impl Carrier {
-    /// No joint moves it.
+    /// A carrier that no joint moves.
     pub(crate) fn fixed(hub: Vec3) -> Self {
         Self { hub, levers: Vec::new(), drift: [0.0; 3] }
     }
@@ -71,14 +71,14 @@ impl Carrier {
         self.levers.extend(levers);
     }
 
-    /// Velocity of a point of the carrier against the chassis.
+    /// Velocity of a point of the carrier relative to the chassis.
     #[inline(always)]
     pub(crate) fn velocity(&self, point: Vec3, rates: &[f64]) -> Vec3 {
         let moved = |v: Vec3, (joint, lever): &(usize, Lever)| add_scaled(v, lever.velocity(point), rates[*joint]);
         self.levers.iter().fold([0.0; 3], moved)
     }
 
-    /// Rate of turn against the chassis about y, rad/s.
+    /// Angular rate about y relative to the chassis, rad/s.
     #[inline(always)]
     pub(crate) fn turning(&self, rates: &[f64]) -> f64 {
         self.levers.iter().map(|(joint, lever)| lever.turning() * rates[*joint]).sum()
@@ -97,7 +97,7 @@ pub(crate) enum Linkage {
     RockerBogie {
         limits_rad: [f64; 2],
         joints: RockerBogieParameters,
-        /// Pivots from the reference point, `[x, z]`.
+        /// Pivots relative to the reference point, `[x, z]`, m.
         rocker: [f64; 2],
         bogie: [f64; 2],
     },
@@ -122,7 +122,7 @@ impl Linkage {
         }
     }
 
-    /// All joints at zero and at rest, for that many wheels.
+    /// All joints at zero and at rest, for `wheels` wheels.
     pub(crate) fn joints(&self, wheels: usize) -> Joints {
         let count = match self {
             Self::Rigid => 0,
@@ -132,13 +132,13 @@ impl Linkage {
         Joints { position: vec![0.0; count], rate: vec![0.0; count] }
     }
 
-    /// How far a wheel's hub may be from its place at rest, m.
+    /// Largest possible distance of a hub from its position at rest, m.
     pub(crate) fn travel_m(&self, hubs: &[Vec3]) -> f64 {
         match self {
             Self::Rigid => 0.0,
-            // Stops are at least as stiff as the springs: twice the travel takes more than the vehicle's weight.
+            // Stops are at least as stiff as the springs: twice the travel would need more than the vehicle's weight.
             Self::Independent { springs, .. } => 2.0 * springs.bump_m.max(springs.droop_m),
-            // Anywhere on a circle about the bogie's pivot, itself anywhere on one about the rocker's.
+            // Anywhere on a circle about the bogie's pivot, which lies anywhere on a circle about the rocker's pivot.
             Self::RockerBogie { rocker, bogie, .. } => {
                 let from = |[x, z]: [f64; 2], hub: &Vec3| norm([hub[0] - x, 0.0, hub[2] - z]);
                 hubs.iter().map(|hub| 2.0 * from(*rocker, hub) + 4.0 * from(*bogie, hub)).fold(0.0, f64::max)
@@ -146,15 +146,15 @@ impl Linkage {
         }
     }
 
-    /// Carriers of wheels with those hubs (from the reference point, joints at zero; axle by axle from the front, left before
-    /// right).
+    /// Carriers of wheels with hubs at `hubs` (relative to the reference point, joints at zero; axle by axle from the front,
+    /// left before right).
     pub(crate) fn carriers(&self, hubs: &[Vec3], joints: &Joints) -> Vec<Carrier> {
         let mut carriers: Vec<Carrier> = hubs.iter().map(|&hub| Carrier::fixed(hub)).collect();
         self.place(hubs, joints, &mut carriers);
         carriers
     }
 
-    /// Moves the carriers to the joints' positions.
+    /// Updates the carriers for the current joint positions.
     pub(crate) fn place(&self, hubs: &[Vec3], joints: &Joints, carriers: &mut [Carrier]) {
         match self {
             Self::Rigid => (),
@@ -212,7 +212,7 @@ impl Linkage {
     }
 }
 
-/// A wheel of a rocker-bogie: turned with its rocker about the rocker's pivot, and with its bogie about the bogie's.
+/// Places a wheel of a rocker-bogie: rotated with its rocker about the rocker's pivot, and with its bogie about the bogie's.
 fn swing(carrier: &mut Carrier, hub: Vec3, wheel: usize, [rocker, bogie]: [[f64; 2]; 2], joints: &Joints) {
     let side = wheel % 2;
     let sign = [1.0, -1.0][side];
@@ -237,7 +237,7 @@ fn swing(carrier: &mut Carrier, hub: Vec3, wheel: usize, [rocker, bogie]: [[f64;
     carrier.drift = [inward(0), 0.0, inward(2)];
 }
 
-/// A vector turned about y (nose down positive).
+/// A vector rotated about y (nose down positive).
 fn turned_about_y([x, y, z]: Vec3, angle: f64) -> Vec3 {
     let (sin, cos) = libm::sincos(angle);
     [cos * x + sin * z, y, cos * z - sin * x]

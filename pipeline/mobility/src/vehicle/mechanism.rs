@@ -1,14 +1,14 @@
-//! A vehicle as rigid bodies on joints, for other simulators.
+//! Export of a vehicle as rigid bodies on joints, for other simulators.
 //!
-//! Bodies and joints are those of the model, with the same masses, moments of inertia, springs, dampers, stops and motors. What
-//! other engines take differently:
+//! Bodies and joints are those of the model, with the same masses, moments of inertia, springs, dampers, stops and motors. The
+//! differences required by other engines are:
 //!
 //! * wheels are rigid cylinders: the sag of the tyres is stated, not modelled;
-//! * engines refuse links without mass: a rocker takes [`LINK_SHARE`] of the front wheel's mass, at its hub, and a bogie as much of
-//!   both of its wheels, at theirs. Mass and centre of mass of the whole stay as they are, whatever the joints' positions; the
-//!   moments of inertia grow by `LINK_SHARE` of a wheel's transverse one for each link;
-//! * steering has no inertia in the model: a servo stiff enough to hold a wheel that scrubs on the spot within
-//!   [`STEERING_ERROR_DEG`], critically damped, follows its command instead.
+//! * engines reject massless links, so a rocker takes [`LINK_SHARE`] of the front wheel's mass, at its hub, and a bogie the same
+//!   share of both of its wheels, at their hubs. Total mass and centre of mass are unchanged for any joint positions; the
+//!   moments of inertia grow by `LINK_SHARE` of a wheel's transverse moment for each link;
+//! * steering has no inertia in the model; here a critically damped servo follows the command, stiff enough to hold a wheel
+//!   that scrubs on the spot within [`STEERING_ERROR_DEG`].
 
 use super::model::{GRAVITY_M_S2, SIDES, Vehicle, Wheel, hubs};
 use super::params::{DriveParameters, IndependentParameters, RockerBogieParameters, SuspensionParameters};
@@ -18,15 +18,15 @@ use sastrugi_schemas::mechanism::{
     Coupling, GroundFriction, Joint, Link, Mechanism, Motion, Motor, Servo, Shape, Spring,
 };
 
-/// Share of a wheel's mass that goes to the link that carries it.
+/// Share of a wheel's mass that is assigned to the link that carries it.
 const LINK_SHARE: f64 = 0.01;
-/// Error of a steering angle under the torque of a wheel that scrubs on the spot, deg.
+/// Steering error under the torque of a wheel that scrubs on the spot, deg.
 const STEERING_ERROR_DEG: f64 = 1.0;
-/// Number of the chassis among the links.
+/// Index of the chassis among the links.
 const CHASSIS: usize = 0;
 
 impl Vehicle {
-    /// The vehicle as rigid bodies on joints, with the friction of a surface as its default.
+    /// The vehicle as rigid bodies on joints, with the friction of `surface` as its default.
     pub fn mechanism(&self, surface: &SurfaceParameters) -> Mechanism {
         let wheels = &self.parameters().wheels;
         let friction = friction(surface);
@@ -41,7 +41,7 @@ impl Vehicle {
         }
     }
 
-    /// Weight on a wheel of a vehicle whose wheels all carry the same, N.
+    /// Load per wheel if all wheels carry equal shares of the weight, N.
     fn static_load_n(&self) -> f64 {
         self.mass_kg * GRAVITY_M_S2 / self.wheels.len() as f64
     }
@@ -78,7 +78,7 @@ impl Vehicle {
         }
     }
 
-    /// A wheel on the link `parent`, with its hub from there.
+    /// A wheel on the link `parent`, with its hub relative to that link.
     fn wheel_link(&self, wheel: &Wheel, parent: usize, hub: Vec3) -> Link {
         let wheels = &self.parameters().wheels;
         let across = wheels.transverse_inertia_kg_m2;
@@ -161,12 +161,12 @@ impl Vehicle {
         self.add_wheel(links, rear, bogie, hubs, bogie_at);
     }
 
-    /// A wheel by its number, on the link `parent` whose frame stands at `pivot` in base_link.
+    /// Adds a wheel, by its index, to the link `parent`, whose frame lies at `pivot` in base_link.
     fn add_wheel(&self, links: &mut Vec<Link>, wheel: usize, parent: usize, hubs: &[Vec3], pivot: Vec3) {
         links.push(self.wheel_link(&self.wheels[wheel], parent, sub(hubs[wheel], pivot)));
     }
 
-    /// A rocker or bogie with its pivot at `pivot` in base_link, with its share of the wheels at `hubs`.
+    /// A rocker or bogie with its pivot at `pivot` in base_link and its share of the mass of the wheels at `hubs`.
     fn carrier_link(
         &self,
         name: &str,
@@ -180,9 +180,9 @@ impl Vehicle {
         let each_kg = LINK_SHARE * wheels.mass_kg;
         let middle = scale(hubs.iter().fold([0.0; 3], |sum, &hub| add(sum, hub)), 1.0 / hubs.len() as f64);
         let own = LINK_SHARE * wheels.transverse_inertia_kg_m2;
-        // All hubs of a link stand on one line along x.
+        // All hubs of a link lie on one line along x.
         let along: f64 = hubs.iter().map(|hub| each_kg * (hub[0] - middle[0]) * (hub[0] - middle[0])).sum();
-        // The model has one damper in the differential, which turns with both rockers: each takes half of it.
+        // The model has one damper in the differential, which turns with both rockers: each gets half of it.
         let (limit_deg, damping) = match parent {
             CHASSIS => (joints.rocker_limit_deg, 0.5 * joints.damping_n_m_s),
             _ => (joints.bogie_limit_deg, joints.damping_n_m_s),
@@ -263,7 +263,7 @@ impl Vehicle {
 
     fn steering_servo(&self, wheel_friction: f64, rate_limit_rad_s: f64) -> Servo {
         let wheels = &self.parameters().wheels;
-        // On ice a wheel still takes a torque to turn.
+        // Even on ice, turning a wheel requires some torque.
         let scrub_n_m = wheel_friction.max(0.1) * self.static_load_n() * 0.5 * wheels.width_m;
         let stiffness_n_m = scrub_n_m / STEERING_ERROR_DEG.to_radians();
         Servo::Angle {

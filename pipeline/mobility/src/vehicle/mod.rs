@@ -1,11 +1,11 @@
-//! Vehicles: their parameters as data, and the dynamics that drive them over a terrain.
+//! Vehicles: their parameters as data, and their dynamics on a terrain.
 //!
 //! # Model
-//! A rigid body with six degrees of freedom and one more per side, the spin of the wheels that a motor channel turns
+//! A rigid body with six degrees of freedom, plus one per side: the spin of the wheels that one motor channel turns
 //! together. State: position of the centre of mass, velocity, unit quaternion, body angular velocity `w`, spin `W` of
-//! either side, and one deflection per contact (`contact.rs`, `belly.rs`). With mass `m`, inertia `I` (wheels included,
-//! save their spin), contact forces `F` at `p`, rolling-resistance couples and wheel spin momentum `J W` about the axle
-//! direction `y`,
+//! each side, and one deflection per contact (`contact.rs`, `belly.rs`). With mass `m`, inertia `I` (including the wheels
+//! but not their spin), contact forces `F` at `p`, rolling-resistance couples, and wheel spin momentum `J W` about the axle
+//! direction `y`:
 //!
 //! ```text
 //! m a        = sum F - m g z
@@ -13,13 +13,13 @@
 //! J dW/dt    = torque - r sum F_x + sum rolling                        (per side, implicit: drive.rs)
 //! ```
 //!
-//! The motor torque itself is internal: what the chassis feels of it is the contact force at its true point and the
-//! change of the wheels' momentum. Fixed steps, semi-implicit (velocities first, then positions with the new
-//! velocities); 500 Hz unless told otherwise.
+//! The motor torque is internal: it acts on the chassis through the contact force at its true point of action and through
+//! the change of the wheels' momentum. Integration: fixed steps, semi-implicit Euler (velocities first, then positions with
+//! the new velocities), 500 Hz by default.
 //!
-//! Source: the vehicle of Majhor and Bos, section 2; the model is described in `docs/traversal.md`. Only `+ - * /`, `sqrt` and
-//! `libm` are used. Cost: about a microsecond per step and vehicle. What the model leaves out (side walls, spikes between
-//! rays, soil) is listed in `docs/traversal.md`.
+//! Source: the vehicle of Majhor and Bos, section 2. `docs/traversal.md` describes the model and lists what it leaves out
+//! (side walls, spikes between rays, soil). Only `+ - * /`, `sqrt` and `libm` are used. Cost: about a microsecond per step
+//! and vehicle.
 
 mod actuation;
 mod articulated;

@@ -1,4 +1,4 @@
-//! A checked vehicle and what follows from its parameters once and for all.
+//! A checked vehicle and the quantities derived once from its parameters.
 
 use super::belly::Belly;
 use super::contact::Tyre;
@@ -18,34 +18,34 @@ pub(crate) const SIDES: [&str; 2] = ["left", "right"];
 #[derive(Clone, Debug)]
 pub(crate) struct Wheel {
     pub name: String,
-    /// Hub from the centre of mass with all joints at zero, m.
+    /// Hub relative to the centre of mass with all joints at zero, m.
     pub hub: Vec3,
     /// Motor channel that turns it.
     pub channel: usize,
     pub steered: bool,
-    /// Hub in plan from the point of the chassis that a turn is commanded about: forward and left, m.
+    /// Hub in plan relative to the point of the chassis about which a turn is commanded: forward and left, m.
     pub turning_arm_m: [f64; 2],
 }
 
-/// A vehicle that was checked and can drive.
+/// A vehicle with checked parameters.
 #[derive(Clone, Debug)]
 pub struct Vehicle {
     name: String,
     parameters: VehicleParameters,
     pub(crate) mass_kg: f64,
-    /// Moments of inertia of the whole vehicle about its centre of mass, joints at zero, without the spin of the wheels,
+    /// Moments of inertia of the complete vehicle about its centre of mass, joints at zero, without the spin of the wheels,
     /// kg m2.
     pub(crate) inertia_kg_m2: Vec3,
-    /// Those of chassis and wheels about their own centres, without the spin of the wheels, kg m2.
+    /// Moments of inertia of chassis and wheels about their own centres, without the spin of the wheels, kg m2.
     pub(crate) own_inertia_kg_m2: Vec3,
-    /// Centre of mass of the whole vehicle in base_link, joints at zero, m.
+    /// Centre of mass of the complete vehicle in base_link, joints at zero, m.
     pub(crate) centre_of_mass_m: Vec3,
-    /// Centre of mass of the chassis from that of the whole vehicle, m.
+    /// Centre of mass of the chassis relative to that of the complete vehicle, m.
     pub(crate) chassis_centre_m: Vec3,
     pub(crate) wheels: Vec<Wheel>,
-    /// Hubs of all wheels, as in `wheels`.
+    /// Hubs of all wheels, in the order of `wheels`.
     pub(crate) hubs: Vec<Vec3>,
-    /// Moment of inertia about the axle of all wheels of each motor channel, kg m2.
+    /// Total moment of inertia about the axle of the wheels of each motor channel, kg m2.
     pub(crate) spin_inertia: Vec<f64>,
     pub(crate) linkage: Linkage,
     pub(crate) tyre: Tyre,
@@ -58,8 +58,8 @@ impl Vehicle {
     /// The products of inertia are taken as 0: the body axes are principal axes.
     ///
     /// # Errors
-    /// A [`ParameterError`] for a number out of range, wheels inside each other, a centre of mass that is not between
-    /// the wheels, or a fan of rays too coarse for the tyre's sag.
+    /// A [`ParameterError`] for a number out of range, overlapping wheels, a centre of mass that is not between the wheels,
+    /// or a fan of rays too coarse for the tyre's sag.
     pub fn new(name: &str, parameters: VehicleParameters) -> Result<Self, ParameterError> {
         parameters.check()?;
         let hubs = hubs(&parameters);
@@ -90,12 +90,12 @@ impl Vehicle {
         })
     }
 
-    /// Name, as `husky_a200`.
+    /// Name, such as `husky_a200`.
     pub fn name(&self) -> &str {
         &self.name
     }
 
-    /// The parameters it was made from.
+    /// The parameters of the vehicle.
     pub fn parameters(&self) -> &VehicleParameters {
         &self.parameters
     }
@@ -106,7 +106,8 @@ impl Vehicle {
         axles[0] - axles[axles.len() - 1]
     }
 
-    /// Half the diagonal of the rectangle around chassis and wheels in plan, m: the radius that a turning vehicle sweeps.
+    /// Half the diagonal of the rectangle around chassis and wheels in plan, m: the radius that the vehicle sweeps when it
+    /// turns on the spot.
     pub fn half_diagonal_m(&self) -> f64 {
         let (wheels, size) = (&self.parameters.wheels, self.parameters.chassis.size_m);
         let length = size[0].max(self.wheelbase_m() + 2.0 * wheels.radius_m);
@@ -114,7 +115,7 @@ impl Vehicle {
         0.5 * (length * length + width * width).sqrt()
     }
 
-    /// The vehicle as drawn.
+    /// Outline of the vehicle for drawing.
     pub fn outline(&self) -> VehicleOutline {
         let (chassis, wheels) = (&self.parameters.chassis, &self.parameters.wheels);
         let wheel = |w: &Wheel| WheelOutline {
@@ -140,12 +141,12 @@ impl Vehicle {
         self.spin_inertia.len()
     }
 
-    /// No contact point lies farther from the centre of its wheel or group, m.
+    /// Largest distance of a contact point from the centre of its wheel or tile, m.
     pub(crate) fn reach_m(&self) -> f64 {
         self.tyre.reach_m.max(self.belly.reach_m)
     }
 
-    /// No contact point lies farther from the centre of mass, m.
+    /// Largest distance of a contact point from the centre of mass, m.
     pub(crate) fn extent_m(&self) -> f64 {
         let wheels = self.wheels.iter().map(|w| norm(w.hub) + self.tyre.reach_m);
         wheels.fold(self.belly.extent_m, f64::max) + self.linkage.travel_m(&self.hubs)
@@ -181,7 +182,7 @@ fn wheels(parameters: &VehicleParameters, hubs: &[Vec3], centre_of_mass: Vec3) -
     hubs.iter().enumerate().map(wheel).collect()
 }
 
-/// A vehicle that turns on the spot can point its steered wheels along the circle about its middle.
+/// A vehicle that turns on the spot must be able to point its steered wheels along the circle about its centre.
 fn check_spot_turn(drive: &DriveParameters, wheels: &[Wheel]) -> Result<(), ParameterError> {
     let DriveParameters::Ackermann(drive) = drive else { return Ok(()) };
     let angle = |w: &Wheel| libm::atan2(w.turning_arm_m[0].abs(), w.turning_arm_m[1].abs()).to_degrees();
@@ -209,7 +210,7 @@ fn centre_of_mass(parameters: &VehicleParameters, hubs: &[Vec3], mass_kg: f64) -
     })
 }
 
-/// Steiner's theorem over chassis and wheels; the spin of the wheels about the axle is a degree of freedom of its own.
+/// Parallel-axis theorem over chassis and wheels; the spin of the wheels about the axle is a separate degree of freedom.
 fn inertia(parameters: &VehicleParameters, hubs: &[Vec3], centre: Vec3) -> Vec3 {
     let (chassis, wheels) = (&parameters.chassis, &parameters.wheels);
     let own = own_inertia(parameters);

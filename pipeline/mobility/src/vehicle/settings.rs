@@ -1,4 +1,4 @@
-//! Parameters of a traverse: vehicle, surface, steering, rules of the mission, clocks.
+//! Parameters of a traverse: vehicle, surface, steering, mission rules and rates.
 
 use super::model::{GRAVITY_M_S2, Vehicle};
 use super::params::SuspensionParameters;
@@ -11,32 +11,31 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
-/// A vehicle over missions.
+/// A vehicle and how it drives missions.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TraverseParameters {
-    /// Kind of vehicle (see `sastrugi kinds`), or `custom`: then `vehicle_changes` holds all parameters.
+    /// Kind of vehicle (see `sastrugi kinds`), or `custom`, in which case `vehicle_changes` holds all parameters.
     pub vehicle: String,
-    /// Vehicle parameters that differ from its data file, as `{ drive = { torque_limit_n_m = 30 } }`.
+    /// Vehicle parameters that differ from its data file, such as `{ drive = { torque_limit_n_m = 30 } }`.
     pub vehicle_changes: Map<String, Value>,
     /// Friction and rolling resistance of the ground.
     pub surface: SurfaceParameters,
-    /// Steering along the line.
+    /// Path following.
     pub controller: ControllerParameters,
     /// Commanded speed, m/s (Majhor and Bos, section 2.3: 1).
     pub speed_m_s: f64,
-    /// The goal counts as reached within this distance in plan, m (chosen here).
+    /// The goal counts as reached within this horizontal distance, m (chosen here).
     pub goal_tolerance_m: f64,
-    /// Pitch or roll beyond this is a tip-over, deg, below 90 (Majhor and Bos, section 2.4: 75).
+    /// Pitch or roll beyond this angle is a tip-over, deg, below 90 (Majhor and Bos, section 2.4: 75).
     pub tip_deg: f64,
-    /// A vehicle that moves less than this in plan within `stuck_time_s` is stuck, m (section 2.4: 0.2).
+    /// A vehicle that moves less than this horizontally within `stuck_time_s` is stuck, m (section 2.4: 0.2).
     pub stuck_distance_m: f64,
     /// Time without motion after which a vehicle is stuck, s (section 2.4: 30).
     pub stuck_time_s: f64,
-    /// Longest mission, s (chosen here: about seven times the undisturbed drive).
+    /// Time limit of a mission, s (chosen here: about seven times the undisturbed drive).
     pub timeout_s: f64,
-    /// Time for the vehicle to come to rest on the ground before the clock starts, s; up to ten times as long while its
-    /// suspension still moves.
+    /// Settling time on the ground before the clock starts, s; up to ten times as long while the suspension still moves.
     pub settle_s: f64,
     /// Time steps per second, Hz (500; 1000 to check convergence).
     pub step_rate_hz: u32,
@@ -46,26 +45,25 @@ pub struct TraverseParameters {
     pub imu_rate_hz: u32,
     /// Rate of the steering, Hz; divides `step_rate_hz`.
     pub control_rate_hz: u32,
-    /// How the recorded poses are differentiated for the figures.
+    /// How the recorded poses are differentiated for the metrics.
     pub differentiator: Differentiator,
 }
 
-/// Pure pursuit of the straight line or polyline.
+/// Pure-pursuit steering along the straight line or polyline.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ControllerParameters {
-    /// Distance along the line from the vehicle's foot point to the point it steers for, m; three wheelbases when absent
-    /// (assumed).
+    /// Look-ahead distance, measured along the line from the vehicle's foot point, m; three wheelbases when absent (assumed).
     pub lookahead_m: Option<f64>,
-    /// Time in which the commanded speed covers the look-ahead distance, s, where that is more than `lookahead_m`; the distance does not
-    /// grow with speed when absent.
+    /// Look-ahead time, s: the look-ahead distance is the larger of `lookahead_m` and the commanded speed times this; it does
+    /// not grow with speed when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lookahead_time_s: Option<f64>,
     /// Factor on the yaw rate of the pursuit arc (assumed: 1, the plain arc).
     pub steering_gain: f64,
-    /// Bearing of the point beyond which the vehicle turns on the spot, deg (assumed: the point is behind).
+    /// Bearing of the look-ahead point beyond which the vehicle turns on the spot, deg (assumed: the point is behind).
     pub turn_start_deg: f64,
-    /// Bearing below which it drives on, deg; below `turn_start_deg` (assumed).
+    /// Bearing below which it resumes driving, deg; below `turn_start_deg` (assumed).
     pub turn_stop_deg: f64,
     /// Yaw rate of a turn on the spot, rad/s (assumed: half of the vehicle's limit).
     pub turn_rate_rad_s: f64,
@@ -112,7 +110,19 @@ impl TraverseParameters {
     ///
     /// # Errors
     /// A [`ParameterError`] for an unknown vehicle, a number out of range, rates that do not divide the step rate, or a
-    /// time step that the vehicle's stiffness does not stand.
+    /// time step that is unstable for the vehicle's stiffness.
+    ///
+    /// ```
+    /// use sastrugi_mobility::vehicle::TraverseParameters;
+    ///
+    /// let (vehicle, settings) = TraverseParameters::default().prepare().unwrap();
+    /// assert_eq!(vehicle.name(), "husky_a200");
+    /// // What the study leaves open is filled in.
+    /// assert_eq!(settings.parameters().surface.wheel_friction, Some(1.0));
+    ///
+    /// let coarse = TraverseParameters { step_rate_hz: 100, ..TraverseParameters::default() };
+    /// assert_eq!(coarse.prepare().unwrap_err().key, "step_rate_hz");
+    /// ```
     pub fn prepare(&self) -> Result<(Vehicle, TraverseSettings), ParameterError> {
         let vehicle = registry::vehicle(&self.vehicle, &self.vehicle_changes)?;
         self.check_rules()?;
@@ -139,7 +149,7 @@ impl TraverseParameters {
         ParameterError::between("tip_deg", self.tip_deg, 0.0, 90.0)?;
         ParameterError::between("timeout_s", self.timeout_s, 0.0, TIME_MAX_S)?;
         if !(0.0..TIME_MAX_S).contains(&self.settle_s) {
-            let message = format!("is {}; it must be 0 or above and below {TIME_MAX_S}", self.settle_s);
+            let message = format!("is {}; it must be at least 0 and less than {TIME_MAX_S}", self.settle_s);
             return Err(ParameterError::new("settle_s", message));
         }
         Ok(())
@@ -170,7 +180,7 @@ impl TraverseParameters {
             return Ok(());
         }
         let message = format!(
-            "is {}: steps of {step_s} s are unstable for the stiffness of `{}`; the limit is {limit_s:.2e} s, so take \
+            "is {}: steps of {step_s} s are unstable for the stiffness of `{}`; the limit is {limit_s:.2e} s, so use \
              {} Hz or more",
             self.step_rate_hz,
             vehicle.name(),
@@ -182,9 +192,9 @@ impl TraverseParameters {
 
 /// Look-ahead distance over wheelbase.
 pub(crate) const LOOKAHEAD_WHEELBASES: f64 = 3.0;
-/// Longest mission and settling that is accepted, s.
+/// Longest time limit and settling time accepted, s.
 const TIME_MAX_S: f64 = 86_400.0;
-/// Highest step rate that is accepted, Hz.
+/// Highest step rate accepted, Hz.
 const STEP_RATE_MAX_HZ: u32 = 100_000;
 
 impl ControllerParameters {
@@ -208,7 +218,7 @@ pub struct TraverseSettings {
 }
 
 impl TraverseSettings {
-    /// The parameters it was made from, those that were left open filled in.
+    /// The parameters, with defaults filled in.
     pub fn parameters(&self) -> &TraverseParameters {
         &self.parameters
     }
@@ -247,8 +257,8 @@ impl TraverseSettings {
 /// Largest stable time step of a vehicle with every contact point in the ground, s.
 ///
 /// A semi-implicit Euler step `h` of a mass `M` on a spring `K` with an explicit damper `C` is stable while
-/// `K h^2 + 2 C h < 4 M`; taken for each of the six degrees of freedom of the body by itself, and for every joint of the
-/// suspension.
+/// `K h^2 + 2 C h < 4 M`. The condition is applied to each of the six degrees of freedom of the body separately, and to every
+/// joint of the suspension.
 pub(crate) fn step_limit_s(vehicle: &Vehicle) -> f64 {
     let contacts = contacts(vehicle);
     let limit = |mass: f64, arm_squared: &dyn Fn(Vec3) -> f64| {
@@ -268,7 +278,7 @@ pub(crate) fn step_limit_s(vehicle: &Vehicle) -> f64 {
 }
 
 fn step_limit_of(mass: f64, stiffness: f64, damping: f64) -> f64 {
-    // The root of the condition, written so that it neither cancels nor overflows to a limit that allows everything.
+    // The root of the condition, in a form without cancellation and without overflow to an infinite limit.
     4.0 * mass / (damping + (damping * damping + 4.0 * stiffness * mass).sqrt())
 }
 
@@ -284,7 +294,7 @@ fn joint_step_limit_s(vehicle: &Vehicle) -> f64 {
             step_limit_of(wheel_kg, stiffness, damping + springs.damping_n_s_m)
         }
         SuspensionParameters::RockerBogie(joints) => {
-            // The lightest turning part is a bogie with its two wheels.
+            // The rotating part with the least inertia is a bogie with its two wheels.
             let [x, z] = joints.bogie_pivot_m;
             let wheels = &vehicle.parameters().wheels;
             let arms_squared = |below: f64| -> f64 {
@@ -313,10 +323,46 @@ fn contacts(vehicle: &Vehicle) -> Vec<Contact> {
         damping: tyre.damping_n_s_m.max(tyre.tangential_damping_n_s_m),
     };
     let points = vehicle.belly.points();
-    // The dissipation of all points together follows their load: here the weight.
+    // The total dissipation of all points is proportional to their load, here the weight.
     let dissipation = belly.dissipation_s_m * vehicle.mass_kg * GRAVITY_M_S2 / points.len() as f64;
     let damping = belly.tangential_damping_n_s_m.max(dissipation);
     let wheels = vehicle.wheels.iter().map(|w| Contact { arm: add(w.hub, wheel.arm), ..wheel });
     let points = points.iter().map(|&arm| Contact { arm, stiffness: belly.stiffness_n_m, damping });
     wheels.chain(points).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The limit solves `K h^2 + 2 C h = 4 M`; without a damper it is `2 sqrt(M / K)`, without a spring `2 M / C`.
+    #[test]
+    fn val_the_step_limit_solves_its_condition() {
+        for (mass, stiffness, damping) in [(2.0, 8e4, 0.0), (2.0, 8e4, 300.0), (0.1, 10.0, 50.0), (1e3, 1e6, 1e4)] {
+            let step_s = step_limit_of(mass, stiffness, damping);
+            let left = stiffness * step_s * step_s + 2.0 * damping * step_s;
+            assert!((left / (4.0 * mass) - 1.0).abs() < 1e-12, "{mass} {stiffness} {damping}: {step_s}");
+        }
+        assert!((step_limit_of(2.0, 8e4, 0.0) - 0.01).abs() < 1e-15);
+        assert!((step_limit_of(3.0, 0.0, 60.0) - 0.1).abs() < 1e-15);
+    }
+
+    /// Just below its limit, a semi-implicit oscillator with an explicit damper stays bounded; just above, it grows beyond bounds.
+    #[test]
+    fn val_the_step_limit_separates_stable_from_unstable() {
+        for (mass, stiffness, damping) in [(2.0, 8e4, 0.0), (2.0, 8e4, 300.0), (0.1, 10.0, 50.0)] {
+            let farthest = |share: f64| {
+                let step_s = share * step_limit_of(mass, stiffness, damping);
+                let (mut position, mut velocity, mut farthest) = (1e-3f64, 0.0f64, 0.0f64);
+                for _ in 0..5000 {
+                    velocity -= step_s * (stiffness * position + damping * velocity) / mass;
+                    position += step_s * velocity;
+                    farthest = farthest.max(position.abs());
+                }
+                farthest
+            };
+            let [stable, unstable] = [0.99, 1.01].map(farthest);
+            assert!(stable < 0.1 && unstable > 1e6, "{mass} {stiffness} {damping}: {stable} {unstable}");
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! One vehicle on the ground, step by step.
+//! Time stepping of one vehicle on the ground.
 
 use super::articulated;
 use super::belly::{Bristles, Load, Motion};
@@ -19,7 +19,7 @@ use sastrugi_schemas::topics::WheelState;
 pub(crate) struct Simulation<'a> {
     ground: &'a Ground,
     vehicle: &'a Vehicle,
-    /// Coefficients where the ground has no surface of its own.
+    /// Coefficients where the ground has no surface map.
     friction: Friction,
     tread: Tread,
     /// Largest change of a steering angle over a step, rad.
@@ -27,11 +27,11 @@ pub(crate) struct Simulation<'a> {
     pub body: Body,
     pub joints: Joints,
     carriers: Vec<Carrier>,
-    /// Spin of the wheels of every channel in the map frame, about their axles, rad/s.
+    /// Spin of the wheels of every channel about their axles, in the map frame, rad/s.
     pub spin: Vec<f64>,
     /// The same at the end of the step.
     spun: Vec<f64>,
-    /// Steering angle of each wheel, and where it is told to go, rad.
+    /// Steering angle of each wheel and its commanded value, rad.
     pub steering: Vec<f64>,
     pub steering_target: Vec<f64>,
     /// Angle turned by each wheel relative to its mount, rad.
@@ -39,7 +39,7 @@ pub(crate) struct Simulation<'a> {
     /// Tread deflection of each wheel, forward and left, m.
     deflections: Vec<[f64; 2]>,
     bristles: Bristles,
-    /// The last step of each wheel.
+    /// Motion and load of each wheel in the last step.
     rolls: Vec<Roll>,
     rim: Vec<Vec3>,
     steered_rim: Vec<Vec3>,
@@ -53,18 +53,18 @@ pub(crate) struct Simulation<'a> {
 /// Motion and load of a wheel over a step.
 #[derive(Clone, Copy, Debug, Default)]
 struct Roll {
-    /// In the map frame.
+    /// Axle direction in the map frame.
     axle: Vec3,
-    /// Angular velocity of what holds the wheel, in the map frame, rad/s.
+    /// Angular velocity of the wheel's mount in the map frame, rad/s.
     mount_rate: Vec3,
-    /// Its part about the axle, rad/s.
+    /// Its component about the axle, rad/s.
     mount_spin: f64,
     touch: Option<(Touch, Grip)>,
-    /// Forward and left, N.
+    /// Friction force, forward and left, N.
     friction: [f64; 2],
     /// Drive torque, N m.
     torque: f64,
-    /// Speed of the contact point along the rolling direction as part of its mount, m/s.
+    /// Speed of the contact point along the rolling direction if it were fixed to the mount, m/s.
     ground_speed: f64,
 }
 
@@ -109,7 +109,7 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// Advances by one time step with a servo for every channel.
+    /// Advances by one time step, with one servo per channel.
     pub(crate) fn step(&mut self, servos: &[Servo]) {
         let axes = self.body.axes();
         let motion = Motion {
@@ -132,7 +132,7 @@ impl<'a> Simulation<'a> {
         self.advance(&axes, force, moment);
     }
 
-    /// Moves body and joints under a force and a moment about the reference point, both without gravity.
+    /// Advances body and joints under a force and a moment about the reference point, both without gravity.
     fn advance(&mut self, axes: &Axes, force: Vec3, moment: Vec3) {
         if self.joints.rate.is_empty() {
             self.body.step(self.vehicle, axes, force, moment, self.tread.step_s);
@@ -145,17 +145,17 @@ impl<'a> Simulation<'a> {
         self.vehicle.linkage.place(&self.vehicle.hubs, &self.joints, &mut self.carriers);
     }
 
-    /// Starts the clock: wheel angles count from here.
+    /// Resets the wheel angles, at the start of the mission.
     pub(crate) fn zero_angles(&mut self) {
         self.angle.fill(0.0);
     }
 
-    /// True when no joint of the suspension moves faster than 1 mm/s or 1 mrad/s.
+    /// True if no suspension joint moves faster than 1 mm/s or 1 mrad/s.
     pub(crate) fn joints_are_still(&self) -> bool {
         self.joints.rate.iter().all(|rate| rate.abs() < STILL)
     }
 
-    /// Moves steering angles towards their targets.
+    /// Moves the steering angles towards their targets.
     fn steer(&mut self) {
         for (angle, target) in self.steering.iter_mut().zip(&self.steering_target) {
             *angle += (target - *angle).clamp(-self.steering_step_rad, self.steering_step_rad);
@@ -204,7 +204,7 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// Finds the spin of every channel at the end of the step.
+    /// Solves for the spin of every channel at the end of the step.
     fn turn_wheels(&mut self, servos: &[Servo]) {
         for (channel, (spun, servo)) in self.spun.iter_mut().zip(servos).enumerate() {
             let of_channel = self.vehicle.wheels.iter().zip(&self.rolls).filter(|(wheel, _)| wheel.channel == channel);
@@ -220,7 +220,7 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// Force and moment of all wheels, and what they do along the joints; moves their treads on.
+    /// Force and moment of all wheels and their generalised forces on the joints; updates the tread deflections.
     fn roll(&mut self, motion: &Motion) -> (Vec3, Vec3) {
         let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
         let wheel_inertia = self.vehicle.parameters().wheels.spin_inertia_kg_m2;
@@ -262,8 +262,7 @@ impl<'a> Simulation<'a> {
         load
     }
 
-    /// How deep the deepest contact point lies below the ground, measured upwards, m; negative above it, NaN where the
-    /// ground is undefined.
+    /// Vertical depth of the deepest contact point below the ground, m; negative above it, NaN where the ground is undefined.
     pub(crate) fn deepest_overlap_m(&self) -> f64 {
         let axes = self.body.axes();
         let mut rim = Vec::new();
@@ -280,12 +279,12 @@ impl<'a> Simulation<'a> {
             .fold(f64::NEG_INFINITY, |deepest, o| if o > deepest || o.is_nan() { o } else { deepest })
     }
 
-    /// Size of the force of the ground on the chassis in the last step, N.
+    /// Magnitude of the force of the ground on the chassis in the last step, N.
     pub(crate) fn chassis_force_n(&self) -> f64 {
         norm(self.chassis_force)
     }
 
-    /// Every wheel as recorded, from the last step.
+    /// The recorded state of every wheel after the last step.
     pub(crate) fn wheel_states(&self) -> Vec<WheelState> {
         (0..self.rolls.len()).map(|index| self.wheel_state(index)).collect()
     }
@@ -309,7 +308,7 @@ impl<'a> Simulation<'a> {
     }
 }
 
-/// Axes turned about their z.
+/// Axes rotated about their z axis.
 fn turned_about_z(axes: &Axes, angle: f64) -> Axes {
     let (sin, cos) = libm::sincos(angle);
     Axes { x: add_scaled(scale(axes.x, cos), axes.y, sin), y: add_scaled(scale(axes.y, cos), axes.x, -sin), z: axes.z }
@@ -317,7 +316,8 @@ fn turned_about_z(axes: &Axes, angle: f64) -> Axes {
 
 #[cfg(test)]
 impl Simulation<'_> {
-    /// Mechanical energy: motion, height, and what tyres, treads, springs and stops have stored, J. Steering stands still.
+    /// Mechanical energy, J: kinetic, potential, and the energy stored in tyres, treads, springs and stops. Steering must be
+    /// at rest.
     pub(crate) fn energy_j(&self) -> f64 {
         let (vehicle, body, axes) = (self.vehicle, &self.body, self.body.axes());
         let velocity = axes.to_body(body.velocity);
@@ -342,13 +342,13 @@ impl Simulation<'_> {
     }
 }
 
-/// Rim speed less ground speed over the larger of the two; 0 for a wheel at rest.
+/// Rim speed minus ground speed, divided by the larger of the two; 0 for a wheel at rest.
 fn slip_ratio(rim_m_s: f64, ground_m_s: f64) -> f64 {
     let larger = rim_m_s.abs().max(ground_m_s.abs());
     if larger > REST_M_S { (rim_m_s - ground_m_s) / larger } else { 0.0 }
 }
 
-/// Below this speed of rim and ground a wheel counts as at rest, m/s.
+/// A wheel counts as at rest below this speed of rim and ground, m/s.
 const REST_M_S: f64 = 1e-3;
-/// Slower than this a joint is at rest, m/s or rad/s.
+/// A joint counts as at rest below this rate, m/s or rad/s.
 const STILL: f64 = 1e-3;

@@ -1,8 +1,8 @@
-//! What the ground is made of: friction and rolling resistance, by preset, by roughness class, or by raster.
+//! Surface of the ground: friction and rolling resistance, by preset, by roughness class, or by raster.
 //!
-//! The surface of a study is a preset with changes; classes of roughness may have surfaces of their own; rasters of friction
-//! and of rolling resistance replace the numbers of the wheels where they hold data. The ground does not give way: a preset
-//! is a pair of coefficients, no soil model.
+//! The surface of a study is a preset with changes. Roughness classes may have their own surfaces. Rasters of friction and of
+//! rolling resistance override the wheel coefficients where they hold data. The ground is rigid: a preset is a set of
+//! coefficients, not a soil model.
 
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::{ParameterError, RoughnessClass};
@@ -13,19 +13,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct SurfaceParameters {
-    /// What the ground is made of.
+    /// Material of the ground.
     pub preset: SurfacePreset,
     /// Friction coefficient between tyre and ground; the preset's when absent.
     pub wheel_friction: Option<f64>,
     /// Friction coefficient between chassis and ground; the preset's when absent.
     pub belly_friction: Option<f64>,
-    /// Rolling resistance over normal force; the preset's when absent.
+    /// Rolling resistance coefficient (resistance divided by normal force); the preset's when absent.
     pub rolling_resistance: Option<f64>,
-    /// Surface of cells of low roughness, where it differs.
+    /// Surface of cells of low roughness, if it differs.
     pub low: Option<ClassSurfaceParameters>,
-    /// Surface of cells of semi roughness, where it differs.
+    /// Surface of cells of semi roughness, if it differs.
     pub semi: Option<ClassSurfaceParameters>,
-    /// Surface of cells of high roughness, where it differs.
+    /// Surface of cells of high roughness, if it differs.
     pub high: Option<ClassSurfaceParameters>,
 }
 
@@ -33,13 +33,13 @@ pub struct SurfaceParameters {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ClassSurfaceParameters {
-    /// What the ground is made of; the study's surface when absent.
+    /// Material of the ground; the study's surface when absent.
     pub preset: Option<SurfacePreset>,
     /// Friction coefficient between tyre and ground.
     pub wheel_friction: Option<f64>,
     /// Friction coefficient between chassis and ground.
     pub belly_friction: Option<f64>,
-    /// Rolling resistance over normal force.
+    /// Rolling resistance coefficient (resistance divided by normal force).
     pub rolling_resistance: Option<f64>,
 }
 
@@ -62,7 +62,7 @@ pub enum SurfacePreset {
     Rock,
 }
 
-/// A preset's name, numbers, and where they come from.
+/// Name, coefficients and sources of a preset.
 pub(crate) struct Material {
     pub preset: SurfacePreset,
     pub name: &'static str,
@@ -96,7 +96,7 @@ pub(crate) const MATERIALS: [Material; 6] = [
         preset: SurfacePreset::Sand,
         name: "sand",
         friction: friction(0.53, 0.5, 0.2),
-        summary: "dry loose sand that does not give way",
+        summary: "dry loose sand, treated as rigid",
         source: "wheels: tangent of the friction angle of dry sand, 28 deg (Wong, 2008, terrain values); rolling resistance \
                  within Wong's 0.1 to 0.35 of a field; chassis assumed",
     },
@@ -118,7 +118,7 @@ pub(crate) const MATERIALS: [Material; 6] = [
         preset: SurfacePreset::Rock,
         name: "rock",
         friction: friction(0.8, 0.5, 0.015),
-        summary: "dry rock, as grippy as concrete",
+        summary: "dry rock, with the grip of concrete",
         source: "wheels and rolling resistance: as dry concrete (Wong, 2008: 0.8 to 0.9, 0.013); chassis assumed",
     },
 ];
@@ -132,20 +132,20 @@ pub(crate) struct Friction {
     /// Between chassis and ground.
     #[serde(rename = "belly_friction")]
     pub belly: f64,
-    /// Rolling resistance over normal force.
+    /// Rolling resistance coefficient.
     #[serde(rename = "rolling_resistance")]
     pub rolling: f64,
 }
 
 impl SurfacePreset {
-    /// Where its numbers come from.
+    /// Source of its coefficients.
     pub(crate) fn source(self) -> &'static str {
         MATERIALS.iter().find(|m| m.preset == self).map_or("", |m| m.source)
     }
 }
 
 impl Friction {
-    /// Of a preset.
+    /// Coefficients of a preset.
     fn of(preset: SurfacePreset) -> Self {
         MATERIALS.iter().find(|m| m.preset == preset).map_or(MATERIALS[0].friction, |m| m.friction)
     }
@@ -176,12 +176,12 @@ impl SurfaceParameters {
         classes.into_iter().try_for_each(check)
     }
 
-    /// Where no class and no raster says otherwise.
+    /// Coefficients where no class or raster overrides them.
     pub(crate) fn friction(&self) -> Friction {
         Friction::of(self.preset).with(self.wheel_friction, self.belly_friction, self.rolling_resistance)
     }
 
-    /// Writes out the numbers that the preset stands for.
+    /// Fills in the coefficients of the preset.
     pub(crate) fn fill(&mut self) {
         let Friction { wheel, belly, rolling } = self.friction();
         (self.wheel_friction, self.belly_friction, self.rolling_resistance) = (Some(wheel), Some(belly), Some(rolling));
@@ -205,14 +205,14 @@ impl ClassSurfaceParameters {
     }
 }
 
-/// Rasters that say where the surface changes; each has a geometry of its own, in the terrain's coordinates.
+/// Rasters that override the surface locally; each has its own geometry, in the terrain's coordinates.
 #[derive(Clone, Debug, Default)]
 pub struct SurfaceLayers {
     /// Codes of [`RoughnessClass`].
     pub classes: Option<Grid<u8>>,
-    /// Friction coefficient between tyre and ground; NaN where the surface has its own.
+    /// Friction coefficient between tyre and ground; NaN where the surface's own applies.
     pub wheel_friction: Option<Grid>,
-    /// Rolling resistance over normal force; NaN where the surface has its own.
+    /// Rolling resistance coefficient; NaN where the surface's own applies.
     pub rolling_resistance: Option<Grid>,
 }
 
@@ -223,21 +223,21 @@ impl SurfaceLayers {
     }
 }
 
-/// A raster that is no surface.
+/// A raster with an invalid coefficient.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
-#[error("take {value} at ({x_m:.2}, {y_m:.2}) m for {what}: it must be 0 or above, or no data")]
+#[error("use {value} at ({x_m:.2}, {y_m:.2}) m for {what}: it must be finite and not negative, or no data")]
 pub struct SurfaceError {
-    /// What the raster holds.
+    /// Quantity that the raster holds.
     pub what: &'static str,
     /// The value.
     pub value: f64,
-    /// Centre of its cell, easting.
+    /// Easting of the cell centre, m.
     pub x_m: f64,
-    /// Centre of its cell, northing.
+    /// Northing of the cell centre, m.
     pub y_m: f64,
 }
 
-/// The surface at every place of a terrain.
+/// The surface at every point of a terrain.
 #[derive(Clone, Debug)]
 pub struct SurfaceMap {
     all: Friction,
@@ -246,7 +246,7 @@ pub struct SurfaceMap {
 }
 
 impl SurfaceMap {
-    /// The surface that parameters and layers describe together. A layer counts in the cell around a point.
+    /// The surface from parameters and layers. The value of a layer applies throughout its cell.
     ///
     /// # Errors
     /// A raster with a negative or infinite value.
@@ -315,6 +315,11 @@ mod tests {
         let wheel = |x: f64| map.at(x, 0.5).wheel;
         assert_eq!([wheel(0.5), wheel(1.5), wheel(2.5), wheel(3.5), wheel(9.0)], [0.8, 0.3, 0.53, 0.9, 0.8]);
         assert_eq!(map.at(3.5, 0.5).rolling, 0.2);
+        // The belly takes the friction of its class, whatever the raster of the wheels holds.
+        assert_eq!([map.at(0.5, 0.5), map.at(3.5, 0.5)], [friction(0.8, 0.5, 0.015), friction(0.9, 0.5, 0.2)]);
+        let rolling = SurfaceLayers { rolling_resistance: Some(Grid::filled(g, 0.07)), ..layers.clone() };
+        let map = SurfaceMap::new(&parameters, rolling).unwrap();
+        assert_eq!([map.at(1.5, 0.5), map.at(9.0, 0.5)], [friction(0.3, 0.5, 0.07), friction(0.8, 0.5, 0.015)]);
         let negative = SurfaceLayers { rolling_resistance: Some(Grid::new(g, vec![0.0, -0.1, 0.0, 0.0])), ..layers };
         let error = SurfaceMap::new(&parameters, negative).unwrap_err().to_string();
         assert!(error.contains("-0.1 at (1.50, 0.50) m for rolling resistance"), "{error}");

@@ -1,4 +1,4 @@
-//! A mission from the settled start to its outcome.
+//! Drives a mission from the settled start to its outcome.
 
 use super::actuation::{self, Limits};
 use super::body::Body;
@@ -16,7 +16,7 @@ use sastrugi_schemas::topics::{CommandSample, Event, EventKind, ImuSample, Recor
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TraverseError {
     /// The ground was prepared for a smaller vehicle.
-    #[error("drive `{vehicle}` on ground prepared for a smaller vehicle; prepare it for this one")]
+    #[error("drive `{vehicle}`: the ground was prepared for a smaller vehicle; prepare it for `{vehicle}`")]
     OtherVehicle {
         /// Name of the vehicle.
         vehicle: String,
@@ -24,8 +24,8 @@ pub enum TraverseError {
     /// The surface differs by roughness class, and the ground was prepared without classes.
     #[error("drive on a surface that differs by roughness class: the ground was prepared without a class map")]
     NoSurface,
-    /// Start or goal is not a point.
-    #[error("drive from {start_m:?} to {goal_m:?}: start and goal must be finite and apart")]
+    /// Start or goal is not finite, or they coincide.
+    #[error("drive from {start_m:?} to {goal_m:?}: start and goal must be finite and must differ")]
     NoLine {
         /// Start, m.
         start_m: [f64; 2],
@@ -34,10 +34,30 @@ pub enum TraverseError {
     },
 }
 
-/// Drives one mission. Time 0 is when the vehicle stands at rest on the start point, facing along its heading.
+/// Drives one mission. At time 0 the vehicle stands at rest on the start point, facing along its heading.
 ///
 /// # Errors
 /// [`TraverseError`]; a vehicle that tips, sticks, leaves the terrain or runs out of time is an outcome, not an error.
+///
+/// ```
+/// use sastrugi_mobility::missions::Mission;
+/// use sastrugi_mobility::vehicle::{Ground, TraverseParameters, drive};
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_schemas::topics::EventKind;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let (vehicle, settings) = TraverseParameters { timeout_s: 2.0, ..Default::default() }.prepare()?;
+/// let terrain = Grid::filled(Geometry::square(120, 320, 0.05), 0.0);
+/// let ground = Ground::new(&terrain, &vehicle)?;
+/// // Ten metres at 1 m/s are not driven in 2 s.
+/// let recording = drive(&ground, &vehicle, &settings, &Mission::between(0, [3.0, 3.0], [13.0, 3.0]))?;
+/// let end = recording.events.last().unwrap();
+/// assert_eq!((end.kind, end.time_s), (EventKind::Timeout, 2.0));
+/// // Poses at 20 Hz, from time 0 to the end.
+/// assert_eq!(recording.states.len(), 41);
+/// # Ok(())
+/// # }
+/// ```
 pub fn drive(
     ground: &Ground,
     vehicle: &Vehicle,
@@ -58,7 +78,7 @@ pub fn drive(
     }
     Ok(match settled(ground, vehicle, settings, mission) {
         Some(simulation) => Run::new(simulation, ground, vehicle, settings, mission).finish(),
-        None => nowhere(vehicle, settings.parameters(), mission),
+        None => invalid_start(vehicle, settings.parameters(), mission),
     })
 }
 
@@ -88,11 +108,11 @@ pub(crate) fn settled<'a>(
     (!simulation.undefined).then_some(simulation)
 }
 
-/// A vehicle whose suspension still moves is given this many times `settle_s` to come to rest.
+/// A vehicle whose suspension still moves gets up to this many times `settle_s` to come to rest.
 const SETTLE_FACTOR: u64 = 10;
 
-/// Pose with the base_link origin over the start, tilted as the plane through the ground under the hubs, wheels about on
-/// that plane.
+/// Pose with the base_link origin above the start, tilted like the least-squares plane through the ground under the hubs,
+/// with the wheels approximately on that plane.
 fn fitted(ground: &Ground, vehicle: &Vehicle, mission: &Mission) -> Option<Body> {
     let [x0, y0] = mission.start_m;
     if !ground.contains(x0, y0) {
@@ -127,8 +147,8 @@ fn tilted([cos, sin]: [f64; 2], ahead: f64, left: f64) -> Axes {
     Axes { x, y: cross(z, x), z }
 }
 
-/// The recording of a vehicle whose start is on no ground.
-fn nowhere(vehicle: &Vehicle, parameters: &TraverseParameters, mission: &Mission) -> Recording {
+/// The recording of a vehicle whose start has no valid ground.
+fn invalid_start(vehicle: &Vehicle, parameters: &TraverseParameters, mission: &Mission) -> Recording {
     let (sin, cos) = libm::sincos(0.5 * mission.heading_rad);
     let state = StateSample {
         time_s: 0.0,
@@ -138,7 +158,7 @@ fn nowhere(vehicle: &Vehicle, parameters: &TraverseParameters, mission: &Mission
         angular_velocity_rad_s: [0.0; 3],
     };
     let text = format!(
-        "the start ({:.2}, {:.2}) m lies off the terrain, beside cells without data, or on extreme ground",
+        "the start ({:.2}, {:.2}) m lies off the terrain, next to cells without data, or on extreme relief",
         mission.start_m[0], mission.start_m[1]
     );
     let event = Event { time_s: 0.0, kind: EventKind::OutOfBounds, text };
@@ -158,10 +178,11 @@ fn empty(vehicle: &Vehicle, parameters: &TraverseParameters) -> Recording {
     }
 }
 
-/// Steps per metre, and per unit of a quaternion, of recorded poses: 1 micrometre. The digits below tell nothing and do not
-/// compress: they were a tenth of every recording. Differentiated twice at 20 Hz they amount to 0.3 mm/s2.
+/// Quantisation of recorded poses, steps per metre and per unit of a quaternion: 1 micrometre. Finer digits carry no
+/// information and do not compress; they made up a tenth of every recording. Differentiated twice at 20 Hz, the rounding
+/// amounts to 0.3 mm/s2.
 const POSE_STEPS: f64 = 1_048_576.0;
-/// Steps per m/s and rad/s of recorded motions.
+/// Quantisation of recorded velocities, steps per m/s and rad/s.
 const MOTION_STEPS: f64 = 65_536.0;
 
 fn in_steps(value: f64, steps: f64) -> f64 {
@@ -182,7 +203,7 @@ struct Run<'a> {
     steps: u64,
     /// Velocity of base_link at the last inertial measurement.
     imu_velocity: Vec3,
-    /// Where and when the vehicle last was as far as `stuck_distance_m` from where it had been.
+    /// Position and time at which the vehicle last completed a move of `stuck_distance_m`.
     moved: ([f64; 2], f64),
 }
 
@@ -197,7 +218,7 @@ impl<'a> Run<'a> {
         let (position, imu_velocity) = simulation.body.base(vehicle);
         let way = match &mission.line {
             None => format!("goal {:.2} m away", mission.length_m()),
-            Some(line) => format!("{:.2} m to follow", line.length_m()),
+            Some(line) => format!("course of {:.2} m", line.length_m()),
         };
         let text = format!("at ({:.2}, {:.2}, {:.2}) m, {way}", position[0], position[1], position[2]);
         let mut recording = empty(vehicle, settings.parameters());
@@ -217,7 +238,7 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// Steps to the outcome.
+    /// Steps until the outcome.
     fn finish(mut self) -> Recording {
         loop {
             if !self.simulation.body.is_finite() {
@@ -235,9 +256,9 @@ impl<'a> Run<'a> {
         }
     }
 
-    /// The recording up to where the numbers of ground or vehicle were too large to go on with.
+    /// The recording up to the step at which the motion overflowed.
     fn diverged(mut self) -> Recording {
-        let text = "the motion went beyond all bounds: the ground or a number of the vehicle is extreme".to_owned();
+        let text = "the simulation diverged: the relief or a vehicle parameter is extreme".to_owned();
         self.recording.events.push(Event { time_s: self.time_s(), kind: EventKind::OutOfBounds, text });
         self.recording
     }
@@ -250,12 +271,12 @@ impl<'a> Run<'a> {
         self.steps as f64 / f64::from(self.parameters().step_rate_hz)
     }
 
-    /// True when something at this rate falls on the current step.
+    /// True when an event at this rate falls on the current step.
     fn is_due(&self, rate_hz: u32) -> bool {
         self.steps.is_multiple_of(u64::from(self.parameters().step_rate_hz / rate_hz))
     }
 
-    /// Control and recording at their rates. At one instant the commands come first, then the samples.
+    /// Control and recording at their rates. At the same instant, commands come before samples.
     fn on_clock(&mut self) {
         let parameters = self.parameters();
         if self.is_due(parameters.control_rate_hz) {
@@ -305,7 +326,8 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// Mean specific force since the last measurement, in the frame at its end; at time 0 that of a vehicle at rest.
+    /// Mean specific force since the last measurement, in the body frame at the end of the interval; at time 0 that of a
+    /// vehicle at rest.
     fn record_imu(&mut self) {
         let body = &self.simulation.body;
         let (_, velocity) = body.base(self.vehicle);
@@ -319,13 +341,13 @@ impl<'a> Run<'a> {
         });
     }
 
-    /// How the mission ends at this instant, if it does.
+    /// The outcome of the mission if it ends at this instant.
     fn outcome(&mut self) -> Option<(EventKind, String)> {
         let rules = self.parameters();
         let body = &self.simulation.body;
         let ([x, y, _], _) = body.base(self.vehicle);
         if self.simulation.undefined || !self.ground.contains(body.position[0], body.position[1]) {
-            let text = format!("at ({x:.2}, {y:.2}) m the ground ends or holds no data");
+            let text = format!("at ({x:.2}, {y:.2}) m the ground ends or has no data");
             return Some((EventKind::OutOfBounds, text));
         }
         if body.is_tipped(self.settings.tip_sin_cos()) {

@@ -1,4 +1,4 @@
-//! Vectors and rotations in three dimensions, from `+ - * /` and `sqrt` alone.
+//! Vectors and rotations in three dimensions, using only `+ - * /` and `sqrt`.
 
 /// A vector `[x, y, z]`.
 pub(crate) type Vec3 = [f64; 3];
@@ -48,7 +48,7 @@ pub(crate) fn normalised(q: Quaternion) -> Quaternion {
     q.map(|c| c * inverse)
 }
 
-/// `q` turned by the rotation vector `turn` (in the frame that `q` describes), to first order in `turn`.
+/// `q` rotated by the rotation vector `turn` (in the frame described by `q`), to first order in `turn`.
 pub(crate) fn turned(q: Quaternion, turn: Vec3) -> Quaternion {
     let [x, y, z, w] = q;
     let [a, b, c] = scale(turn, 0.5);
@@ -118,7 +118,7 @@ mod tests {
     proptest! {
         /// Tolerance: a few rounding errors.
         #[test]
-        fn prop_axes_and_quaternion_are_one_rotation(q in prop::array::uniform4(-1.0..1.0f64)) {
+        fn prop_axes_and_quaternion_are_the_same_rotation(q in prop::array::uniform4(-1.0..1.0f64)) {
             prop_assume!(q.iter().map(|c| c * c).sum::<f64>() > 1e-3);
             let q = normalised(q);
             let axes = Axes::of(q);
@@ -131,9 +131,9 @@ mod tests {
         }
     }
 
-    /// A turn of 1e-4 rad about each axis moves the other two axes by 1e-4, to second order.
+    /// A rotation of 1e-4 rad about each axis moves the other two axes by 1e-4, to second order.
     #[test]
-    fn val_turns_follow_the_right_hand() {
+    fn val_rotations_follow_the_right_hand_rule() {
         let q = normalised([0.1, -0.2, 0.3, 0.8]);
         let axes = Axes::of(q);
         let turn = Axes::of(turned(q, [0.0, 0.0, 1e-4]));

@@ -1,10 +1,10 @@
 use super::*;
-use crate::testing::{drawn, limits, map_of};
+use crate::testing::{drawn, limits, map_of, oblong_map_of};
 use sastrugi_numeric::{Geometry, Grid};
 
 const EAST: Direction = Direction { rows: 0, cols: 1 };
 
-/// A corridor eastward of `free` rows of cells of `cell_m`.
+/// An eastward corridor, `free` rows wide, with cells of `cell_m`.
 fn corridor(free: usize, cell_m: f64) -> TravelMap {
     let heights = Grid::filled(Geometry::square(free + 2, 8, cell_m), 0.0);
     let mut map = TravelMap::new(heights, limits(30.0, 30.0)).unwrap();
@@ -15,7 +15,7 @@ fn corridor(free: usize, cell_m: f64) -> TravelMap {
 #[test]
 fn val_a_corridor_of_exactly_the_width_fits_and_one_cell_less_does_not() {
     for cell_m in [0.1, 0.3, 1.0, 2.5] {
-        // A width of one cell costs nothing extra in any gap, as gaps narrower than a cell count as one.
+        // A width of one cell adds no cost in any gap, because gaps narrower than a cell count as one.
         for width_cells in 2..=9usize {
             let width_m = width_cells as f64 * cell_m;
             let middle = |free: usize| {
@@ -68,4 +68,13 @@ fn val_settings_out_of_range_are_refused() {
     assert_eq!(key(1e9, 1.0, 10.0), "width_m");
     assert_eq!(key(1.0, -1.0, 10.0), "clearance_weight");
     assert_eq!(key(1.0, 1.0, 0.5), "clearance_max");
+}
+
+/// From the middle of 5 x 5 oblong cells, two steps to each side: of 4 m across a path eastward, 3 m northward, 5 m along a diagonal.
+#[test]
+fn val_gaps_over_oblong_cells_are_measured_across_the_path() {
+    let map = oblong_map_of(5, 5, limits(30.0, 30.0), |_, _| 0.0);
+    let clearance = Clearance::new(&map, 100.0, 1.0, 10.0).unwrap();
+    let gap_m = |rows, cols| clearance.gap_m(map.node(2, 2), Direction { rows, cols });
+    assert_eq!([gap_m(0, 1), gap_m(-1, 0), gap_m(-1, 1), gap_m(-1, -1)], [16.0, 12.0, 20.0, 20.0]);
 }

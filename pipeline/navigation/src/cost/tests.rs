@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::{drawn, limits, map_of, thesis_costs};
+use crate::testing::{drawn, limits, map_of, oblong_map_of, thesis_costs};
 
 #[test]
 fn val_a_step_costs_its_length_times_the_cost_of_its_slope() {
@@ -48,4 +48,41 @@ fn val_the_bound_is_manhattan_or_octile_on_level_ground_and_the_slant_where_long
     assert_eq!(costs.bound(&map, 0, 7, Neighbourhood::Four), 4.0);
     assert!((costs.bound(&map, 0, 7, Neighbourhood::Eight) - (2.0 + 2f64.sqrt())).abs() < 1e-12);
     assert_eq!(costs.bound(&map, 0, 1, Neighbourhood::Eight), 901f64.sqrt());
+}
+
+#[test]
+fn val_a_step_costs_the_mean_factor_of_its_ends() {
+    let map = drawn(&["..", ".."]);
+    let costs = CostModel::new(SlopeCost::THESIS, Some(vec![2.0, 3.0, 4.0, 6.0]), &map).unwrap();
+    let [east, south, south_east] = [Direction::ALL[0], Direction::ALL[3], Direction::ALL[7]];
+    assert_eq!(costs.step(&map, 0, 1, east), 2.5);
+    assert_eq!(costs.step(&map, 0, 2, south), 3.0);
+    assert_eq!(costs.step(&map, 0, 3, south_east), 4.0 * 2f64.sqrt());
+    assert_eq!(costs.factor(3), 6.0);
+    // Bounds are at the least factor.
+    assert_eq!(costs.bound(&map, 0, 1, Neighbourhood::Four), 2.0);
+    assert_eq!(costs.straight(&map, 0, 3), 2.0 * 2f64.sqrt());
+}
+
+/// Two rows and three columns apart: 9 m east-west, 8 m north-south, and 5 m along each diagonal.
+#[test]
+fn val_bounds_over_oblong_cells_keep_the_axes_apart() {
+    let map = oblong_map_of(3, 4, limits(30.0, 30.0), |_, _| 0.0);
+    let costs = thesis_costs(&map);
+    let [from, to] = [map.node(0, 0), map.node(2, 3)];
+    for [from, to] in [[from, to], [to, from]] {
+        assert_eq!(costs.bound(&map, from, to, Neighbourhood::Four), 17.0);
+        assert_eq!(costs.bound(&map, from, to, Neighbourhood::Eight), 13.0);
+        assert_eq!(costs.level_bound(&map, from, to, Neighbourhood::Eight), 13.0);
+        assert_eq!(costs.straight(&map, from, to), 145f64.sqrt());
+    }
+}
+
+/// Bounds for unknown ground leave the heights out.
+#[test]
+fn val_the_level_bound_does_not_know_heights() {
+    let map = map_of(2, 2, limits(80.0, 80.0), |_, c| 3.0 * c as f64);
+    let costs = thesis_costs(&map);
+    assert_eq!(costs.bound(&map, 0, 1, Neighbourhood::Four), 10f64.sqrt());
+    assert_eq!(costs.level_bound(&map, 0, 1, Neighbourhood::Four), 1.0);
 }

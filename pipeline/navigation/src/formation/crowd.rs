@@ -1,16 +1,16 @@
-//! Members that move from target to target without collisions (the thesis, Algorithm 7, OnlinePathFinder).
+//! Motion of the members from target to target without collisions (the thesis, Algorithm 7, OnlinePathFinder).
 //!
-//! In every step the members act in order of priority, each seeing the moves already made. A member goes towards its target ("up") where the
-//! ground ahead may be travelled and no other member comes in its way; it waits for a member that does, and goes round ground that may not be
-//! travelled: up-left, up-right, left, right, or back towards the line between its last target and the next. Discs are swept: two members
-//! never come closer than their radii at any time between two steps.
+//! In every step the members act in order of priority, and each sees the moves already made. A member moves towards its target ("up") if the ground
+//! ahead is passable and no other member is in its way. It waits for a member in its way, and avoids impassable ground by going up-left, up-right,
+//! left, right, or back towards the line between its last target and the next. Discs are swept: two members never come closer than the sum of their
+//! radii at any time between two steps.
 //!
-//! What the thesis leaves open: members that wait for each other would wait for ever, so that after [`PATIENCE`] waits the member of
-//! lower priority goes round the other as round a rock, and after twice as many the one of higher priority does. Members that are lost or at
-//! their last target are rocks at once. Obstacles that move are known for one step: a member goes round them, and out of their way where it
-//! would be run over. Slopes on a straight line to a target are those of quarters of a cell, as for routes; on other ways each step is within the
-//! limits. A member that comes no nearer to its target takes a detour over the cells. A team that comes no nearer for
-//! [`STUCK_AFTER_S`] seconds, or whose joint state repeats, is stuck: it never goes in circles for ever.
+//! Where the thesis is silent: members that wait for each other would wait forever, so after [`PATIENCE`] waits the member of lower priority passes
+//! the other as if it were a rock, and after twice as many the one of higher priority does. Lost members and members at their last target are rocks
+//! at once. Moving obstacles are known one step ahead: a member passes them, and leaves their way if it would be run over. Slopes on a straight line
+//! to a target are taken over quarters of a cell, as for routes; in other directions each step is within the limits. A member that comes no closer to
+//! its target takes a detour over the cells. A team that makes no progress for [`STUCK_AFTER_S`] seconds, or whose joint state repeats, is stuck, so
+//! it never moves in circles forever.
 
 use super::detour::detour;
 use super::footing::Footing;
@@ -21,29 +21,29 @@ use super::plane::{Vector, add, closest_approach, direction, distance, dot, leng
 #[cfg(test)]
 mod tests;
 
-/// Steps that a member waits for one of higher priority before it goes round it.
+/// Steps that a member waits for one of higher priority before it passes it.
 pub const PATIENCE: u32 = 10;
-/// Time without progress of any member after which the team is stuck, s.
+/// Time without progress of any member after which the team counts as stuck, s.
 pub const STUCK_AFTER_S: f64 = 60.0;
-/// Time without progress after which a member looks for a detour, s.
+/// Time without progress after which a member plans a detour, s.
 const DETOUR_AFTER_S: f64 = 5.0;
-/// Detours to one target.
+/// Largest number of detours per target.
 const DETOURS_MAX: u32 = 3;
-/// Steps that a member pauses where no direction is open.
+/// Steps that a member pauses if no direction is open.
 const PAUSE: u32 = 5;
-/// Progress that counts, as a share of the step's length.
+/// Least progress that counts, as a share of the step length.
 const PROGRESS: f64 = 1e-3;
-/// Rounding of distances, as a share.
+/// Relative rounding of distances.
 const ROUNDING: f64 = 1e-12;
 
-/// Directions in eighths of a turn to the left of "up": the order of step 2 of the algorithm.
+/// Directions in step 2 of the algorithm, in eighths of a turn to the left of "up", in order.
 const DIRECT: [i32; 5] = [0, 1, -1, 2, -2];
-/// The same of step 3, for members on the right of the line between their targets; mirrored on the left.
+/// Directions in step 3, for members to the right of the line between their targets; mirrored to the left of it.
 const TO_THE_LINE: [i32; 4] = [0, 1, 2, 3];
-/// All of them, for a member that would be run over.
+/// All directions, for a member that would be run over.
 const ALL: [i32; 8] = [0, 1, -1, 2, -2, 3, -3, 4];
 
-/// How members move.
+/// Settings of the motion.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct CrowdSettings {
     /// Length of a step, s.
@@ -52,22 +52,22 @@ pub struct CrowdSettings {
     pub radius_m: f64,
     /// Distance at which a target counts as reached, m.
     pub arrive_m: f64,
-    /// Steps for which the ground ahead is looked at, at least 1.
+    /// Number of steps checked ahead on the ground, at least 1.
     pub look_ahead: u32,
     /// Whether members take detours; without them they move as in the thesis.
     pub detours: bool,
 }
 
-/// What a member does.
+/// What a member is doing.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Phase {
-    /// On its way.
+    /// Moving.
     Moving,
-    /// Standing in this step.
+    /// Standing still in this step.
     Waiting,
     /// At its last target.
     Arrived,
-    /// Lost: a rock.
+    /// Lost; counts as a rock.
     Lost,
 }
 
@@ -87,42 +87,42 @@ impl Phase {
     }
 }
 
-/// Where a member is in Algorithm 7.
+/// State of a member in Algorithm 7.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Mode {
     /// Step 2.
     Direct,
     /// Step 3.
     ToTheLine,
-    /// A pause with so many steps left.
+    /// A pause, with the number of remaining steps.
     Pausing(u32),
 }
 
-/// How a member moves.
+/// State of motion of a member.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Motion {
     /// Position, m.
     pub position_m: Vector,
     /// Displacement in the last step, m.
     pub moved_m: Vector,
-    /// Direction to its target, held once it is there.
+    /// Direction to its target; kept once the target is reached.
     pub heading: Vector,
-    /// Speed when it moves, m/s.
+    /// Speed while moving, m/s.
     pub speed_m_s: f64,
-    /// Number of its next target.
+    /// Index of its next target.
     pub next: usize,
-    /// What it does.
+    /// What it is doing.
     pub phase: Phase,
-    /// True when it moved in another direction than towards its target.
+    /// True if it moved in a direction other than towards its target.
     pub dodging: bool,
     mode: Mode,
-    /// True while it moves on a straight line to its goal that was found to be passable.
+    /// True while it moves on a straight line to its goal that was found passable.
     on_line: bool,
-    /// Waits for other members since it last went towards its target.
+    /// Number of waits for other members since it last moved towards its target.
     waits: u32,
 }
 
-/// How near a member came to its target.
+/// How close a member has come to its target.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Progress {
     best_m: f64,
@@ -136,25 +136,25 @@ impl Progress {
     }
 }
 
-/// Members, their targets, and the obstacles among them.
+/// The members, their targets, and moving obstacles.
 #[derive(Clone, Debug)]
 pub struct Crowd<'a> {
     footing: Footing<'a>,
     settings: CrowdSettings,
     obstacles: Vec<MovingObstacle>,
     motions: Vec<Motion>,
-    /// Place of each member in the order of priority.
+    /// Rank of each member in the order of priority.
     ranks: Vec<usize>,
     targets_m: Vec<Vec<Vector>>,
-    /// Points to go to before the next target, the next one last.
+    /// Points to visit before the next target, the first of them last.
     detours: Vec<Vec<Vector>>,
     progress: Vec<Progress>,
-    /// A joint state of before, and its step.
+    /// An earlier joint state, and its step.
     saved: (Vec<Motion>, u64),
     step: u64,
 }
 
-/// What a member can do next.
+/// Next action of a member.
 enum Action {
     Move { displacement_m: Vector, eighths: i32, mode: Mode },
     Wait(Mode),
@@ -205,51 +205,52 @@ impl<'a> Crowd<'a> {
         }
     }
 
-    /// How the members move.
+    /// States of motion of the members.
     pub fn motions(&self) -> &[Motion] {
         &self.motions
     }
 
-    /// Time since the start, s: steps over their rate where that is whole, so that times are the decimals nearest to them.
+    /// Time since the start, s. If the step rate is an integer, it is computed as steps over rate, so that times are the closest floats to their
+    /// decimals.
     pub fn time_s(&self) -> f64 {
         let (steps, rate_hz) = (self.step as f64, 1.0 / self.settings.step_s);
         if rate_hz == rate_hz.round() { steps / rate_hz } else { steps * self.settings.step_s }
     }
 
-    /// The obstacles that move on their own.
+    /// The moving obstacles.
     pub fn obstacles(&self) -> &[MovingObstacle] {
         &self.obstacles
     }
 
-    /// The target that a member makes for, m; its position once it has arrived.
+    /// The member's present target, m; its position once it has arrived.
     pub fn target_m(&self, member: usize) -> Vector {
         let motion = &self.motions[member];
         self.targets_m[member].get(motion.next).copied().unwrap_or(motion.position_m)
     }
 
-    /// Lets the members stand on other ground.
+    /// Replaces the ground that the members stand on.
     pub fn stand_on(&mut self, footing: Footing<'a>) {
         self.footing = footing;
     }
 
-    /// Whether the straight line between two points may be travelled.
+    /// Whether the straight line between two points is passable.
     pub fn is_passable(&self, from_m: Vector, to_m: Vector) -> bool {
         self.footing.is_passable(from_m, to_m)
     }
 
-    /// Changes the speed of a member, m/s.
+    /// Sets the speed of a member, m/s.
     pub fn set_speed(&mut self, member: usize, speed_m_s: f64) {
         self.motions[member].speed_m_s = speed_m_s;
     }
 
-    /// Makes a member a rock.
+    /// Marks a member as lost, so that it counts as a rock.
     pub fn lose(&mut self, member: usize) {
         let motion = &mut self.motions[member];
         (motion.phase, motion.moved_m, motion.dodging) = (Phase::Lost, [0.0; 2], false);
     }
 
-    /// Gives a member other targets, of which it makes for number `next`; lost members keep theirs. One that makes for the same point as before
-    /// goes on as it is.
+    /// Gives a member other targets, with `next` the index of the present one; lost members keep theirs. A member whose present target is the same
+    /// point continues unchanged.
     pub fn redirect(&mut self, member: usize, targets_m: Vec<Vector>, next: usize) {
         let motion = self.motions[member];
         if motion.phase == Phase::Lost {
@@ -266,7 +267,7 @@ impl<'a> Crowd<'a> {
         }
     }
 
-    /// Moves all members by one step, in this order. Returns the member that is stuck when the team comes no farther.
+    /// Moves all members by one step, in this order. Returns the member that is stuck once the team makes no progress.
     pub fn step(&mut self, order: &[usize]) -> Option<usize> {
         self.motions.iter_mut().for_each(|motion| motion.moved_m = [0.0; 2]);
         order.iter().enumerate().for_each(|(rank, &member)| self.ranks[member] = rank);
@@ -293,7 +294,7 @@ impl<'a> Crowd<'a> {
         }
     }
 
-    /// Goes on to the next target where the present one is reached.
+    /// Advances to the next target once the present one is reached.
     fn arrive(&mut self, member: usize) {
         while self.motions[member].phase.is_mobile() {
             let motion = self.motions[member];
@@ -322,13 +323,13 @@ impl<'a> Crowd<'a> {
         self.progress[member] = Progress::from(self.step);
     }
 
-    /// The point that a member makes for: its target, or a point of its detour.
+    /// The point that a member is heading for: its target, or a point of its detour.
     fn goal_m(&self, member: usize) -> Vector {
         self.detours[member].last().copied().unwrap_or_else(|| self.target_m(member))
     }
 
-    /// Looks whether the straight line to the goal may be travelled, unless the member is on such a line already. Slopes are those of quarters of
-    /// a cell, so that a part of a passable line may be too steep by itself.
+    /// Checks whether the straight line to the goal is passable, unless the member is already on such a line. Slopes are taken over quarters of a
+    /// cell, so a part of a passable line may be too steep on its own.
     fn look_at_line(&mut self, member: usize) {
         let motion = &self.motions[member];
         let on_line = motion.on_line || self.footing.is_passable(motion.position_m, self.goal_m(member));
@@ -352,7 +353,7 @@ impl<'a> Crowd<'a> {
         action.unwrap_or(Action::Pause(PAUSE))
     }
 
-    /// The first of some directions that the ground leaves open: taken, or waited for where another member is in the way.
+    /// The first direction that the ground leaves open: taken, or waited for if another member is in the way.
     fn first_way<const N: usize>(&self, member: usize, up: Vector, directions: [i32; N], mode: Mode) -> Option<Action> {
         directions.into_iter().find_map(|eighths| match self.way(member, up, eighths) {
             Way::Open(displacement_m) => {
@@ -364,7 +365,7 @@ impl<'a> Crowd<'a> {
         })
     }
 
-    /// What lies in a direction: the ground for the steps ahead, everything that moves for this one.
+    /// Checks a direction: the ground for the steps ahead, moving members and obstacles for this step only.
     fn way(&self, member: usize, up: Vector, eighths: i32) -> Way {
         let motion = &self.motions[member];
         let step_m = motion.speed_m_s * self.settings.step_s;
@@ -392,7 +393,7 @@ impl<'a> Crowd<'a> {
         })
     }
 
-    /// Whether a displacement brings a member into the disc of another, which moves as it has moved in this step.
+    /// Whether a displacement brings a member into the disc of another, given how that one has moved in this step.
     fn meets(&self, member: usize, other: usize, displacement_m: Vector) -> bool {
         let (motion, other) = (&self.motions[member], &self.motions[other]);
         let offset_m = sub(motion.position_m, sub(other.position_m, other.moved_m));
@@ -410,13 +411,13 @@ impl<'a> Crowd<'a> {
         })
     }
 
-    /// Whether a member goes round another instead of waiting for it.
+    /// Whether a member passes another instead of waiting for it.
     fn is_rock(&self, member: usize, other: usize) -> bool {
         let patience = if self.ranks[other] < self.ranks[member] { PATIENCE } else { 2 * PATIENCE };
         !self.motions[other].phase.is_mobile() || self.motions[member].waits >= patience
     }
 
-    /// Whether a member is on the right of the line from its last target to the next.
+    /// Whether a member is to the right of the line from its last target to the next.
     fn is_right_of_line(&self, member: usize) -> bool {
         let motion = &self.motions[member];
         let target_m = self.target_m(member);
@@ -425,7 +426,7 @@ impl<'a> Crowd<'a> {
         dot(sub(motion.position_m, last_m), to_the_right(sub(target_m, last_m))) > 0.0
     }
 
-    /// Another action for a member that an obstacle would run over where it stands.
+    /// Replaces the action of a member that an obstacle would run over.
     fn escape(&self, member: usize, action: Action) -> Action {
         if matches!(action, Action::Move { .. }) || !self.meets_obstacle(member, [0.0; 2]) {
             return action;
@@ -475,7 +476,7 @@ impl<'a> Crowd<'a> {
         }
     }
 
-    /// Time since a member last came nearer to its target, s.
+    /// Time since a member last came closer to its target, s.
     fn without_progress_s(&self, member: usize) -> f64 {
         (self.step - self.progress[member].at_step) as f64 * self.settings.step_s
     }
@@ -488,7 +489,7 @@ impl<'a> Crowd<'a> {
         self.progress[member] = Progress { best_m: f64::INFINITY, at_step: self.step, detours };
         let (motion, discs) = (self.motions[member], self.rocks(member));
         let last = self.targets_m[member].len().saturating_sub(1);
-        // A target that no way leads to is left out.
+        // Targets that cannot be reached are skipped.
         let candidates = (motion.next..=motion.next + 2).chain([last]).filter(|k| *k <= last);
         let found = candidates.into_iter().find_map(|k| {
             let target_m = self.targets_m[member][k];
@@ -502,7 +503,7 @@ impl<'a> Crowd<'a> {
         }
     }
 
-    /// What stands still around a member, with the radii of both sides together.
+    /// Stationary discs around a member, with the sums of both radii.
     fn rocks(&self, member: usize) -> Vec<Disc> {
         let radius_m = self.settings.radius_m;
         let still = self.motions.iter().enumerate().filter(|(k, motion)| *k != member && motion.phase != Phase::Moving);
@@ -514,7 +515,7 @@ impl<'a> Crowd<'a> {
         members.chain(obstacles).collect()
     }
 
-    /// The member that has gone without progress for longest, once none comes nearer to its target or the joint state repeats.
+    /// The member without progress for longest, once no member makes progress or the joint state repeats.
     fn stuck(&mut self) -> Option<usize> {
         let mobile = |member: &usize| self.motions[*member].phase.is_mobile();
         let members: Vec<usize> = (0..self.motions.len()).filter(mobile).collect();
@@ -523,8 +524,8 @@ impl<'a> Crowd<'a> {
         (self.repeats(&members) || out_of_time).then_some(oldest)
     }
 
-    /// Whether the members move as they did at an earlier step, so that they would do so for ever (Brent, 1980: every state is compared with
-    /// the one at the last power of two).
+    /// Whether the members move as they did at an earlier step, and so would repeat forever (Brent, 1980: every state is compared with the one at the
+    /// last power of two).
     fn repeats(&mut self, mobile: &[usize]) -> bool {
         let may_detour =
             self.settings.detours && mobile.iter().any(|member| self.progress[*member].detours < DETOURS_MAX);
@@ -538,7 +539,7 @@ impl<'a> Crowd<'a> {
         repeats
     }
 
-    /// Least distance between the centres of two members during the last step, m; infinite for one member alone.
+    /// Least distance between the centres of two members during the last step, m; infinite for a single member.
     pub fn least_separation_m(&self) -> f64 {
         let mut least_m = f64::INFINITY;
         for (k, one) in self.motions.iter().enumerate() {
@@ -550,7 +551,7 @@ impl<'a> Crowd<'a> {
         least_m
     }
 
-    /// Members that a moving obstacle touches now.
+    /// Number of members that a moving obstacle touches now.
     pub fn touched(&self) -> usize {
         let now_s = self.time_s();
         let touched = |motion: &&Motion| {
@@ -563,8 +564,7 @@ impl<'a> Crowd<'a> {
     }
 }
 
-/// Whether a point at `offset_m` comes nearer to the origin than `least_m` while it moves; where it is nearer already, whether it comes nearer
-/// still.
+/// Whether a point at `offset_m` comes closer to the origin than `least_m` as it moves or, if it is closer already, comes closer still.
 fn touches(offset_m: Vector, motion_m: Vector, least_m: f64) -> bool {
     let (now_m, reach_m) = (length(offset_m), length(motion_m));
     now_m - reach_m < least_m && closest_approach(offset_m, motion_m) < least_m.min(now_m) * (1.0 - ROUNDING)

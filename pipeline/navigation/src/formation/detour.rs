@@ -1,5 +1,5 @@
-//! A way round for a member that the directions of Algorithm 7 lead nowhere: the cheapest path over the cells, clear of what stands still,
-//! straightened. The thesis has no such way: its member tries the same directions for ever.
+//! Detour of a member that makes no progress in the directions of Algorithm 7: the cheapest path over the cells, clear of stationary discs,
+//! straightened. The thesis has no detours: its member tries the same directions forever.
 
 use super::footing::Footing;
 use super::placement::Disc;
@@ -8,10 +8,13 @@ use crate::map::{Neighbourhood, Node};
 use crate::search::grid::GridNetwork;
 use crate::search::{Network, astar};
 
-/// Cells around a point in which a node is looked for that leads there: steep cells may be open along their contours alone.
+#[cfg(test)]
+mod tests;
+
+/// Distance in cells around a point within which a node is searched that connects to it; steep cells may be open along their contours only.
 const REACH: i32 = 3;
 
-/// Points to go to in turn, the last one `to_m`; `None` where no path leads there.
+/// Points to visit in turn, the last one `to_m`; `None` if no path leads there.
 pub fn detour(footing: &Footing<'_>, from_m: Vector, to_m: Vector, discs: &[Disc]) -> Option<Vec<Vector>> {
     let ground = footing.ground();
     let grid = GridNetwork { ground, neighbourhood: Neighbourhood::Eight };
@@ -26,7 +29,7 @@ pub fn detour(footing: &Footing<'_>, from_m: Vector, to_m: Vector, discs: &[Disc
     Some(around.straightened(&corners.collect::<Vec<_>>()))
 }
 
-/// Steps between cells that keep clear of discs, whose radii are those of both sides together.
+/// Steps between cells that keep clear of discs, whose radii are sums of both radii.
 struct Around<'a> {
     footing: &'a Footing<'a>,
     grid: GridNetwork<'a>,
@@ -37,7 +40,7 @@ impl Around<'_> {
     fn is_clear(&self, from_m: Vector, to_m: Vector) -> bool {
         self.discs.iter().all(|disc| {
             let offset_m = sub(from_m, disc.position_m);
-            // From within a disc one may leave it.
+            // A path that starts within a disc may leave it.
             let least_m = disc.radius_m.min(distance(from_m, disc.position_m));
             closest_approach(offset_m, sub(to_m, from_m)) >= least_m
         })
@@ -47,7 +50,7 @@ impl Around<'_> {
         self.is_clear(from_m, to_m) && self.footing.is_passable(from_m, to_m)
     }
 
-    /// The corners that straight open lines need, without the first.
+    /// The corners that remain when straight open lines replace the path, without the first.
     fn straightened(&self, corners: &[Vector]) -> Vec<Vector> {
         let mut kept = Vec::new();
         let mut start = 0;

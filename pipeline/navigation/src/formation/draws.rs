@@ -1,4 +1,4 @@
-//! Losses and moving obstacles drawn at random.
+//! Losses and moving obstacles, drawn at random.
 
 use super::obstacles::MovingObstacle;
 use super::parameters::{Loss, TeamParameters};
@@ -8,17 +8,17 @@ use sastrugi_numeric::Streams;
 #[cfg(test)]
 mod tests;
 
-/// Losses and obstacles lie between these shares of the route.
+/// Range of losses and obstacles along the route, as shares of it.
 const MIDDLE: [f64; 2] = [0.1, 0.9];
-/// Obstacles cross the route within this time of the leader, s.
+/// Obstacles cross the route within this time of the leader's passage, s.
 const NEAR_S: f64 = 10.0;
-/// Obstacles start and end at this distance from the route, m.
+/// Distance from the route at which obstacles start and end, m.
 const ASIDE_M: f64 = 15.0;
-/// Speed of an obstacle over that of the members.
+/// Range of an obstacle's speed, relative to that of the members.
 const SPEEDS: [f64; 2] = [0.25, 1.0];
 
-/// Adds the losses and obstacles that `drawn_losses` and `drawn_obstacles` ask for, along a route of at least two points, m. The n-th of each
-/// kind draws from its own stream, so that asking for more changes none of those before.
+/// Adds the losses and obstacles that `drawn_losses` and `drawn_obstacles` request, along a route of at least two points, m. The n-th of each kind
+/// draws from its own stream, so requesting more does not change earlier ones.
 pub fn draw(parameters: &TeamParameters, route_m: &[Vector], members: u32, streams: &Streams) -> TeamParameters {
     let mut drawn = TeamParameters { drawn_losses: 0, drawn_obstacles: 0, ..parameters.clone() };
     let legs = || route_m.windows(2).map(|pair| distance(pair[0], pair[1]));

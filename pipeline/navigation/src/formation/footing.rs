@@ -1,16 +1,19 @@
-//! Where members of a team may stand.
+//! Where members of a team can stand.
 //!
-//! Lines between points, unlike steps between nodes, can slip along a contour of a steep slope to where no direction is open, or up to a
-//! plateau that no path leaves. So a member stands only where a node around it can be reached that belongs to the same ground as the route:
-//! to a strong component of the grid that a waypoint lies in.
+//! Lines between points, unlike steps between nodes, can lead along a contour of a steep slope to a point with no open direction, or onto a plateau
+//! that no path leaves. A member therefore stands only where it can reach an adjacent node that belongs to the same ground as the route: to a strong
+//! component of the grid that contains a waypoint.
 
 use super::plane::{Vector, distance};
 use crate::line::{Ground, is_passable};
 use crate::map::{Direction, Node};
 use crate::search::components::components;
 
-/// Ground with its strong components: nodes that can all reach one another by steps to their eight neighbours. Time and memory are
-/// proportional to the cells (16 B each while it is made, 4 B each then).
+#[cfg(test)]
+mod tests;
+
+/// Ground with its strong components: nodes that can all reach one another by steps to their eight neighbours. Time and memory are proportional to
+/// the number of cells (16 B each during construction, 4 B each afterwards).
 #[derive(Clone, Debug)]
 pub struct TeamGround<'a> {
     ground: Ground<'a>,
@@ -26,22 +29,22 @@ impl<'a> TeamGround<'a> {
         Self { ground, components: components(map.len() as u32, |_| Direction::ALL.len() as u32, step) }
     }
 
-    /// Map, costs and room for a team.
+    /// Map, costs and clearance.
     pub fn ground(&self) -> Ground<'a> {
         self.ground
     }
 }
 
-/// Ground as far as it belongs to a route.
+/// The part of the ground that belongs to a route.
 #[derive(Clone, Debug)]
 pub struct Footing<'a> {
     on: &'a TeamGround<'a>,
-    /// Components that hold waypoints, ascending.
+    /// Components that contain waypoints, ascending.
     home: Vec<u32>,
 }
 
 impl<'a> Footing<'a> {
-    /// Of the components around some points, m.
+    /// The components around some points, m.
     pub fn new(on: &'a TeamGround<'a>, points_m: &[Vector]) -> Self {
         let mut footing = Self { on, home: Vec::new() };
         let around = |point_m: &Vector| {
@@ -56,24 +59,24 @@ impl<'a> Footing<'a> {
         footing
     }
 
-    /// Map, costs and room for a team.
+    /// Map, costs and clearance.
     pub fn ground(&self) -> Ground<'a> {
         self.on.ground
     }
 
-    /// Whether the straight line between two points may be travelled.
+    /// Whether the straight line between two points is passable.
     pub fn is_passable(&self, from_m: Vector, to_m: Vector) -> bool {
         let map = self.on.ground.map;
         is_passable(map, map.point_at(from_m), map.point_at(to_m))
     }
 
-    /// Whether a member may stand at a point: from there it comes to a node of the route's ground.
+    /// Whether a member can stand at a point: it can reach an adjacent node of the route's ground.
     pub fn holds(&self, point_m: Vector) -> bool {
         let map = self.on.ground.map;
         self.nodes_around(point_m, 0).any(|node| self.is_passable(point_m, map.position_m(node)))
     }
 
-    /// The nearest node of the route's ground within some cells of a point that is open.
+    /// The nearest open node of the route's ground within `cells` of a point.
     pub fn node_near(&self, point_m: Vector, cells: i32, open: impl Fn(Vector) -> bool) -> Option<Node> {
         let map = self.on.ground.map;
         let away_m = |node: &Node| distance(map.position_m(*node), point_m);
@@ -82,7 +85,7 @@ impl<'a> Footing<'a> {
         nodes.into_iter().find(|node| open(map.position_m(*node)))
     }
 
-    /// Free nodes of the route's ground: the corners of the square that a point lies in, and so many cells more.
+    /// Free nodes of the route's ground: the corners of the square that contains the point, and `cells` more on each side.
     fn nodes_around(&self, point_m: Vector, cells: i32) -> impl Iterator<Item = Node> {
         let map = self.on.ground.map;
         let corner = map.point_at(point_m).map(libm::floor);

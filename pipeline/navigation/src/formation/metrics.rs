@@ -1,7 +1,7 @@
 //! How well a team keeps its formation.
 //!
-//! The errors of a follower are its distances behind its predecessor and to the right of it, in the direction of the leg of the route that the
-//! predecessor is on (the thesis: "the movement direction of the group"), less the depth and the width of its slot. They count from the start
+//! The errors of a follower are its distances behind its predecessor and to the right of it, minus the depth and the width of its slot. Directions
+//! are those of the leg of the route that the predecessor is on (the thesis: "the movement direction of the group"). Errors count from the start
 //! until the follower arrives or is lost.
 
 use super::plane::{Vector, dot, sub, to_the_right};
@@ -9,18 +9,18 @@ use super::plane::{Vector, dot, sub, to_the_right};
 #[cfg(test)]
 mod tests;
 
-/// Share of the spacing up to which errors are in range (the thesis, section 5.3).
+/// Share of the spacing up to which errors count as in range (the thesis, section 5.3).
 pub const IN_RANGE: f64 = 0.2;
-/// Share of the spacing up to which they are tolerable.
+/// Share of the spacing up to which errors count as tolerable.
 pub const TOLERABLE: f64 = 0.4;
 
-/// Depth and width error of a follower, m, positive when it lies too far behind or to the right.
+/// Depth and width error of a follower, m; positive if it is too far behind or to the right.
 pub fn errors_m(predecessor_m: Vector, forward: Vector, follower_m: Vector, offset_m: [f64; 2]) -> [f64; 2] {
     let back_m = sub(predecessor_m, follower_m);
     [dot(back_m, forward) - offset_m[0], -dot(back_m, to_the_right(forward)) - offset_m[1]]
 }
 
-/// Sums over the steps of one follower.
+/// Error sums over the steps of one follower.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct FollowerErrors {
     /// Number of steps.
@@ -36,7 +36,7 @@ pub struct FollowerErrors {
 }
 
 impl FollowerErrors {
-    /// Adds the errors of a step.
+    /// Adds the errors of one step.
     pub fn add(&mut self, errors_m: [f64; 2], spacing_m: f64) {
         let size_m = errors_m.map(f64::abs);
         self.steps += 1;
@@ -55,29 +55,29 @@ impl FollowerErrors {
     }
 }
 
-/// Figures of a run.
+/// Metrics of a run.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Metrics {
     /// Errors of each member while it followed another.
     pub followers: Vec<FollowerErrors>,
-    /// Length driven by each member in plan, m.
+    /// Horizontal distance driven by each member, m.
     pub driven_m: Vec<f64>,
-    /// Least distance between the centres of two members, m; infinite for one member alone.
+    /// Least distance between the centres of two members, m; infinite for a single member.
     pub least_separation_m: f64,
-    /// Steps that members waited.
+    /// Number of steps that members waited.
     pub waits: u64,
-    /// Steps that members moved in another direction than towards their targets.
+    /// Number of steps that members moved in a direction other than towards their targets.
     pub dodges: u64,
-    /// Waypoints with too little room for the formation, even compressed.
+    /// Number of waypoints with too little room even for the compressed formation.
     pub squeezed: u64,
-    /// Steps in which a moving obstacle touched a member.
+    /// Number of steps in which a moving obstacle touched a member, summed over members.
     pub contacts: u64,
-    /// Times at which the route was changed.
+    /// Number of route changes.
     pub replans: u64,
 }
 
 impl Metrics {
-    /// Of a team at its start.
+    /// Metrics of a team at its start.
     pub fn of(members: usize) -> Self {
         Self {
             followers: vec![FollowerErrors::default(); members],

@@ -1,9 +1,9 @@
 //! Teams that keep a formation along a route (the thesis, chapter 4).
 //!
-//! A [`shape::Formation`] has a slot for each member. At every waypoint of the route [`placement`] gives each slot a target that fits the
-//! ground; [`crowd`] moves the members from target to target, step by step and without collisions; [`speeds`] keeps their distances.
-//! A [`Team`] puts these together, with losses of members, and measures how well the formation holds. It goes along a given route, or along one that it
-//! plans on the ground it has seen.
+//! A [`shape::Formation`] has a slot for each member. At every waypoint of the route, [`placement`] gives each slot a target that fits the ground;
+//! [`crowd`] moves the members from target to target, step by step and without collisions; [`speeds`] keeps their distances. A [`Team`] combines
+//! these, handles losses of members, and measures how well it keeps its formation. It follows a given route, or one that it plans on the ground it
+//! has seen.
 //!
 //! Positions are eastings and northings in the coordinates of the map's heights, m.
 

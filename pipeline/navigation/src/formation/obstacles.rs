@@ -1,4 +1,4 @@
-//! Obstacles that move on their own: discs along polylines, which give way to nobody.
+//! Moving obstacles: discs that follow polylines and give way to nobody.
 
 use super::plane::{Vector, add, distance, scale, sub};
 use sastrugi_schemas::ParameterError;
@@ -8,17 +8,17 @@ use serde::{Deserialize, Serialize};
 #[cfg(test)]
 mod tests;
 
-/// A disc that goes along a polyline once, at one speed, and stands at its last point from then on.
+/// A disc that follows a polyline once, at constant speed, and then stays at its last point.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MovingObstacle {
-    /// Polyline `[[x, y], ...]` in the terrain's coordinates, m; it stands at the first point until it starts.
+    /// Polyline `[[x, y], ...]` in the terrain's coordinates, m; the obstacle stays at the first point until it starts.
     pub points_m: Vec<Vector>,
     /// Speed, above 0, m/s.
     pub speed_m_s: f64,
     /// Radius, above 0, m.
     pub radius_m: f64,
-    /// Time of its start, 0 or later, s.
+    /// Start time, at least 0, s.
     #[serde(default)]
     pub start_s: f64,
 }
@@ -27,7 +27,7 @@ impl MovingObstacle {
     /// Refuses values out of range.
     ///
     /// # Errors
-    /// The first one.
+    /// The first value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
         ParameterError::positive("speed_m_s", self.speed_m_s)?;
         ParameterError::positive("radius_m", self.radius_m)?;
@@ -35,11 +35,13 @@ impl MovingObstacle {
         let finite = self.points_m.iter().flatten().all(|value| value.is_finite());
         match !self.points_m.is_empty() && finite {
             true => Ok(()),
-            false => Err(ParameterError::new("points_m", "must have at least one point, all of finite coordinates")),
+            false => {
+                Err(ParameterError::new("points_m", "must have at least one point; all coordinates must be finite"))
+            }
         }
     }
 
-    /// Where its centre is at a time, m.
+    /// Position of its centre at a time, m.
     pub fn position_m(&self, time_s: f64) -> Vector {
         let mut left_m = (time_s - self.start_s).max(0.0) * self.speed_m_s;
         for pair in self.points_m.windows(2) {
@@ -52,7 +54,7 @@ impl MovingObstacle {
         self.points_m.last().copied().unwrap_or_default()
     }
 
-    /// Time from which on it stands, s.
+    /// Time after which it stays at its last point, s.
     pub fn end_s(&self) -> f64 {
         let length_m: f64 = self.points_m.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
         self.start_s + length_m / self.speed_m_s

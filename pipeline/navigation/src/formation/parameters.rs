@@ -1,4 +1,4 @@
-//! Parameters of a team as a study writes them.
+//! Team parameters, as a study states them.
 
 use super::crowd::CrowdSettings;
 use super::obstacles::MovingObstacle;
@@ -15,19 +15,19 @@ mod tests;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Shape {
-    /// One behind the other.
+    /// One behind another.
     #[default]
     Column,
     /// Side by side, alternately to the left and to the right of the leader.
     Line,
-    /// Back from the leader on both sides.
+    /// Behind the leader on both sides, in a V.
     Wedge,
-    /// The slots of `slots`.
+    /// The slots listed in `slots`.
     Custom,
 }
 
 impl Shape {
-    /// All of them.
+    /// All shapes.
     pub const ALL: [Self; 4] = [Self::Column, Self::Line, Self::Wedge, Self::Custom];
 
     /// Name in studies and tables.
@@ -35,7 +35,7 @@ impl Shape {
         self.pattern().map_or("custom", Pattern::name)
     }
 
-    /// The built-in pattern; custom slots have none.
+    /// The built-in pattern; `None` for custom slots.
     pub fn pattern(self) -> Option<Pattern> {
         match self {
             Self::Column => Some(Pattern::Column),
@@ -46,13 +46,13 @@ impl Shape {
     }
 }
 
-/// A member that is lost on the way.
+/// A member that is lost during the run.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Loss {
     /// Time since the start, 0 or later, s.
     pub time_s: f64,
-    /// Member, from 1.
+    /// Member, counted from 1.
     pub member: u32,
 }
 
@@ -62,61 +62,61 @@ pub struct Loss {
 pub struct TeamParameters {
     /// Formation.
     pub formation: Shape,
-    /// Members; 4 when absent. Custom formations have one for each slot.
+    /// Number of members; 4 if absent. A custom formation has one per slot.
     pub members: Option<u32>,
-    /// Distance between neighbouring slots, m. Errors in range are at most 20 % of it, tolerable ones 40 %.
+    /// Distance between adjacent slots, m. Errors up to 20 % of it count as in range, up to 40 % as tolerable.
     pub spacing_m: f64,
     /// Slots of a custom formation.
     pub slots: Vec<SlotParameters>,
     /// Radius of a member, m.
     pub radius_m: f64,
-    /// Room between the discs of two members at their targets, m.
+    /// Clearance between the discs of two members at their targets, m.
     pub margin_m: f64,
     /// Mean speed, m/s.
     pub speed_m_s: f64,
-    /// Least speed of a moving member, m/s.
+    /// Lowest speed of a moving member, m/s.
     pub speed_min_m_s: f64,
-    /// Greatest speed, m/s.
+    /// Highest speed, m/s.
     pub speed_max_m_s: f64,
     /// Acceleration, m/s^2.
     pub accelerate_m_s2: f64,
     /// Deceleration, m/s^2.
     pub slow_m_s2: f64,
-    /// Deviation from the depth of a slot at which speeds change, a share of the depth and at least of the spacing.
+    /// Tolerated deviation from a slot's depth before speeds change, as a share of the depth, or of the spacing if that is larger.
     pub tolerance: f64,
-    /// Speeds as in the listing of Algorithm 8, which slows a member that lags.
+    /// Adjust speeds as in the listing of Algorithm 8, which slows down a member that lags.
     pub literal_speeds: bool,
-    /// Distance between waypoints, m: longer legs of the route are divided; the spacing when absent.
+    /// Largest distance between waypoints, m: longer legs of the route are divided; `spacing_m` if absent.
     pub waypoint_spacing_m: Option<f64>,
-    /// The waypoints of the route alone, as in the thesis.
+    /// Use only the waypoints of the route, as in the thesis.
     pub literal_waypoints: bool,
-    /// Members plan a way round where Algorithm 7 leads them nowhere; as in the thesis without.
+    /// Let a member plan a detour if the directions of Algorithm 7 make no progress; the thesis has none.
     pub detours: bool,
     /// Distance at which a target counts as reached, m.
     pub arrive_m: f64,
-    /// Length of a step, s.
+    /// Time step, s.
     pub step_s: f64,
-    /// Steps for which members look at the ground ahead.
+    /// Number of steps that members check ahead on the ground.
     pub look_ahead: u32,
-    /// Distance from its leader within which the team sees the ground, m: it plans from start to goal on what it has seen. It follows the route
-    /// when absent.
+    /// Distance from the leader within which the team sees the ground, m: it then plans from start to goal on the ground seen so far. If absent, it
+    /// follows the route.
     pub sensing_radius_m: Option<f64>,
-    /// Time after which the run ends, s; ten times that of the route at mean speed, plus ten minutes, when absent.
+    /// Time limit of the run, s; if absent, ten times the time for the route at mean speed, plus ten minutes.
     pub time_max_s: Option<f64>,
-    /// Rate of the recorded samples, Hz: the rate of the steps over a whole number.
+    /// Rate of the recorded samples, Hz; it must be the rate of the steps divided by an integer.
     pub sample_rate_hz: f64,
-    /// Members lost on the way.
+    /// Members lost during the run.
     pub losses: Vec<Loss>,
-    /// Number of further losses, drawn: members and times.
+    /// Number of additional losses, with members and times drawn at random.
     pub drawn_losses: u32,
     /// Obstacles that move on their own.
     pub obstacles: Vec<MovingObstacle>,
-    /// Number of further moving obstacles, drawn, which cross the route near the team.
+    /// Number of additional moving obstacles, drawn at random, which cross the route near the team.
     pub drawn_obstacles: u32,
 }
 
 impl Default for TeamParameters {
-    /// The thesis' team of four, spacing of 10, in metres for its map units; it gives no other values.
+    /// The thesis' team of four with a spacing of 10, its map units taken as metres; it gives no other values.
     fn default() -> Self {
         Self {
             formation: Shape::default(),
@@ -149,14 +149,14 @@ impl Default for TeamParameters {
     }
 }
 
-/// Members of a built-in formation where the study states none: the thesis' four.
+/// Members of a built-in formation if the study states none: four, as in the thesis.
 const MEMBERS: u32 = 4;
 
 impl TeamParameters {
-    /// Refuses what no team can have, whatever the terrain.
+    /// Refuses values that are invalid on any terrain.
     ///
     /// # Errors
-    /// The first key that is wrong.
+    /// The first invalid key.
     pub fn check(&self) -> Result<(), ParameterError> {
         let positive = [
             ("spacing_m", self.spacing_m),
@@ -185,7 +185,7 @@ impl TeamParameters {
         if !(self.tolerance > 0.0 && self.tolerance < 0.5) {
             return Err(ParameterError::new(
                 "tolerance",
-                format!("is {}; it must lie above 0 and below 0.5", self.tolerance),
+                format!("is {}; it must be above 0 and below 0.5", self.tolerance),
             ));
         }
         if self.look_ahead == 0 {
@@ -211,7 +211,7 @@ impl TeamParameters {
         Ok(())
     }
 
-    /// Loses the members in order, on a copy.
+    /// Applies the losses in order, to a copy of the formation.
     fn check_losses(&self, mut formation: Formation) -> Result<(), ParameterError> {
         for (k, loss) in self.losses.iter().enumerate() {
             ParameterError::not_negative("time_s", loss.time_s).map_err(|e| e.within(&format!("losses.{k}")))?;
@@ -222,21 +222,22 @@ impl TeamParameters {
             true => Ok(()),
             false => {
                 let left = formation.slots().len();
-                let message = format!("is {}; of the {left} members that are left one must stay", self.drawn_losses);
+                let message =
+                    format!("is {}; at least one of the {left} remaining members must be kept", self.drawn_losses);
                 Err(ParameterError::new("drawn_losses", message))
             }
         }
     }
 
-    /// The formation at the start.
+    /// The formation at the start of the run.
     ///
     /// # Errors
-    /// Slots that make no formation, or keys that do not go together.
+    /// Slots that do not form a formation, or keys that exclude each other.
     pub fn formation(&self) -> Result<Formation, ParameterError> {
         let slots = match self.formation.pattern() {
             Some(_) if !self.slots.is_empty() => {
                 let message =
-                    format!("are those of a custom formation, but `formation` is \"{}\"", self.formation.name());
+                    format!("apply only to a custom formation, but `formation` is \"{}\"", self.formation.name());
                 return Err(ParameterError::new("slots", message));
             }
             Some(pattern) => {
@@ -250,7 +251,7 @@ impl TeamParameters {
             None if self.members.is_some() => {
                 return Err(ParameterError::new(
                     "members",
-                    "has no meaning for a custom formation: each slot has a member",
+                    "does not apply to a custom formation, which has one member per slot",
                 ));
             }
             None => &self.slots,
@@ -258,23 +259,23 @@ impl TeamParameters {
         Formation::new(slots, self.radius_m).map_err(|e| refused("slots", &e))
     }
 
-    /// Distance between neighbouring slots, m; NaN for a custom formation, whose slots lie as they are given.
+    /// Distance between adjacent slots, m; NaN for a custom formation, whose slots are given individually.
     pub fn pattern_spacing_m(&self) -> f64 {
         self.formation.pattern().map_or(f64::NAN, |_| self.spacing_m)
     }
 
-    /// Steps from one recorded sample to the next.
+    /// Number of steps between recorded samples.
     ///
     /// # Errors
-    /// A rate that is not that of the steps over a whole number.
+    /// A rate that is not the rate of the steps divided by an integer.
     pub fn sample_every(&self) -> Result<u64, ParameterError> {
         let steps = 1.0 / (self.sample_rate_hz * self.step_s);
-        let whole = steps.round();
-        if whole >= 1.0 && (steps - whole).abs() <= 1e-9 * whole && whole <= f64::from(u32::MAX) {
-            return Ok(whole as u64);
+        let count = steps.round();
+        if count >= 1.0 && (steps - count).abs() <= 1e-9 * count && count <= f64::from(u32::MAX) {
+            return Ok(count as u64);
         }
         let message = format!(
-            "is {}; with steps of {} s it must be {} Hz over a whole number",
+            "is {}; with steps of {} s it must be {} Hz divided by an integer",
             self.sample_rate_hz,
             self.step_s,
             1.0 / self.step_s
@@ -282,7 +283,7 @@ impl TeamParameters {
         Err(ParameterError::new("sample_rate_hz", message))
     }
 
-    /// Greatest distance between waypoints, m.
+    /// Largest distance between waypoints, m.
     pub(crate) fn leg_max_m(&self) -> f64 {
         match self.literal_waypoints {
             true => f64::INFINITY,

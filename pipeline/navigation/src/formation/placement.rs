@@ -1,11 +1,11 @@
-//! Targets of a team's members at a waypoint (the thesis, Algorithm 6, PlaceAgents).
+//! Targets of the team's members at a waypoint (the thesis, Algorithm 6, PlaceAgents).
 //!
-//! At waypoint P the ground is walked to the left, to the right and backwards, cell by cell while it may be travelled, as far as the formation
-//! is wide and deep. Where there is less room the formation's box is compressed, across and along by themselves. A target that cannot be
-//! reached straight from its foot on the line through P, or where no member can stand, moves to that foot. What the thesis leaves open: at the last waypoint the
-//! heading is that of the last leg; the box keeps as near to P as the walls let it (the thesis centres it between the points reached,
-//! even where there is room on both sides, which shifts the team at every lone rock); a target that is too near to an earlier one moves back
-//! along the route until it is not, and where that fails the waypoint is squeezed.
+//! From waypoint P the ground is checked to the left, to the right and backwards, in steps of one cell while it is passable, up to the width and
+//! depth of the formation. If there is less room, the formation's box is compressed, across and along separately. A target that cannot be reached
+//! straight from its foot on the line through P, or where no member can stand, moves to that foot. Where the thesis is silent: at the last waypoint
+//! the heading is that of the last leg; the box stays as close to P as the walls permit (the thesis centres it between the points reached, even if
+//! there is room on both sides, which shifts the team at every isolated rock); a target too close to an earlier one moves back along the route until
+//! it is clear, and if that fails, the waypoint is squeezed.
 
 use super::footing::Footing;
 use super::plane::{Vector, add, direction, distance, scale, sub, to_the_right};
@@ -14,10 +14,10 @@ use super::shape::Formation;
 #[cfg(test)]
 mod tests;
 
-/// Rounding of distances, as a share.
+/// Relative rounding of distances.
 const ROUNDING: f64 = 1e-9;
 
-/// A disc that stands still: a lost member.
+/// A stationary disc: a lost member.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Disc {
     /// Centre, m.
@@ -26,37 +26,37 @@ pub struct Disc {
     pub radius_m: f64,
 }
 
-/// Where the members are to be at a waypoint.
+/// Targets of the members at a waypoint.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Placement {
-    /// Target of each slot, in their order, m.
+    /// Target of each slot, in the order of the slots, m.
     pub targets_m: Vec<Vector>,
     /// Corners of the compressed box: front left, front right, rear right, rear left, m.
     pub corners_m: [Vector; 4],
-    /// Compression across and along, above 0 to 1; 1 in open ground.
+    /// Compression across and along, above 0 and at most 1; 1 in open ground.
     pub scale: [f64; 2],
-    /// True where targets lie nearer to each other than the members' discs allow.
+    /// True if targets are closer to each other than the members' discs permit.
     pub squeezed: bool,
 }
 
-/// What placements depend on.
+/// Inputs of a placement.
 #[derive(Clone, Copy, Debug)]
 pub struct Placer<'a> {
     /// Ground.
     pub footing: &'a Footing<'a>,
     /// Formation.
     pub formation: &'a Formation,
-    /// Waypoints, no two in succession the same, m.
+    /// Waypoints without successive duplicates, m.
     pub route_m: &'a [Vector],
     /// Radius of a member, m.
     pub radius_m: f64,
-    /// Room between the discs of two members at their targets, m.
+    /// Clearance between the discs of two members at their targets, m.
     pub margin_m: f64,
     /// Discs that targets keep clear of.
     pub discs: &'a [Disc],
 }
 
-/// A waypoint with the frame of its formation.
+/// A waypoint and the axes of its formation.
 #[derive(Clone, Copy)]
 struct Frame {
     at_m: Vector,
@@ -65,19 +65,19 @@ struct Frame {
 }
 
 impl Frame {
-    /// The point at a depth behind and a width to the right of the waypoint.
+    /// The point at a depth behind the waypoint and a width to the right of it.
     fn point(&self, depth_m: f64, width_m: f64) -> Vector {
         add(self.at_m, sub(scale(self.right, width_m), scale(self.forward, depth_m)))
     }
 }
 
 impl Placer<'_> {
-    /// The targets at every waypoint.
+    /// Placements at all waypoints.
     pub fn all(&self) -> Vec<Placement> {
         (0..self.route_m.len()).map(|k| self.at(k)).collect()
     }
 
-    /// The targets at waypoint `k`, which must exist.
+    /// Placement at waypoint `k`, which must exist.
     pub fn at(&self, k: usize) -> Placement {
         let at_m = self.route_m[k];
         let forward = heading(self.route_m, k);
@@ -100,7 +100,7 @@ impl Placer<'_> {
         Placement { targets_m: placed.targets_m, corners_m, scale: [across, along], squeezed: placed.squeezed }
     }
 
-    /// How far one may go straight from a point, at most `limit_m`: the last of steps of one cell that can be reached.
+    /// Distance that can be travelled straight from a point, at most `limit_m`, in steps of one cell.
     fn reach_m(&self, from_m: Vector, direction: Vector, limit_m: f64) -> f64 {
         let [dx, dy] = self.footing.ground().map.cell_m();
         let step_m = dx.min(dy);
@@ -117,7 +117,7 @@ impl Placer<'_> {
         reached_m
     }
 
-    /// The point of the route at a distance before waypoint `k`; before the first one straight on backwards, as far as the ground allows.
+    /// The point of the route at a distance before waypoint `k`. Before the first waypoint it lies straight behind, if the ground is passable.
     fn behind(&self, k: usize, back_m: f64) -> Option<Vector> {
         let mut left_m = back_m;
         for pair in self.route_m[..=k].windows(2).rev() {
@@ -133,19 +133,19 @@ impl Placer<'_> {
     }
 }
 
-/// The targets of a waypoint so far.
+/// Targets of a waypoint placed so far.
 struct Placed<'a> {
     placer: &'a Placer<'a>,
     k: usize,
     frame: Frame,
     targets_m: Vec<Vector>,
-    /// Up to this distance behind the waypoint the route is taken, as far as targets were pushed back: depths grow with the ids.
+    /// Distance behind the waypoint up to which pushed-back targets occupy the route; depths grow with ids.
     pushed_m: f64,
     squeezed: bool,
 }
 
 impl Placed<'_> {
-    /// Adds the target of the next slot: at its place, else at its foot, else on the route behind it.
+    /// Adds the target of the next slot: at its position, else at its foot, else on the route behind it.
     fn add(&mut self, [depth_m, width_m]: Vector) {
         let (foot_m, target_m) = (self.frame.point(depth_m, 0.0), self.frame.point(depth_m, width_m));
         let in_place = self.is_within_reach(foot_m, target_m).then_some(target_m);
@@ -162,10 +162,10 @@ impl Placed<'_> {
         footing.is_passable(foot_m, target_m) && footing.holds(target_m)
     }
 
-    /// The first clear point of the route from a depth on.
+    /// The first clear point of the route from a depth backwards.
     fn pushed_back(&mut self, depth_m: f64) -> Option<Vector> {
         let step_m = 0.25 * self.separation_m();
-        // Each target takes at most twice the separation along the route.
+        // Each target occupies at most twice the separation along the route.
         let count = 8 * (self.targets_m.len() + self.placer.discs.len() + 1);
         let from_m = Some(depth_m.max(self.pushed_m)).filter(|from_m| from_m.is_finite())?;
         self.pushed_m = f64::INFINITY;
@@ -191,7 +191,7 @@ impl Placed<'_> {
     }
 }
 
-/// Heading at waypoint `k`: to the next one, at the last one from the one before; east for a route of one waypoint.
+/// Heading at waypoint `k`: towards the next one; at the last one, from the previous one; east for a route of one waypoint.
 pub fn heading(route_m: &[Vector], k: usize) -> Vector {
     let leg = |k: usize| Some(sub(*route_m.get(k + 1)?, *route_m.get(k)?)).and_then(direction);
     leg(k).or_else(|| leg(k.checked_sub(1)?)).unwrap_or([1.0, 0.0])

@@ -1,9 +1,9 @@
-//! Plans of a team that knows only the ground it has seen.
+//! Planning for a team that knows only the ground it has seen.
 //!
-//! The team sees what lies within a radius of its leader and remembers it. As in [`crate::replan`], D* Lite gives the cheapest steps to the goal
-//! over that, with ground not yet seen taken for free and level, and searches again only what new sights change. The team is led along the
-//! part of that plan that lies within the circle it sees, straightened: all of it is known ground. It is led on when the plan leaves
-//! that circle elsewhere, or when half of the way to its edge is left.
+//! The team sees the ground within a radius of its leader and remembers it. As in [`crate::replan`], D* Lite finds the cheapest steps to the goal,
+//! with unseen ground counted as free and level, and searches again only what new observations affect. The team is led along the part of the plan
+//! within the circle that it sees, straightened, so it stays on known ground. It gets a new route when the plan leaves that circle elsewhere, or when
+//! half of the way to the circle's edge is left.
 
 use super::footing::{Footing, TeamGround};
 use super::plane::{Vector, distance};
@@ -17,26 +17,26 @@ use sastrugi_schemas::ParameterError;
 #[cfg(test)]
 mod tests;
 
-/// Share of the radius by which a plan must leave the circle elsewhere to count as another one.
+/// Share of the radius by which the plan's exit from the circle must move for the plan to count as a different one.
 const TURN: f64 = 0.25;
-/// Diagonals of a cell that the radius has at least, beside the distance at which targets count as reached: the end of what is known stays
-/// ahead of the leader.
+/// Least radius in cell diagonals, in addition to the distance at which targets count as reached, so that the end of the known ground stays ahead of
+/// the leader.
 const DIAGONALS: f64 = 4.0;
 
-/// What new sights ask of a team.
+/// What a team should do after a look around.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Advice {
-    /// Nothing new.
-    GoOn,
-    /// Another way: its points from the leader's node on, m.
+    /// Continue as before.
+    Continue,
+    /// Follow another route: its points from the leader's node on, m.
     Lead {
         /// The points.
         ahead_m: Vec<Vector>,
-        /// Whether the plan is another one; else the old one goes on.
+        /// Whether the plan is a different one; otherwise it extends the old one.
         turns: bool,
     },
-    /// No way to the goal is left.
-    NoWay,
+    /// There is no path to the goal.
+    NoPath,
 }
 
 /// What a team has seen, and its plan.
@@ -47,21 +47,21 @@ pub struct Scout<'a> {
     search: DStarLite,
     at: Node,
     goal: Node,
-    /// Centre of the circle that was last planned in.
+    /// Centre of the circle of the last plan.
     centre: Node,
-    /// Where the plan leaves that circle.
+    /// Node at which the plan leaves that circle.
     end: Node,
-    /// Radius of circles that plans are made in: lines between nodes in them touch only cells that are seen.
+    /// Radius of the circles for plans: lines between nodes in them touch only seen cells.
     reach_m: f64,
-    /// Distance to the end at which the team is led on.
-    soon_m: f64,
+    /// Distance to the end at which the team gets the next part of its route.
+    extend_m: f64,
 }
 
 impl<'a> Scout<'a> {
-    /// At the start, with what is seen from there.
+    /// A scout at the start, with what is seen from there.
     ///
     /// # Errors
-    /// A radius too small for the cells.
+    /// The radius is too small for the cells.
     pub fn new(
         on: &'a TeamGround<'a>,
         radius_m: f64,
@@ -73,7 +73,7 @@ impl<'a> Scout<'a> {
         let least_m = DIAGONALS * diagonal_m + arrive_m;
         if radius_m < least_m {
             let message = format!(
-                "is {radius_m} m; on this terrain it must be at least {least_m:.3} m: {DIAGONALS} diagonals of a cell, and `arrive_m`"
+                "is {radius_m} m; on this terrain it must be at least {least_m:.3} m: {DIAGONALS} cell diagonals plus `arrive_m`"
             );
             return Err(ParameterError::new("sensing_radius_m", message));
         }
@@ -88,48 +88,48 @@ impl<'a> Scout<'a> {
             centre: start,
             end: start,
             reach_m: radius_m - diagonal_m,
-            soon_m: (0.5 * radius_m).max(arrive_m + 2.0 * diagonal_m),
+            extend_m: (0.5 * radius_m).max(arrive_m + 2.0 * diagonal_m),
         })
     }
 
-    /// Whether the team is being led to the goal itself.
+    /// Whether the present route leads to the goal itself.
     pub fn leads_to_goal(&self) -> bool {
         self.end == self.goal
     }
 
-    /// The first plan; `None` where there is no way.
-    pub fn set_out(&mut self) -> Option<Vec<Vector>> {
+    /// The first plan; `None` if there is no path.
+    pub fn first_plan(&mut self) -> Option<Vec<Vector>> {
         let path = self.search.search(&self.known)?.path;
         Some(self.ahead(&path))
     }
 
-    /// Looks around from where the leader is now.
+    /// Looks around from the leader's present position.
     pub fn look(&mut self, leader_m: Vector) -> Advice {
         let near = self.footing.node_near(leader_m, 0, |node_m| self.footing.is_passable(leader_m, node_m));
-        let Some(node) = near.filter(|node| *node != self.at && !self.leads_to_goal()) else { return Advice::GoOn };
+        let Some(node) = near.filter(|node| *node != self.at && !self.leads_to_goal()) else { return Advice::Continue };
         self.at = node;
         let changed = self.known.sense(node);
-        let ends_soon = self.distance_m(node, self.end) <= self.soon_m;
+        let ends_soon = self.distance_m(node, self.end) <= self.extend_m;
         if changed.is_empty() && !ends_soon {
-            return Advice::GoOn;
+            return Advice::Continue;
         }
         self.search.move_to(&self.known, node);
         self.search.changed(&self.known, changed);
-        let Some(found) = self.search.search(&self.known) else { return Advice::NoWay };
+        let Some(found) = self.search.search(&self.known) else { return Advice::NoPath };
         let turns = self.distance_m(self.leaves(&found.path), self.end) > TURN * self.reach_m;
         match turns || ends_soon {
             true => Advice::Lead { ahead_m: self.ahead(&found.path), turns },
-            false => Advice::GoOn,
+            false => Advice::Continue,
         }
     }
 
-    /// The last node of a plan before it leaves the circle last planned in.
+    /// The last node of a plan before it leaves the circle of the last plan.
     fn leaves(&self, path: &[Node]) -> Node {
         let within = path.iter().take_while(|node| self.distance_m(self.centre, **node) <= self.reach_m);
         within.last().copied().unwrap_or(self.at)
     }
 
-    /// The part of a plan within the circle around its beginning, straightened, m.
+    /// The part of a plan within the circle around its start, straightened, m.
     fn ahead(&mut self, path: &[Node]) -> Vec<Vector> {
         self.centre = self.at;
         self.end = self.leaves(path);

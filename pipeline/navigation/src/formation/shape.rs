@@ -1,7 +1,7 @@
-//! Formations: slots at fixed offsets from one another, and the members that hold them (the thesis, section 4.1 and Algorithm 9).
+//! Formations: slots at fixed offsets from one another, and the members that occupy them (the thesis, section 4.1 and Algorithm 9).
 //!
-//! A slot lies behind its predecessor by its depth and to the right of it by its width, m; slot 1 has no predecessor and leads. Lower ids
-//! lie nearer the front and have priority. A slot may hold a team with a formation of its own, whose leader takes the slot.
+//! A slot lies behind its predecessor by its depth, and to the right of it by its width, m; slot 1 has no predecessor and leads. Lower ids are nearer
+//! the front and have priority. A slot may hold a team with a formation of its own, whose leader occupies the slot.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -9,16 +9,16 @@ use serde::{Deserialize, Serialize};
 #[cfg(test)]
 mod tests;
 
-/// Most members of a team.
+/// Largest number of members of a team.
 const MEMBERS_MAX: usize = 1000;
 
-/// A slot as a study writes it.
+/// A slot as stated in a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SlotParameters {
-    /// Number, from 1; unique in the formation.
+    /// Id, from 1; unique in the formation.
     pub id: u32,
-    /// Id of the slot that it follows, smaller than its own; absent for slot 1 alone.
+    /// Id of the slot that it follows, smaller than its own; absent only for slot 1.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub predecessor: Option<u32>,
     /// Distance behind the predecessor, m.
@@ -27,7 +27,7 @@ pub struct SlotParameters {
     /// Distance to the right of the predecessor, m.
     #[serde(default)]
     pub width_m: f64,
-    /// Slots of a team that holds this one, with ids from 1; its leader stands here.
+    /// Slots of a team that occupies this slot, with ids from 1; its leader stands here.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub team: Vec<SlotParameters>,
 }
@@ -36,17 +36,17 @@ pub struct SlotParameters {
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Pattern {
-    /// One behind the other.
+    /// One behind another.
     #[default]
     Column,
     /// Side by side, alternately to the left and to the right of the leader.
     Line,
-    /// Back from the leader on both sides.
+    /// Behind the leader on both sides, in a V.
     Wedge,
 }
 
 impl Pattern {
-    /// All of them.
+    /// All patterns.
     pub const ALL: [Self; 3] = [Self::Column, Self::Line, Self::Wedge];
 
     /// Name in studies and tables.
@@ -58,10 +58,10 @@ impl Pattern {
         }
     }
 
-    /// The slots of a team of that size. With four members they are those of the thesis.
+    /// Slots of a team of this size. With four members they are those of the thesis.
     pub fn slots(self, members: u32, spacing_m: f64) -> Vec<SlotParameters> {
         let slot = |id: u32| {
-            // Slot 2 goes to the left, 3 to the right, each later one behind the one two before.
+            // Slot 2 is to the left and 3 to the right; each later one follows the one two before.
             let (predecessor, side) = match self {
                 Self::Column => (id - 1, 0.0),
                 Self::Line | Self::Wedge if id == 2 => (1, -1.0),
@@ -82,50 +82,50 @@ impl Pattern {
     }
 }
 
-/// A formation that cannot be taken up.
+/// Why a formation was refused.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FormationError {
-    /// No slot 1.
-    #[error("no slot has the id 1, which leads")]
+    /// No slot has id 1.
+    #[error("no slot has id 1, which is the leader's")]
     Leaderless,
     /// Two slots with the same id.
-    #[error("two slots have the id {0}; ids are unique")]
+    #[error("two slots have id {0}; ids must be unique")]
     Duplicate(u32),
-    /// A slot other than the first without a predecessor.
-    #[error("slot {0} has no predecessor; every slot but 1 follows one with a smaller id")]
+    /// A slot other than the first has no predecessor.
+    #[error("slot {0} has no predecessor; every slot except 1 must follow one with a smaller id")]
     Unled(u32),
-    /// A predecessor that is not smaller, or not there.
-    #[error("slot {slot} follows slot {predecessor}; it must follow a slot with a smaller id that exists")]
+    /// The predecessor does not have a smaller id, or does not exist.
+    #[error("slot {slot} follows slot {predecessor}; it must follow an existing slot with a smaller id")]
     Predecessor {
         /// Slot.
         slot: u32,
-        /// What it follows.
+        /// Its predecessor.
         predecessor: u32,
     },
     /// Too many slots.
-    #[error("{0} slots are too many; a team has at most {MEMBERS_MAX} members")]
+    #[error("the formation has {0} slots; a team has at most {MEMBERS_MAX} members")]
     Size(usize),
-    /// A leader that follows another slot.
-    #[error("slot 1 leads, but follows slot {0}")]
+    /// The leader follows another slot.
+    #[error("slot 1 follows slot {0}; as the leader it must have no predecessor")]
     Led(u32),
-    /// An offset that is not finite.
+    /// An offset is not finite.
     #[error("the offset of slot {0} is not finite")]
     Offset(u32),
-    /// A slot nearer the front than one of higher priority.
+    /// A slot is nearer the front than one with a smaller id.
     #[error(
-        "slot {slot} lies {depth_m} m behind the leader, nearer the front than slot {ahead} at {ahead_m} m; lower ids lie nearer the front"
+        "slot {slot} lies {depth_m} m behind the leader, nearer the front than slot {ahead} at {ahead_m} m; lower ids must be nearer the front"
     )]
     Order {
         /// Slot.
         slot: u32,
         /// Its distance behind the leader, m.
         depth_m: f64,
-        /// Slot of a smaller number.
+        /// A slot with a smaller id.
         ahead: u32,
         /// Its distance behind the leader, m.
         ahead_m: f64,
     },
-    /// Two slots too near each other.
+    /// Two slots are too close to each other.
     #[error("slots {first} and {second} lie {distance_m:.3} m apart; members of radius {radius_m} m need at least {} m", 2.0 * radius_m)]
     Crowded {
         /// Slot.
@@ -137,38 +137,38 @@ pub enum FormationError {
         /// Radius of a member, m.
         radius_m: f64,
     },
-    /// A member that holds no slot.
-    #[error("member {0} is not in the team, or was lost before")]
+    /// A member does not occupy a slot.
+    #[error("member {0} is not in the team or has already been lost")]
     NotThere(u32),
-    /// No member is left.
+    /// No member would be left.
     #[error("no member would be left")]
     TeamLost,
 }
 
-/// A checked slot.
+/// A validated slot.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Slot {
-    /// Number.
+    /// Id.
     pub id: u32,
-    /// Position of the predecessor among the slots; none for the leader.
+    /// Index of the predecessor among the slots; `None` for the leader.
     pub predecessor: Option<usize>,
-    /// Distance behind the predecessor and to the right of it, m.
+    /// Distance behind the predecessor, and to the right of it, m.
     pub offset_m: [f64; 2],
-    /// Distance behind the leader and to the right of it, m.
+    /// Distance behind the leader, and to the right of it, m.
     pub from_leader_m: [f64; 2],
-    /// Member that holds it, from 1.
+    /// Member that occupies it, from 1.
     pub member: u32,
 }
 
-/// Slots in order of priority, each held by a member.
+/// Slots in order of priority, each occupied by a member.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Formation {
     slots: Vec<Slot>,
 }
 
 impl Formation {
-    /// A formation of these slots for members of that radius; the k-th slot by id is held by member k. Teams within it are taken apart: their
-    /// members get the ids after those of the formation, and so a lower priority.
+    /// A formation of these slots for members of this radius; member k occupies the k-th slot by id. Teams within it are flattened: their members get
+    /// the ids after those of the formation, and so a lower priority.
     ///
     /// # Errors
     /// See [`FormationError`].
@@ -187,12 +187,12 @@ impl Formation {
         &self.slots
     }
 
-    /// Position of the slot that a member holds.
+    /// Index of the slot that a member occupies.
     pub fn slot_of(&self, member: u32) -> Option<usize> {
         self.slots.iter().position(|slot| slot.member == member)
     }
 
-    /// Extent to the sides and backwards, m: `[leftmost, rightmost, rearmost]` from the leader.
+    /// Extent to the sides and to the rear, m: `[leftmost, rightmost, rearmost]` from the leader.
     pub fn extent_m(&self) -> [f64; 3] {
         let fold = |axis: usize, from: f64, end: fn(f64, f64) -> f64| {
             self.slots.iter().map(|slot| slot.from_leader_m[axis]).fold(from, end)
@@ -200,11 +200,27 @@ impl Formation {
         [fold(1, 0.0, f64::min), fold(1, 0.0, f64::max), fold(0, 0.0, f64::max)]
     }
 
-    /// Fills the slot of a lost member (the thesis, Algorithm 9): the lowest-numbered follower moves up, its own lowest-numbered follower after
-    /// it, until one has none, whose slot disappears. Other followers keep their slots. Returns the members that moved, with their new slots.
+    /// Fills the slot of a lost member (the thesis, Algorithm 9): its lowest-numbered follower moves up, then that one's lowest-numbered follower,
+    /// until one has no follower; its slot is removed. Other followers keep their slots. Returns the members that moved, with their new slots.
     ///
     /// # Errors
-    /// A member that holds no slot; the last member.
+    /// A member without a slot, or the last member.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_navigation::formation::Formation;
+    /// use sastrugi_navigation::formation::shape::Pattern;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // A wedge of four: slots 2 and 3 follow the leader, slot 4 follows slot 2.
+    /// let mut wedge = Formation::new(&Pattern::Wedge.slots(4, 10.0), 0.5)?;
+    /// // Without the leader, member 2 leads and member 4 follows in its place.
+    /// assert_eq!(wedge.lose(1)?, [(2, 1), (4, 2)]);
+    /// let holders: Vec<(u32, u32)> = wedge.slots().iter().map(|slot| (slot.id, slot.member)).collect();
+    /// assert_eq!(holders, [(1, 2), (2, 4), (3, 3)]);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn lose(&mut self, member: u32) -> Result<Vec<(u32, u32)>, FormationError> {
         let mut empty = self.slot_of(member).ok_or(FormationError::NotThere(member))?;
         if self.slots.len() == 1 {
@@ -224,7 +240,7 @@ impl Formation {
     }
 }
 
-/// The slots with those of the teams within them. The leader of such a team stands in the slot.
+/// The slots, including those of teams within them. The leader of such a team occupies its slot.
 fn flattened(slots: &[SlotParameters]) -> Result<Vec<Slot>, FormationError> {
     let mut slots: Vec<&SlotParameters> = slots.iter().collect();
     slots.sort_by_key(|slot| slot.id);
@@ -255,7 +271,7 @@ fn of_one_level(slots: &[&SlotParameters]) -> Result<Vec<Slot>, FormationError> 
     Ok(checked)
 }
 
-/// A slot behind those that were placed before it.
+/// Positions a slot behind the slots before it.
 fn placed(slot: &SlotParameters, before: &[Slot]) -> Result<Slot, FormationError> {
     let id = slot.id;
     if before.iter().any(|other| other.id == id) {
@@ -279,7 +295,7 @@ fn placed(slot: &SlotParameters, before: &[Slot]) -> Result<Slot, FormationError
     Ok(Slot { id, predecessor, offset_m, from_leader_m, member: 0 })
 }
 
-/// Lower numbers stand nearer the front.
+/// Lower ids must be nearer the front.
 fn check_order(slots: &[Slot]) -> Result<(), FormationError> {
     let behind = |pair: &[Slot]| pair[1].from_leader_m[0] < pair[0].from_leader_m[0];
     match slots.windows(2).find(|pair| behind(pair)) {

@@ -1,10 +1,10 @@
-//! Speeds that keep the distances between members (the thesis, Algorithm 8, TuneSpeeds).
+//! Speeds that keep the members' distances (the thesis, Algorithm 8, TuneSpeeds).
 //!
-//! Each follower compares its distance behind its predecessor, along the predecessor's heading, with the depth of its slot, and asks for
-//! speeds: slower when it is too near, faster when it lags, and a slower predecessor when it lags by twice as much. Of several
-//! requests to one member the slower one counts, and the faster one before the mean speed. The listing slows a member that lags, though the
-//! text ranks requests to speed up that it never makes; `literal` does as the listing. With a depth of 0 the listing's bands are empty; here
-//! the bands are shares of the spacing.
+//! Each follower compares its distance behind its predecessor, along the predecessor's heading, with the depth of its slot, and requests speeds: a
+//! lower one of itself if it is too close, a higher one if it lags, and a lower one of its predecessor if it lags by twice as much. Of several
+//! requests to a member, slower has precedence over faster, and faster over the mean speed. The listing slows down a member that lags, although the
+//! text ranks requests to speed up, which the listing never makes; `literal` follows the listing. With a depth of 0 the bands of the listing are
+//! empty; here the bands are then shares of the spacing.
 
 use super::plane::{Vector, dot, sub};
 use super::shape::Formation;
@@ -14,14 +14,14 @@ use serde::{Deserialize, Serialize};
 #[cfg(test)]
 mod tests;
 
-/// Speeds and accelerations of a member.
+/// Speed and acceleration limits of a member.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 pub struct SpeedLimits {
     /// Mean speed, m/s.
     pub mean_m_s: f64,
-    /// Least speed of a moving member, m/s.
+    /// Lowest speed of a moving member, m/s.
     pub min_m_s: f64,
-    /// Greatest speed, m/s.
+    /// Highest speed, m/s.
     pub max_m_s: f64,
     /// Acceleration, m/s^2.
     pub accelerate_m_s2: f64,
@@ -29,33 +29,33 @@ pub struct SpeedLimits {
     pub slow_m_s2: f64,
 }
 
-/// What a member is asked for, the stronger request the greater.
+/// Speed request to a member; greater values take precedence.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Request {
-    /// Nothing.
+    /// No request.
     #[default]
     None,
     /// The mean speed.
     Mean,
-    /// A greater one.
+    /// A higher speed.
     Faster,
-    /// A lower one.
+    /// A lower speed.
     Slower,
 }
 
 /// Bands of the distance behind the predecessor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Bands {
-    /// Width of a band as a share of the slot's depth, and at least of the spacing, above 0 and below 0.5.
+    /// Width of a band as a share of the slot's depth, or of the spacing if that is larger; above 0 and below 0.5.
     pub tolerance: f64,
-    /// Distance between neighbouring slots, m.
+    /// Distance between adjacent slots, m.
     pub spacing_m: f64,
-    /// As the listing has it.
+    /// Whether to follow the listing.
     pub literal: bool,
 }
 
 impl SpeedLimits {
-    /// A speed after `step_s` seconds under a request.
+    /// Speed after `step_s` seconds with this request.
     pub fn tuned(&self, speed_m_s: f64, request: Request, step_s: f64) -> f64 {
         let (slower, faster) = (speed_m_s - self.slow_m_s2 * step_s, speed_m_s + self.accelerate_m_s2 * step_s);
         let tuned_m_s = match request {
@@ -69,7 +69,7 @@ impl SpeedLimits {
 }
 
 impl Bands {
-    /// Requests to the members, by slot. `position` and `heading` are those of the member in a slot.
+    /// Requests to the members, per slot. `position` and `heading` are those of the member in a slot.
     pub fn requests(
         &self,
         formation: &Formation,
@@ -87,7 +87,7 @@ impl Bands {
         requests
     }
 
-    /// Requests of a follower at that distance behind its predecessor: to itself and to the predecessor.
+    /// Requests of a follower at this distance behind its predecessor: to itself, and to the predecessor.
     pub fn of_follower(&self, distance_m: f64, depth_m: f64) -> [Request; 2] {
         let band_m = self.tolerance * depth_m.abs().max(self.spacing_m);
         let lag_m = distance_m - depth_m;

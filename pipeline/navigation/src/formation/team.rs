@@ -1,4 +1,4 @@
-//! A team on its way: formation, placement, movement, speeds and losses together.
+//! A run of a team: formation, placement, motion, speeds and losses combined.
 
 use super::crowd::{Crowd, Motion, Phase};
 use super::footing::{Footing, TeamGround};
@@ -13,33 +13,33 @@ use sastrugi_schemas::ParameterError;
 #[cfg(test)]
 mod tests;
 
-/// Time between two events of one kind of a member below which only the first is told, s.
+/// An event of the same kind and member within this time of the previous one is not recorded, s.
 const EVENT_GAP_S: f64 = 1.0;
-/// Time limit where none is stated: so many times that of the route at mean speed.
+/// Default time limit, as a multiple of the time for the route at mean speed.
 const TIME_FACTOR: f64 = 10.0;
-/// And so much more, s.
+/// Time added to the default time limit, s.
 const TIME_MORE_S: f64 = 600.0;
-/// Cells around a place at the start in which a free one is looked for, at most.
+/// Largest distance in cells within which a free start is searched for a member.
 const SEARCH_CELLS: f64 = 100.0;
 
-/// Why a team cannot set out. Messages read after "failed to".
+/// Why a team could not start. Messages read after "failed to".
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum TeamError {
     /// A parameter out of range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
-    /// A route that leads nowhere.
-    #[error("lead a team along a route without two waypoints apart")]
+    /// The route has no length.
+    #[error("lead a team along a route of no length: it needs two distinct waypoints")]
     Route,
-    /// A member without a free place at the start.
+    /// There is no free position for a member at the start.
     #[error(
-        "place member {member} near ({:.2}, {:.2}), at the start of the route: no free ground there has room for a disc of radius {radius_m} m",
+        "place member {member} near ({:.2}, {:.2}) at the start of the route: no free ground nearby has room for a disc of radius {radius_m} m",
         position_m[0], position_m[1]
     )]
     NoRoom {
         /// Member, from 1.
         member: u32,
-        /// Its place, m.
+        /// Its position, m.
         position_m: Vector,
         /// Radius of a member, m.
         radius_m: f64,
@@ -49,14 +49,14 @@ pub enum TeamError {
 /// How a run ended.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Outcome {
-    /// All members that are left are at their last targets.
+    /// All remaining members are at their last targets.
     Arrived,
-    /// No member comes nearer to its target; this one has not for longest.
+    /// No member makes progress; this one has made none for longest.
     Stuck {
         /// Member, from 1.
         member: u32,
     },
-    /// Out of time.
+    /// The time limit was reached.
     Timeout,
 }
 
@@ -71,47 +71,47 @@ impl Outcome {
     }
 }
 
-/// Something that happened.
+/// An event of a run.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Event {
     /// Time, s.
     pub time_s: f64,
-    /// Member, from 1; `None` for the team as a whole.
+    /// Member, from 1; `None` for an event of the team.
     pub member: Option<u32>,
-    /// What.
+    /// What happened.
     pub kind: EventKind,
 }
 
 /// Kinds of events.
 #[derive(Clone, Debug, PartialEq)]
 pub enum EventKind {
-    /// The clock starts.
+    /// The run starts.
     Start,
-    /// A member begins to wait.
+    /// A member starts to wait.
     Wait,
-    /// A member begins to move in another direction than towards its target.
+    /// A member starts to move in a direction other than towards its target.
     Dodge,
     /// A member is lost.
     Lost,
-    /// A member takes a slot.
+    /// A member moves to another slot.
     Rearranged {
         /// Id of the slot.
         slot: u32,
     },
-    /// The leader makes for a waypoint with too little room for the formation.
+    /// The leader heads for a waypoint with too little room for the formation.
     Squeezed {
-        /// Number of the waypoint, from 0.
+        /// Index of the waypoint, from 0.
         waypoint: usize,
     },
-    /// The team makes for its goal by another way.
+    /// The team heads for its goal by another route.
     Replanned,
-    /// A member is at its last target.
+    /// A member has reached its last target.
     Arrived,
-    /// The run is over.
+    /// The run has ended.
     End(Outcome),
 }
 
-/// Where a member is and how well it keeps its place.
+/// State of a member, and how well it keeps its position.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sample {
     /// Position, m.
@@ -122,15 +122,15 @@ pub struct Sample {
     pub velocity_m_s: Vector,
     /// Id of its slot; `None` once it is lost.
     pub slot: Option<u32>,
-    /// Target that it makes for, m.
+    /// Its present target, m.
     pub target_m: Vector,
     /// Depth and width error, m; `None` for the leader and for lost members.
     pub errors_m: Option<[f64; 2]>,
-    /// What it does.
+    /// What it is doing.
     pub phase: Phase,
 }
 
-/// The formation's box from a time on.
+/// The formation's box, valid from a time on.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TimedBox {
     /// Time, s.
@@ -141,7 +141,7 @@ pub struct TimedBox {
     pub squeezed: bool,
 }
 
-/// The way that a team makes for from a time on.
+/// The route of a team, valid from a time on.
 #[derive(Clone, Debug, PartialEq)]
 pub struct TimedRoute {
     /// Time, s.
@@ -150,45 +150,65 @@ pub struct TimedRoute {
     pub points_m: Vec<Vector>,
 }
 
-/// A team on its way along a route.
+/// A team that follows a route.
 #[derive(Clone, Debug)]
 pub struct Team<'a> {
     ground: &'a TeamGround<'a>,
     parameters: TeamParameters,
     formation: Formation,
-    /// What the team has seen, where it plans its way itself.
+    /// What the team has seen, if it plans its own route.
     scout: Option<Scout<'a>>,
-    /// Waypoints that are still of use.
+    /// Waypoints that are still needed.
     route_m: Vec<Vector>,
-    /// Number of the first of them.
+    /// Index of the first of them.
     first: usize,
     routes: Vec<TimedRoute>,
     placements: Vec<Placement>,
     crowd: Crowd<'a>,
-    /// Losses to come, the next one last.
+    /// Remaining losses, the next one last.
     losses: Vec<Loss>,
     metrics: Metrics,
     events: Vec<Event>,
     boxes: Vec<TimedBox>,
-    /// Time of the last event of waiting and of dodging of each member, s.
-    told_s: Vec<[f64; 2]>,
+    /// Time at which each member was last seen waiting, and dodging, s.
+    seen_s: Vec<[f64; 2]>,
     time_max_s: f64,
     outcome: Option<Outcome>,
 }
 
 impl<'a> Team<'a> {
-    /// A team at the start of a route, in m; members are placed as at any waypoint. A team with a sensing radius takes from the route its ends
-    /// and its time limit, and plans its way by the costs of the ground, which must be those of slopes alone; for others they count for
-    /// detours alone.
+    /// A team at the start of a route, in m; members are placed as at any waypoint. A team with a sensing radius uses only the ends and the time
+    /// limit of the route, and plans its own route by the costs of the ground, which must depend on slope alone. For other teams, costs matter only
+    /// for detours.
     ///
     /// # Errors
-    /// Parameters out of range, a route without a length, or no room at its start.
+    /// Parameters out of range, a route of no length, or no room at its start.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_navigation::formation::{Outcome, Team, TeamGround, TeamParameters};
+    /// use sastrugi_navigation::{CostModel, Ground, SlopeCost, SlopeLimits, TravelMap};
+    /// use sastrugi_numeric::{Geometry, Grid};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let heights = Grid::filled(Geometry::square(40, 80, 1.0), 0.0);
+    /// let map = TravelMap::new(heights, SlopeLimits::new(30.0, 30.0)?)?;
+    /// let costs = CostModel::new(SlopeCost::THESIS, None, &map)?;
+    /// let ground = TeamGround::new(Ground { map: &map, costs: &costs, clearance: None });
+    /// // Two members in a column, 10 m apart, drive 40 m east at 1 m/s.
+    /// let parameters = TeamParameters { members: Some(2), ..TeamParameters::default() };
+    /// let mut team = Team::new(&ground, &parameters, &[[20.0, 20.0], [60.0, 20.0]])?;
+    /// assert_eq!(team.run(|_| ())?, Outcome::Arrived);
+    /// assert!((38.0..42.0).contains(&team.time_s()) && team.metrics().least_separation_m > 8.0);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn new(ground: &'a TeamGround<'a>, parameters: &TeamParameters, route_m: &[Vector]) -> Result<Self, TeamError> {
         parameters.check()?;
         let formation = parameters.formation()?;
         let route_length_m: f64 = route_m.windows(2).map(|pair| distance(pair[0], pair[1])).sum();
         let mut scout = scout(ground, parameters, route_m)?;
-        let own_m = scout.as_mut().and_then(Scout::set_out);
+        let own_m = scout.as_mut().and_then(Scout::first_plan);
         let points_m = own_m.unwrap_or_else(|| route_m.to_vec());
         let route_m = divided(&points_m, parameters.leg_max_m())?;
         let footing = Footing::new(ground, &route_m);
@@ -213,20 +233,20 @@ impl<'a> Team<'a> {
             metrics: Metrics::of(members),
             events: Vec::new(),
             boxes: Vec::new(),
-            told_s: vec![[f64::NEG_INFINITY; 2]; members],
+            seen_s: vec![[f64::NEG_INFINITY; 2]; members],
             time_max_s: parameters.time_max_s.unwrap_or(limit_s),
             parameters: parameters.clone(),
             outcome: None,
         };
-        team.tell(None, EventKind::Start);
+        team.record(None, EventKind::Start);
         team.enter_waypoint(0);
         Ok(team)
     }
 
-    /// Runs to the end; calls `sample` at the start, at every recorded instant and at the end if it is one.
+    /// Runs to the end; calls `sample` at the start and at every sampling instant, which may include the end.
     ///
     /// # Errors
-    /// A sampling rate that does not suit the steps.
+    /// A sampling rate that does not match the steps.
     pub fn run(&mut self, mut sample: impl FnMut(&Self)) -> Result<Outcome, TeamError> {
         let every = self.parameters.sample_every()?;
         sample(self);
@@ -242,40 +262,40 @@ impl<'a> Team<'a> {
         Ok(Outcome::Timeout)
     }
 
-    /// One step; the outcome once the run is over.
+    /// Runs one step; returns the outcome once the run has ended.
     pub fn step(&mut self) -> Option<Outcome> {
         if self.outcome.is_some() {
             return self.outcome;
         }
-        self.lose_due();
+        self.apply_due_losses();
         self.outcome =
             if self.look() { self.advance() } else { Some(Outcome::Stuck { member: self.leader() as u32 + 1 }) };
         if let Some(outcome) = self.outcome {
-            self.tell(None, EventKind::End(outcome));
+            self.record(None, EventKind::End(outcome));
         }
         self.outcome
     }
 
-    /// Speeds, and a step of all members.
+    /// Adjusts the speeds and moves all members by one step.
     fn advance(&mut self) -> Option<Outcome> {
         self.tune_speeds();
         let before: Vec<Motion> = self.crowd.motions().to_vec();
         let stuck = self.crowd.step(&self.order());
-        self.note(&before);
+        self.record_step(&before);
         self.ended(stuck)
     }
 
-    /// Looks around where the team plans its way itself; false where no way is left.
+    /// Looks around if the team plans its own route; false if there is no path.
     fn look(&mut self) -> bool {
         let leader_m = self.motion_in(0).position_m;
         let Some(scout) = &mut self.scout else { return true };
         match scout.look(leader_m) {
-            Advice::GoOn => true,
-            Advice::NoWay => false,
+            Advice::Continue => true,
+            Advice::NoPath => false,
             Advice::Lead { ahead_m, turns } => {
                 if turns {
                     self.metrics.replans += 1;
-                    self.tell(None, EventKind::Replanned);
+                    self.record(None, EventKind::Replanned);
                 }
                 self.lead_on(&ahead_m);
                 true
@@ -283,11 +303,11 @@ impl<'a> Team<'a> {
         }
     }
 
-    /// Leads the team on from where its leader is. Waypoints that others have still to pass stay, thinned, so that their headings are those of
-    /// whole legs, not of every look around.
+    /// Leads the team on from its leader's position. Waypoints that other members have still to pass are kept, but thinned, so that headings are
+    /// those of complete legs rather than of every look around.
     fn lead_on(&mut self, ahead_m: &[Vector]) {
         let leader_m = self.motion_in(0).position_m;
-        // Straight to the second point where that may be travelled: the first is the node beside the leader.
+        // Goes straight to the second point if that is passable: the first is the node next to the leader.
         let straight = ahead_m.get(1).is_some_and(|second_m| self.crowd.is_passable(leader_m, *second_m));
         let points_m = [&[leader_m], &ahead_m[usize::from(straight)..]].concat();
         let Ok(ahead_m) = divided(&points_m, self.parameters.leg_max_m()) else { return };
@@ -301,8 +321,8 @@ impl<'a> Team<'a> {
         self.route_m = [&self.route_m[first..kept], &ahead_m].concat();
         self.first += first;
         self.routes.push(TimedRoute { time_s: self.time_s(), points_m });
-        // The leader's place is now waypoint `kept`; those beside and before the leader make for the one after.
-        self.place_anew(|_, motion| match motion.next {
+        // The leader's position is now waypoint `kept`; members next to and ahead of the leader head for the one after it.
+        self.replace_targets(|_, motion| match motion.next {
             next if next < kept => next - first,
             next if next < passed => kept - first,
             next => next - passed + kept + 1 - first,
@@ -315,27 +335,27 @@ impl<'a> Team<'a> {
         self.crowd.time_s()
     }
 
-    /// How the members move, the first member first.
+    /// States of motion of the members, first member first.
     pub fn motions(&self) -> &[Motion] {
         self.crowd.motions()
     }
 
-    /// The formation as it is now.
+    /// The present formation.
     pub fn formation(&self) -> &Formation {
         &self.formation
     }
 
-    /// Waypoints that are still of use with the targets at each, m.
+    /// Waypoints that are still needed, m, and the placement at each.
     pub fn placements(&self) -> (&[Vector], &[Placement]) {
         (&self.route_m, &self.placements)
     }
 
-    /// The ways that the team made for so far, in order of time.
+    /// Routes of the team so far, in order of time.
     pub fn routes(&self) -> &[TimedRoute] {
         &self.routes
     }
 
-    /// Figures so far.
+    /// Metrics so far.
     pub fn metrics(&self) -> &Metrics {
         &self.metrics
     }
@@ -350,7 +370,7 @@ impl<'a> Team<'a> {
         &self.boxes
     }
 
-    /// Members as they are now, the first member first.
+    /// Present state of the members, first member first.
     pub fn samples(&self) -> Vec<Sample> {
         let sample = |(k, motion): (usize, &Motion)| {
             let slot = self.formation.slot_of(k as u32 + 1);
@@ -372,7 +392,7 @@ impl<'a> Team<'a> {
         self.formation.slots().iter().map(|slot| slot.member as usize - 1).collect()
     }
 
-    /// The member in the first slot, from 0.
+    /// The member in the first slot, as an index.
     fn leader(&self) -> usize {
         self.formation.slots()[0].member as usize - 1
     }
@@ -381,7 +401,7 @@ impl<'a> Team<'a> {
         &self.crowd.motions()[self.formation.slots()[slot].member as usize - 1]
     }
 
-    /// Direction of the leg of the route that the member in a slot is on.
+    /// Direction of the route's leg that the member in a slot is on.
     fn forward(&self, slot: usize) -> Vector {
         heading(&self.route_m, self.motion_in(slot).next.min(self.route_m.len() - 1).saturating_sub(1))
     }
@@ -403,20 +423,20 @@ impl<'a> Team<'a> {
         }
     }
 
-    /// Loses the members whose time has come.
-    fn lose_due(&mut self) {
+    /// Applies the losses that are due.
+    fn apply_due_losses(&mut self) {
         while let Some(loss) = self.losses.pop_if(|loss| loss.time_s <= self.crowd.time_s()) {
             self.crowd.lose(loss.member as usize - 1);
-            self.tell(Some(loss.member), EventKind::Lost);
-            // The losses were checked: each member is lost once, and one stays.
+            self.record(Some(loss.member), EventKind::Lost);
+            // Cannot fail: the losses were checked, so each member is lost once and one remains.
             let moved = self.formation.lose(loss.member).unwrap_or_default();
-            self.place_anew(|_, motion| motion.next);
-            moved.iter().for_each(|&(member, slot)| self.tell(Some(member), EventKind::Rearranged { slot }));
+            self.replace_targets(|_, motion| motion.next);
+            moved.iter().for_each(|&(member, slot)| self.record(Some(member), EventKind::Rearranged { slot }));
         }
     }
 
-    /// Targets of the formation as it is now; `next` gives the waypoint that the member in a slot makes for.
-    fn place_anew(&mut self, next: impl Fn(usize, &Motion) -> usize) {
+    /// Recomputes the targets of the present formation; `next` gives the waypoint that the member in a slot heads for.
+    fn replace_targets(&mut self, next: impl Fn(usize, &Motion) -> usize) {
         let lost = self.crowd.motions().iter().filter(|motion| motion.phase == Phase::Lost);
         let discs: Vec<Disc> =
             lost.map(|motion| Disc { position_m: motion.position_m, radius_m: self.parameters.radius_m }).collect();
@@ -426,7 +446,7 @@ impl<'a> Team<'a> {
         for (slot, member) in self.order().into_iter().enumerate() {
             let motion = self.crowd.motions()[member];
             let targets_m = targets(&self.placements, slot);
-            // One that has arrived looks at its last target again.
+            // A member that has arrived checks its last target again.
             let moved_m = distance(motion.position_m, targets_m[last]);
             let at = next(slot, &motion);
             let next = if at > last && moved_m > self.parameters.arrive_m { last } else { at };
@@ -435,22 +455,22 @@ impl<'a> Team<'a> {
         self.crowd.stand_on(footing);
     }
 
-    /// Notes what happened in a step.
-    fn note(&mut self, before: &[Motion]) {
+    /// Records the events and metrics of a step.
+    fn record_step(&mut self, before: &[Motion]) {
         let leader = self.leader();
         let after: Vec<Motion> = self.crowd.motions().to_vec();
         for (k, (before, after)) in before.iter().zip(&after).enumerate() {
             self.metrics.driven_m[k] += length(after.moved_m);
             if after.phase == Phase::Waiting {
                 self.metrics.waits += 1;
-                self.tell_seldom(k, 0, before.phase != Phase::Waiting, EventKind::Wait);
+                self.record_unless_recent(k, 0, before.phase != Phase::Waiting, EventKind::Wait);
             }
             if after.dodging {
                 self.metrics.dodges += 1;
-                self.tell_seldom(k, 1, !before.dodging, EventKind::Dodge);
+                self.record_unless_recent(k, 1, !before.dodging, EventKind::Dodge);
             }
             if self.leads_to_goal() && after.phase == Phase::Arrived && before.phase != Phase::Arrived {
-                self.tell(Some(k as u32 + 1), EventKind::Arrived);
+                self.record(Some(k as u32 + 1), EventKind::Arrived);
             }
             if k == leader && after.next != before.next && after.next < self.placements.len() {
                 self.enter_waypoint(after.next);
@@ -466,13 +486,13 @@ impl<'a> Team<'a> {
         self.metrics.contacts += self.crowd.touched() as u64;
     }
 
-    /// The leader makes for a waypoint.
+    /// Records that the leader heads for a waypoint.
     fn enter_waypoint(&mut self, waypoint: usize) {
         let Placement { corners_m, squeezed, .. } = self.placements[waypoint];
         self.boxes.push(TimedBox { time_s: self.time_s(), corners_m, squeezed });
         if squeezed {
             self.metrics.squeezed += 1;
-            self.tell(None, EventKind::Squeezed { waypoint: self.first + waypoint });
+            self.record(None, EventKind::Squeezed { waypoint: self.first + waypoint });
         }
     }
 
@@ -485,21 +505,21 @@ impl<'a> Team<'a> {
         stuck.map(|member| Outcome::Stuck { member: member as u32 + 1 }).or(out_of_time)
     }
 
-    /// False while the way that the team makes for ends where its knowledge ends.
+    /// False while the present route ends where the known ground ends.
     fn leads_to_goal(&self) -> bool {
         self.scout.as_ref().is_none_or(Scout::leads_to_goal)
     }
 
-    fn tell(&mut self, member: Option<u32>, kind: EventKind) {
+    fn record(&mut self, member: Option<u32>, kind: EventKind) {
         self.events.push(Event { time_s: self.time_s(), member, kind });
     }
 
-    /// Tells that a member begins to wait (0) or to dodge (1), unless it did so a moment ago.
-    fn tell_seldom(&mut self, member: usize, which: usize, begins: bool, kind: EventKind) {
-        let (now_s, last_s) = (self.time_s(), self.told_s[member][which]);
-        self.told_s[member][which] = now_s;
+    /// Records that a member starts to wait (0) or to dodge (1), unless it did so a moment ago.
+    fn record_unless_recent(&mut self, member: usize, which: usize, begins: bool, kind: EventKind) {
+        let (now_s, last_s) = (self.time_s(), self.seen_s[member][which]);
+        self.seen_s[member][which] = now_s;
         if begins && now_s - last_s > EVENT_GAP_S {
-            self.tell(Some(member as u32 + 1), kind);
+            self.record(Some(member as u32 + 1), kind);
         }
     }
 }
@@ -532,7 +552,7 @@ fn targets(placements: &[Placement], slot: usize) -> Vec<Vector> {
     placements.iter().map(|placement| placement.targets_m[slot]).collect()
 }
 
-/// Places at the first waypoint, m; where there is no room, the nearest free nodes.
+/// Positions at the first waypoint, m; without room there, the nearest free nodes.
 fn starts(
     footing: &Footing<'_>,
     formation: &Formation,
@@ -553,7 +573,7 @@ fn starts(
     Ok(starts_m)
 }
 
-/// A route with waypoints at most so far apart, without those that repeat the one before.
+/// A route with waypoints at most `leg_max_m` apart, without successive duplicates.
 fn divided(route_m: &[Vector], leg_max_m: f64) -> Result<Vec<Vector>, TeamError> {
     let mut all: Vec<Vector> = Vec::new();
     for &point_m in route_m {

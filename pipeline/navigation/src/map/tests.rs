@@ -1,5 +1,5 @@
 use super::*;
-use crate::testing::{Random, drawn, limits, map_of, may_step_by_definition, rough};
+use crate::testing::{Random, drawn, limits, map_of, may_step_by_definition, oblong_map_of, rough};
 use sastrugi_numeric::Geometry;
 
 fn refused(rows: usize, cols: usize, cell: f64, heights: Vec<f64>) -> String {
@@ -8,7 +8,7 @@ fn refused(rows: usize, cols: usize, cell: f64, heights: Vec<f64>) -> String {
 }
 
 #[test]
-fn val_maps_that_cannot_be_planned_on_are_refused() {
+fn val_invalid_maps_are_refused() {
     assert_eq!(
         refused(1, 3, 1.0, vec![0.0; 3]),
         "plan on 1 x 3 cells: a map needs at least 2 x 2 and at most 1073741824 in all"
@@ -31,7 +31,7 @@ fn val_slope_limits_lie_between_0_and_90_degrees() {
 }
 
 #[test]
-fn val_the_directions_know_their_places() {
+fn val_directions_have_their_indices() {
     for (k, direction) in Direction::ALL.into_iter().enumerate() {
         assert_eq!(direction.index(), k);
         assert_eq!(direction.back().back(), direction);
@@ -44,6 +44,7 @@ fn val_the_directions_know_their_places() {
 #[test]
 fn prop_the_table_of_steps_agrees_with_their_definition_after_any_edits() {
     let mut random = Random(1);
+    let mut counts = [0, 0];
     for _ in 0..40 {
         let mut map = rough(7, 9, 0.15, 1.1, &mut random);
         for _ in 0..30 {
@@ -59,13 +60,15 @@ fn prop_the_table_of_steps_agrees_with_their_definition_after_any_edits() {
             for direction in Direction::ALL {
                 let expected = may_step_by_definition(&map, node, direction);
                 assert_eq!(map.accessible(node, direction).is_some(), expected, "{node} {direction:?}");
+                counts[usize::from(expected)] += 1;
             }
         }
     }
+    assert!(counts.iter().all(|count| *count > 1000), "refused and allowed: {counts:?}");
 }
 
 #[test]
-fn val_heights_decide_what_may_be_freed() {
+fn val_only_nodes_with_heights_can_be_unblocked() {
     let mut map = map_of(3, 3, limits(30.0, 30.0), |r, c| if [r, c] == [1, 1] { f64::NAN } else { 0.0 });
     assert!(map.is_blocked(4));
     map.unblock(4);
@@ -93,7 +96,7 @@ fn val_a_diagonal_over_a_ridge_is_refused_though_its_ends_are_level() {
 }
 
 #[test]
-fn val_lines_slip_between_no_two_diagonal_blocked_cells() {
+fn val_lines_do_not_pass_between_diagonal_blocked_cells() {
     let map = drawn(&["..#", ".#.", "..."]);
     assert!(!map.is_free_along([2.0, 0.0], [0.0, 1.0]), "touches the corner of the centre");
     assert!(!map.is_free_along([1.0, 2.0], [0.0, 1.0]), "between two blocked cells");
@@ -102,7 +105,7 @@ fn val_lines_slip_between_no_two_diagonal_blocked_cells() {
     assert!(!map.is_free_along([f64::NAN, 0.0], [0.0, 0.0]));
 }
 
-/// Whether a line between two nodes comes within `slack` of a cell: the slow and obvious way, by clipping.
+/// Whether a line between two nodes comes within `slack` of a cell; a slow and obvious reference by clipping.
 fn touches(start: Point, end: Point, cell: [usize; 2], slack: f64) -> bool {
     let (mut from, mut to) = (0.0f64, 1.0f64);
     for axis in 0..2 {
@@ -143,4 +146,56 @@ fn val_heights_between_nodes_are_bilinear() {
     let gap = map_of(2, 2, limits(30.0, 30.0), |r, c| if [r, c] == [1, 1] { f64::NAN } else { 3.0 });
     assert_eq!(gap.height_at_m([0.0, 0.5]), Some(3.0), "a missing height without weight does not count");
     assert_eq!(gap.height_at_m([0.5, 0.5]), None);
+}
+
+/// The same between points anywhere, such as positions of a team's members.
+#[test]
+fn prop_free_lines_between_any_points_touch_no_blocked_cell() {
+    let mut random = Random(3);
+    let mut free = 0;
+    for _ in 0..2000 {
+        let map = rough(9, 9, 0.12, 0.0, &mut random);
+        let mut point = || [8.0 * random.unit(), 8.0 * random.unit()];
+        let [start, end] = [point(), point()];
+        let mut blocked = (0..map.len() as Node).filter(|node| map.is_blocked(*node)).map(|node| map.place(node));
+        let expected = !blocked.any(|cell| touches(start, end, cell, 1e-9));
+        assert_eq!(map.is_free_along(start, end), expected, "{start:?} {end:?}");
+        free += usize::from(expected);
+    }
+    assert!((500..1500).contains(&free), "{free}");
+}
+
+#[test]
+fn val_oblong_cells_keep_their_axes_apart() {
+    let [east, north, north_east] = [Direction::ALL[0], Direction::ALL[1], Direction::ALL[4]];
+    let level = oblong_map_of(3, 4, limits(30.0, 30.0), |_, _| 0.0);
+    assert_eq!([east, north, north_east].map(|direction| level.step_m(direction)), [3.0, 4.0, 5.0]);
+    assert_eq!(level.position_m(level.node(0, 0)), [101.5, 210.0]);
+    assert_eq!(level.position_m(level.node(2, 3)), [110.5, 202.0]);
+    assert_eq!(level.point_at([110.5, 202.0]), [2.0, 3.0]);
+    assert_eq!(level.point_at([103.0, 209.0]), [0.25, 0.5]);
+    // A rise of 2 m is 33.7 degrees over 3 m, and 26.6 degrees over 4 m.
+    let eastward = oblong_map_of(3, 3, limits(30.0, 30.0), |_, c| 2.0 * c as f64);
+    let southward = oblong_map_of(3, 3, limits(30.0, 30.0), |r, _| 2.0 * r as f64);
+    assert_eq!([east, east.back(), north].map(|d| eastward.accessible(4, d)), [None, None, Some(1)]);
+    assert_eq!([east, north, north.back()].map(|d| southward.accessible(4, d)), [Some(5), Some(1), Some(7)]);
+}
+
+#[test]
+fn val_the_nearest_node_of_a_point_lies_on_the_map() {
+    let map = drawn(&["....", "....", "...."]);
+    for (point, place) in [([0.49, 0.5], [0, 1]), ([1.5, 2.4], [2, 2]), ([-7.0, 99.0], [0, 3]), ([99.0, -7.0], [2, 0])]
+    {
+        assert_eq!(map.place(map.nearest(point)), place, "{point:?}");
+    }
+}
+
+/// The limits are tangents of the angles, and allowed themselves.
+#[test]
+fn val_slopes_up_to_the_limits_are_allowed() {
+    let limits = limits(30.0, 20.0);
+    assert!((limits.up - 1.0 / 3f64.sqrt()).abs() < 1e-15 && (limits.down - 0.363_970_234_266_202).abs() < 1e-14);
+    assert!(limits.allow(limits.up) && limits.allow(-limits.down) && limits.allow(0.0));
+    assert!(!limits.allow(limits.up * (1.0 + 1e-12)) && !limits.allow(-limits.down * (1.0 + 1e-12)));
+    assert!(!limits.allow(f64::NAN));
 }

@@ -1,17 +1,17 @@
 use super::*;
 use crate::search::dijkstra;
-use crate::testing::{NEIGHBOURHOODS, Random, drawn, ends, limits, map_of, rough};
+use crate::testing::{NEIGHBOURHOODS, Random, drawn, ends, limits, map_of, oblong_map_of, rough, thesis_costs};
 
 fn settings(sensing_radius_m: f64, neighbourhood: Neighbourhood) -> WalkSettings {
     WalkSettings { sensing_radius_m, slope: SlopeCost::THESIS, neighbourhood }
 }
 
 #[test]
-fn prop_walks_arrive_wherever_there_is_a_way_and_cost_no_less_than_with_full_knowledge() {
+fn prop_walks_arrive_if_a_path_exists_and_cost_no_less_than_with_full_knowledge() {
     let mut random = Random(70);
     let (mut arrived, mut detours) = (0, 0);
     for k in 0..80 {
-        // Slopes that may be taken either way, so that no step is a trap.
+        // Slopes that are allowed in both directions, so that no step is a trap.
         let heights: Vec<f64> = (0..20 * 20).map(|_| 0.5 * random.unit()).collect();
         let mut map = map_of(20, 20, limits(30.0, 30.0), |r, c| heights[20 * r + c]);
         (0..400).filter(|_| random.unit() < 0.25).for_each(|node| map.block(node));
@@ -47,7 +47,7 @@ fn val_a_dead_end_is_walked_into_and_left_again() {
 }
 
 #[test]
-fn prop_every_plan_costs_what_a_fresh_search_over_the_known_cells_does() {
+fn prop_every_plan_costs_as_much_as_a_fresh_search_over_the_known_cells() {
     let mut random = Random(71);
     for k in 0..10 {
         let map = rough(18, 18, 0.2, 0.5, &mut random);
@@ -73,7 +73,7 @@ fn prop_every_plan_costs_what_a_fresh_search_over_the_known_cells_does() {
 }
 
 #[test]
-fn val_what_cannot_be_walked_is_refused() {
+fn val_impossible_walks_are_refused() {
     let map = drawn(&[".#.", ".#.", ".#."]);
     let message =
         |radius_m, goal| walk(&map, &settings(radius_m, Neighbourhood::Four), [0, 0], goal).unwrap_err().to_string();
@@ -84,7 +84,7 @@ fn val_what_cannot_be_walked_is_refused() {
 }
 
 #[test]
-fn prop_all_within_the_radius_is_seen_and_nothing_else() {
+fn prop_exactly_the_cells_within_the_radius_are_seen() {
     let mut random = Random(72);
     for radius_m in [1.5, 2.0, 4.7, 11.0, 1e9] {
         let map = rough(19, 23, 0.2, 0.5, &mut random);
@@ -108,4 +108,37 @@ fn prop_all_within_the_radius_is_seen_and_nothing_else() {
             }
         }
     }
+}
+
+/// Within 6 m over cells of 3 m x 4 m: two columns to each side in the same row, one in the adjacent rows.
+#[test]
+fn val_the_radius_over_oblong_cells_is_in_metres() {
+    let map = oblong_map_of(7, 7, limits(30.0, 30.0), |_, _| 0.0);
+    let costs = thesis_costs(&map);
+    let ground = Ground { map: &map, costs: &costs, clearance: None };
+    let known = Known::new(GridNetwork { ground, neighbourhood: Neighbourhood::Eight }, 6.0, map.node(3, 3));
+    let seen: Vec<[usize; 2]> =
+        (0..map.len() as Node).filter(|node| known.seen[*node as usize]).map(|node| map.place(node)).collect();
+    let expected = [[2, 2], [2, 3], [2, 4], [3, 1], [3, 2], [3, 3], [3, 4], [3, 5], [4, 2], [4, 3], [4, 4]];
+    assert_eq!(seen, expected);
+}
+
+/// The least radius that is allowed is the diagonal of a cell, here 5 m.
+#[test]
+fn val_the_least_radius_is_the_diagonal_of_a_cell() {
+    let map = oblong_map_of(3, 5, limits(30.0, 30.0), |_, _| 0.0);
+    let walked = |radius_m| walk(&map, &settings(radius_m, Neighbourhood::Four), [0, 0], [0, 4]);
+    assert_eq!(walked(5.0).unwrap().cost, 12.0);
+    assert!(walked(4.999).unwrap_err().to_string().contains("the diagonal of a cell, 5 m"));
+}
+
+/// Steps to four neighbours unless the settings say otherwise; unknown keys are refused.
+#[test]
+fn val_settings_of_a_walk_keep_their_names_and_default() {
+    let read = |text: &str| serde_json::from_str::<WalkSettings>(text);
+    let text = r#"{"sensing_radius_m":5.0,"slope":{"kind":"linear","up":1.0,"down":1.0}}"#;
+    assert_eq!(read(text).unwrap(), settings(5.0, Neighbourhood::Four));
+    let text = r#"{"sensing_radius_m":5.0,"slope":{"kind":"linear","up":1.0,"down":1.0},"neighbourhood":"eight"}"#;
+    assert_eq!(read(text).unwrap(), settings(5.0, Neighbourhood::Eight));
+    assert!(read(r#"{"sensing_radius_m":5.0,"slope":{"kind":"linear","up":1.0,"down":1.0},"radius":1}"#).is_err());
 }

@@ -32,7 +32,7 @@ fn val_edges_join_consecutive_marks_of_a_line_with_nothing_blocked_between() {
 
 #[test]
 fn val_an_edge_over_a_cliff_goes_only_where_every_step_does() {
-    // Level from end to end, with a step of 0.8 m up and two of 0.4 m down between.
+    // Level from end to end, with one step of 0.8 m up and two of 0.4 m down in between.
     let map = map_of(2, 5, limits(30.0, 60.0), |_, c| [0.0, 0.0, 0.8, 0.4, 0.0][c]);
     let costs = thesis_costs(&map);
     let roadmap = Roadmap::new(ground(&map, &costs), &marks(&map, &[0, 4]), Neighbourhood::Four);
@@ -58,7 +58,7 @@ fn val_with_every_node_marked_the_roadmap_is_the_grid() {
 }
 
 #[test]
-fn val_narrow_ends_make_an_edge_dear() {
+fn val_narrow_ends_make_an_edge_expensive() {
     let map = drawn(&["##.##", ".....", "##.##"]);
     let costs = thesis_costs(&map);
     let cost = |clearance: Option<&Clearance>| {

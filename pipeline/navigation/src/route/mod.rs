@@ -1,9 +1,9 @@
-//! Routes from one cell to another: settings in, paths with their scores out.
+//! Routes from one cell to another: settings in, scored paths out.
 //!
-//! [`plan`] plans one route. A [`Planner`] prepares what does not depend on start and goal, for many routes over the same ground: the
-//! vertices, the roadmap and its landmarks. Every path is scored twice, as found and smoothed, by the one integral of [`crate::line`],
-//! beside the cost that its own search gave it: a search over the roadmap charges for narrow ground only at the ends of its edges, one over
-//! the grid at every cell, and only the integral compares them.
+//! [`plan`] plans one route. A [`Planner`] prepares everything that does not depend on start and goal (vertices, roadmap, landmarks), for many routes
+//! over the same ground. Every path is scored twice, as found and smoothed, by the one integral of [`crate::line`], in addition to the cost from its
+//! own search. Search costs are not comparable: a search over the roadmap charges for narrow ground only at the ends of its edges, one over the grid
+//! at every cell.
 
 mod query;
 mod settings;
@@ -27,13 +27,13 @@ use sastrugi_schemas::ParameterError;
 /// A cell: row and column.
 pub type Cell = [usize; 2];
 
-/// A route that cannot be planned. Messages read after "failed to".
+/// Why a route could not be planned. Messages read after "failed to".
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum RouteError {
     /// A setting out of range.
     #[error("plan a route: {0}")]
     Parameter(#[from] ParameterError),
-    /// An end that is not on the map.
+    /// Start or goal is outside the map.
     #[error(
         "plan a route: the {end} (row {}, column {}) is outside the map; rows are 0 to {}, columns 0 to {}",
         cell[0], cell[1], shape[0] - 1, shape[1] - 1
@@ -46,7 +46,7 @@ pub enum RouteError {
         /// Rows and columns of the map.
         shape: [usize; 2],
     },
-    /// An end that cannot be entered.
+    /// Start or goal is blocked.
     #[error(
         "plan a route: the {end} (row {}, column {}, height {height_m} m) is blocked; choose a cell that has a height and \
          lies outside all obstacles",
@@ -57,7 +57,7 @@ pub enum RouteError {
         end: &'static str,
         /// Row and column.
         cell: Cell,
-        /// Height, m; NaN where there is none.
+        /// Height, m; NaN without data.
         height_m: f64,
     },
     /// Start and goal are the same cell.
@@ -66,7 +66,7 @@ pub enum RouteError {
         /// Row and column.
         cell: Cell,
     },
-    /// Valid ends without a path between them.
+    /// No path exists between valid ends.
     #[error(
         "find a path from row {}, column {} to row {}, column {}: none exists with {} neighbours and slopes of at most \
          {} degrees uphill and {} degrees downhill",
@@ -77,20 +77,20 @@ pub enum RouteError {
         start: Cell,
         /// Row and column.
         goal: Cell,
-        /// Steps that were allowed.
+        /// Allowed steps.
         neighbourhood: Neighbourhood,
-        /// Steepest slopes up and down, degrees.
+        /// Slope limits uphill and downhill, degrees.
         limits_deg: [f64; 2],
     },
-    /// An anytime search that spent its budget before it found a path.
+    /// An anytime search used up its budget before it found a path.
     #[error("find a path within {budget} expansions; raise the budget or the weight")]
     Budget {
         /// The budget.
         budget: u64,
     },
-    /// A found path that the fine integral refuses.
+    /// The search found a path that the line integral refuses.
     #[error(
-        "score a path from row {}, column {} to row {}, column {}: rounding takes a leg beyond the slope limit",
+        "score a path from row {}, column {} to row {}, column {}: rounding puts a leg beyond the slope limit",
         start[0], start[1], goal[0], goal[1]
     )]
     Score {
@@ -104,23 +104,23 @@ pub enum RouteError {
 /// A route and how it was found.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Route {
-    /// Nodes of the path as found: cells in steps, or the ends of straight legs.
+    /// Nodes of the path as found: adjacent cells, or ends of straight legs.
     pub path: Vec<Node>,
-    /// Nodes that are left after smoothing.
+    /// Nodes that remain after smoothing.
     pub smoothed: Vec<Node>,
-    /// Cost by the search, metres of level ground.
+    /// Cost according to the search, metres of level ground.
     pub search_cost: f64,
-    /// The path as found, by the fine integral.
+    /// Score of the path as found, by the line integral.
     pub path_score: Travelled,
-    /// The smoothed path, by the fine integral.
+    /// Score of the smoothed path, by the line integral.
     pub smoothed_score: Travelled,
-    /// Proven bound on search cost over the cheapest path of the same network, 1 for a cheapest one; `None` for lines at any angle.
+    /// Proven upper bound on the search cost relative to the cheapest path of the same network; 1 for an optimal path, `None` for lines at any angle.
     pub cost_ratio_max: Option<f64>,
     /// Vertices of the network.
     pub vertices: usize,
     /// Directed edges of the network.
     pub edges: usize,
-    /// Vertices added to connect what the ground connects.
+    /// Vertices that the repair added.
     pub repaired: usize,
     /// Vertices that the search expanded.
     pub expansions: u64,
@@ -129,7 +129,31 @@ pub struct Route {
 /// Plans one route.
 ///
 /// # Errors
-/// Settings out of range, ends that are outside, blocked or equal, or no path between them.
+/// Settings out of range; ends outside the map, blocked or equal; no path between them.
+///
+/// # Examples
+/// ```
+/// use sastrugi_navigation::{CostModel, Ground, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, plan};
+/// use sastrugi_numeric::{Geometry, Grid};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let heights = Grid::filled(Geometry::square(3, 5, 1.0), 0.0);
+/// let mut map = TravelMap::new(heights, SlopeLimits::new(30.0, 30.0)?)?;
+/// let costs = CostModel::new(SlopeCost::THESIS, None, &map)?;
+/// // By default over a roadmap, along rows and columns; smoothing makes it one straight line.
+/// let route = plan(&Ground { map: &map, costs: &costs, clearance: None }, &RouteSettings::default(), [0, 0], [2, 4])?;
+/// assert_eq!(route.search_cost, 6.0);
+/// assert_eq!(route.smoothed, [map.node(0, 0), map.node(2, 4)]);
+///
+/// for row in 0..3 {
+///     map.block(map.node(row, 2));
+/// }
+/// let ground = Ground { map: &map, costs: &costs, clearance: None };
+/// let refused = plan(&ground, &RouteSettings::default(), [0, 0], [2, 4]);
+/// assert!(matches!(refused, Err(RouteError::NoPath { .. })));
+/// # Ok(())
+/// # }
+/// ```
 pub fn plan(ground: &Ground<'_>, settings: &RouteSettings, start: Cell, goal: Cell) -> Result<Route, RouteError> {
     settings.check()?;
     let ends = check_ends(ground.map, start, goal)?;
@@ -137,7 +161,7 @@ pub fn plan(ground: &Ground<'_>, settings: &RouteSettings, start: Cell, goal: Ce
     planner.route_between(ends)
 }
 
-/// What routes over the same ground share.
+/// Planner for many routes over the same ground.
 #[derive(Clone, Debug)]
 pub struct Planner<'a> {
     ground: Ground<'a>,
@@ -153,10 +177,30 @@ enum Prepared<'a> {
 }
 
 impl<'a> Planner<'a> {
-    /// Prepares for routes over a ground.
+    /// Prepares the network of a ground.
     ///
     /// # Errors
     /// Settings out of range.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_navigation::{CostModel, Ground, Method, Planner, RouteSettings, SlopeCost, SlopeLimits, TravelMap};
+    /// use sastrugi_numeric::{Geometry, Grid};
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let heights = Grid::filled(Geometry::square(3, 5, 1.0), 0.0);
+    /// let map = TravelMap::new(heights, SlopeLimits::new(30.0, 30.0)?)?;
+    /// let costs = CostModel::new(SlopeCost::THESIS, None, &map)?;
+    /// let ground = Ground { map: &map, costs: &costs, clearance: None };
+    /// let planner = Planner::new(ground, RouteSettings { method: Method::GridAstar, ..RouteSettings::default() })?;
+    /// // 15 cells, with 12 steps along rows and 10 along columns, each in both directions.
+    /// assert_eq!(planner.size(), [15, 44]);
+    /// for (start, goal, cost) in [([0, 0], [2, 4], 6.0), ([2, 4], [0, 0], 6.0), ([1, 1], [1, 3], 2.0)] {
+    ///     assert_eq!(planner.route(start, goal)?.search_cost, cost);
+    /// }
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn new(ground: Ground<'a>, settings: RouteSettings) -> Result<Self, RouteError> {
         settings.check()?;
         Ok(Self::prepared(ground, settings, &[]))
@@ -179,11 +223,11 @@ impl<'a> Planner<'a> {
         Self { ground, settings, network, repaired }
     }
 
-    /// Plans a route. Over a roadmap, start and goal are joined to the first vertices along the lines through them; where that gives no path
-    /// and repair is on, the roadmap is made anew with both as vertices, which settles whether there is one.
+    /// Plans a route. On a roadmap, start and goal are linked to the first vertices along the lines through them. If that yields no path and repair
+    /// is on, the roadmap is rebuilt with both as vertices, which decides whether a path exists.
     ///
     /// # Errors
-    /// Ends that are outside, blocked or equal, or no path between them.
+    /// Ends outside the map, blocked or equal; no path between them.
     pub fn route(&self, start: Cell, goal: Cell) -> Result<Route, RouteError> {
         let ends = check_ends(self.ground.map, start, goal)?;
         match self.route_between(ends) {
@@ -225,10 +269,10 @@ impl<'a> Planner<'a> {
         }
     }
 
-    /// The bare search between two free nodes: its path, as nodes, and the proven bound on its cost.
+    /// The search alone, between two free nodes: the path as nodes, and the proven bound on its cost.
     ///
     /// # Errors
-    /// No path, or none within the budget.
+    /// No path, or none found within the budget.
     pub fn search(&self, [start, goal]: [Node; 2]) -> Result<(Found, Option<f64>), RouteError> {
         let exact = |found: Option<Found>| found.map(|found| (found, Some(1.0)));
         let found = match (&self.network, self.settings.method) {
@@ -255,7 +299,7 @@ impl<'a> Planner<'a> {
     }
 }
 
-/// The nodes of start and goal.
+/// Checks start and goal and returns their nodes.
 pub(crate) fn check_ends(map: &TravelMap, start: Cell, goal: Cell) -> Result<[Node; 2], RouteError> {
     let shape = map.shape();
     for (end, cell) in [("start", start), ("goal", goal)] {

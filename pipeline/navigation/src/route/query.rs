@@ -1,4 +1,4 @@
-//! One search over a prepared roadmap: start and goal joined to it on demand.
+//! One search over a prepared roadmap, with start and goal linked to it for this search only.
 
 use crate::cost::Spot;
 use crate::map::Node;
@@ -6,7 +6,7 @@ use crate::roadmap::{Roadmap, Way};
 use crate::search::landmarks::{Landmarks, Target};
 use crate::search::{Found, Network, astar};
 
-/// The roadmap with two more vertices: the start, which no edge leads to, and the goal, which none leaves.
+/// The roadmap with two more vertices: the start, which has no incoming edges, and the goal, which has no outgoing ones.
 pub(super) struct Query<'a> {
     roadmap: &'a Roadmap<'a>,
     landmarks: &'a Landmarks,
@@ -55,7 +55,7 @@ impl Network for Query<'_> {
     fn edges(&self, vertex: u32, mut visit: impl FnMut(u32, f64)) {
         let start = self.roadmap.len() as u32;
         if vertex >= start {
-            // Nothing leaves the goal, at which the search ends.
+            // The goal has no outgoing edges; the search ends there.
             self.first_edges.iter().filter(|_| vertex == start).for_each(|(target, cost)| visit(*target, *cost));
             return;
         }

@@ -6,24 +6,24 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Most landmarks: a table of 1 kB for each vertex.
+/// Largest number of landmarks: 64 take 1 kB per vertex.
 const LANDMARKS_MAX: u32 = 64;
 
-/// How a path is searched.
+/// Search method.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case", deny_unknown_fields)]
 pub enum Method {
-    /// A* over every cell.
+    /// A* over all cells.
     GridAstar,
-    /// A* over the roadmap between the vertices of the ground.
+    /// A* over the roadmap between vertices.
     Roadmap(VertexSettings),
-    /// Lazy Theta* over every cell: legs at any angle.
+    /// Lazy Theta* over all cells, with legs at any angle.
     ThetaStar,
-    /// Anytime weighted A* over every cell.
+    /// Anytime weighted A* over all cells.
     Anytime {
-        /// Weight of the bound, 1 or above.
+        /// First weight of the bound, at least 1.
         weight: f64,
-        /// Expansions that may be spent, at least 1.
+        /// Number of expansions, at least 1.
         budget: u64,
     },
 }
@@ -32,18 +32,18 @@ pub enum Method {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RouteSettings {
-    /// How the path is searched.
+    /// Search method.
     pub method: Method,
-    /// Steps that may be taken.
+    /// Steps that are allowed.
     pub neighbourhood: Neighbourhood,
-    /// Landmarks of a prepared roadmap, at most 64; none by default. A single route makes none.
+    /// Landmarks of a prepared roadmap, at most 64; none by default. Planning a single route uses none.
     pub landmarks: u32,
-    /// Cost that smoothing may add for each waypoint it removes, metres of level ground; 0 or above.
+    /// Cost that smoothing may add for each waypoint that it removes, metres of level ground, at least 0.
     pub smoothing_tolerance: f64,
 }
 
 impl Default for RouteSettings {
-    /// The thesis' roadmap without height-difference threshold.
+    /// The thesis' roadmap without the height-difference threshold.
     fn default() -> Self {
         Self {
             method: Method::Roadmap(VertexSettings::default()),
@@ -58,7 +58,7 @@ impl RouteSettings {
     /// Refuses settings out of range.
     ///
     /// # Errors
-    /// The first one.
+    /// The first value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
         ParameterError::not_negative("smoothing_tolerance", self.smoothing_tolerance)?;
         if self.landmarks > LANDMARKS_MAX {
@@ -68,7 +68,7 @@ impl RouteSettings {
         match self.method {
             Method::Roadmap(vertices) => vertices.check().map_err(|error| error.within("method")),
             Method::Anytime { weight, .. } if !(weight >= 1.0 && weight.is_finite()) => {
-                let message = format!("is {weight}; it must be a finite number, 1 or above");
+                let message = format!("is {weight}; it must be finite and at least 1");
                 Err(ParameterError::new("method.weight", message))
             }
             Method::Anytime { budget: 0, .. } => {

@@ -1,21 +1,20 @@
-//! Anytime weighted A* that repairs its path (ARA*; Likhachev, Gordon and Thrun, 2003).
+//! Anytime repairing A* (ARA*; Likhachev, Gordon and Thrun, 2003).
 //!
-//! Vertices come in the order of cost so far plus `weight` times the bound: a path is found soon. Then the excess of the weight over 1 is
-//! halved, again and again, and only what lies cheaper than the path found is looked at anew, until the budget of expansions is spent or
-//! no path can be cheaper. A vertex is expanded once for each weight: one that becomes cheaper after that is put off until the next, as
-//! otherwise searches under a large weight can expand the same vertices without end. The cost over the smallest sum of cost so far and
-//! plain bound among the vertices left is a proven bound on cost over optimum. Budgets count expansions, never time: the same call finds
-//! the same path.
+//! Vertices are ordered by cost so far plus `weight` times the bound, so that a path is found early. Then the excess of the weight over 1 is halved
+//! repeatedly, and only vertices that could improve the path found are searched again, until the budget of expansions is spent or no path can be
+//! cheaper. A vertex is expanded once per weight; if it becomes cheaper after that, it is deferred to the next weight, because under a large weight
+//! the same vertices could otherwise be expanded endlessly. The cost divided by the smallest sum of cost so far and plain bound among the remaining
+//! vertices is a proven bound on cost over optimum. Budgets count expansions, never time, so the same call finds the same path.
 
 use super::{Found, NONE, Network, Open, Queue, cost_along, path_to};
 
-/// Excess of the weight over 1 below which the weight is 1.
+/// Excess of the weight over 1 below which the weight becomes 1.
 const EXCESS_MIN: f64 = 0.01;
 
-/// How the search ended.
+/// Result of the search.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
-    /// The best path found, and a bound on its cost over the optimum, at least 1.
+    /// The best path found, and a proven bound on its cost over the optimum, at least 1.
     Found(Found, f64),
     /// There is no path.
     NoPath,
@@ -23,7 +22,7 @@ pub enum Outcome {
     Spent,
 }
 
-/// The best path that `budget` expansions find, with a first weight of 1 or above.
+/// Finds the best path within `budget` expansions, with a first weight of at least 1.
 pub fn search(network: &impl Network, start: u32, goal: u32, weight: f64, budget: u64) -> Outcome {
     let mut search = Search::new(network, start, goal);
     let mut weight = weight;
@@ -43,8 +42,8 @@ struct Search<'a, N> {
     rounds: Vec<u32>,
     round: u32,
     open: Queue,
-    /// Vertices that became cheaper after they were expanded in this round.
-    put_off: Vec<u32>,
+    /// Vertices that became cheaper after their expansion in this round.
+    deferred: Vec<u32>,
     expansions: u64,
 }
 
@@ -58,7 +57,7 @@ impl<'a, N: Network> Search<'a, N> {
             rounds: vec![0; network.len()],
             round: 1,
             open: Queue::default(),
-            put_off: Vec::new(),
+            deferred: Vec::new(),
             expansions: 0,
         };
         search.costs[start as usize] = 0.0;
@@ -66,7 +65,7 @@ impl<'a, N: Network> Search<'a, N> {
         search
     }
 
-    /// Expands until no vertex left promises a path within `weight` of the one found; false where the budget is spent before.
+    /// Expands until no remaining vertex promises a path within `weight` of the one found; false if the budget is spent first.
     fn spend(&mut self, weight: f64, budget: u64) -> bool {
         while let Some(next) = self.open.pop() {
             if next.sum() >= self.costs[self.goal as usize] {
@@ -97,7 +96,7 @@ impl<'a, N: Network> Search<'a, N> {
             self.costs[target as usize] = through;
             self.parents[target as usize] = next.vertex();
             match self.rounds[target as usize] == self.round {
-                true => self.put_off.push(target),
+                true => self.deferred.push(target),
                 false => {
                     self.open.push(Open::new(
                         through + weight * self.network.bound(target, self.goal),
@@ -109,25 +108,25 @@ impl<'a, N: Network> Search<'a, N> {
         });
     }
 
-    /// Cost so far plus plain bound of a vertex that may lead to a cheaper path than the one found.
-    fn hope(&self, vertex: u32) -> Option<f64> {
+    /// Cost so far plus plain bound of a vertex, if it may lead to a cheaper path than the one found.
+    fn promise(&self, vertex: u32) -> Option<f64> {
         let sum = self.costs[vertex as usize] + self.network.bound(vertex, self.goal);
         Some(sum).filter(|sum| *sum < self.costs[self.goal as usize])
     }
 
-    /// Vertices left that may lead to a cheaper path.
+    /// Remaining vertices that may lead to a cheaper path.
     fn left(&self) -> impl Iterator<Item = u32> {
         let is_new = |open: &&Open| open.so_far() <= self.costs[open.vertex() as usize];
         let open = self.open.iter().filter(is_new).map(Open::vertex);
         let open = open.filter(|vertex| self.rounds[*vertex as usize] != self.round);
-        open.chain(self.put_off.iter().copied()).filter(|vertex| self.hope(*vertex).is_some())
+        open.chain(self.deferred.iter().copied()).filter(|vertex| self.promise(*vertex).is_some())
     }
 
     fn least_left(&self) -> Option<f64> {
-        self.left().filter_map(|vertex| self.hope(vertex)).reduce(f64::min)
+        self.left().filter_map(|vertex| self.promise(vertex)).reduce(f64::min)
     }
 
-    /// Orders what is left by another weight.
+    /// Reorders the remaining vertices by another weight.
     fn begin_round(&mut self, weight: f64) {
         let left: Vec<u32> = self.left().collect();
         self.open = Queue::default();
@@ -135,7 +134,7 @@ impl<'a, N: Network> Search<'a, N> {
             let so_far = self.costs[vertex as usize];
             self.open.push(Open::new(so_far + weight * self.network.bound(vertex, self.goal), so_far, vertex));
         }
-        self.put_off.clear();
+        self.deferred.clear();
         self.round += 1;
     }
 
@@ -145,7 +144,7 @@ impl<'a, N: Network> Search<'a, N> {
             return left.map_or(Outcome::NoPath, |_| Outcome::Spent);
         }
         let path = path_to(self.goal, &self.parents);
-        // Below the cost of the goal where a vertex on the path has become cheaper since.
+        // Less than the recorded cost of the goal if a vertex on the path has become cheaper since.
         let cost = cost_along(self.network, &path);
         let ratio = left.map_or(1.0, |sum| (cost / sum).max(1.0));
         Outcome::Found(Found { path, cost, expansions: self.expansions }, ratio)

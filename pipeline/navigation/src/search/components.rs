@@ -2,8 +2,8 @@
 
 use super::NONE;
 
-/// The component of each vertex, numbered from 0. `successor(v, k)` is the k-th of at most `degree(v)` successors of v, or `None` where that
-/// edge is not there.
+/// The component of each vertex, numbered from 0. `successor(v, k)` is the k-th of at most `degree(v)` successors of v, or `None` if that edge is
+/// missing.
 pub fn components(count: u32, degree: impl Fn(u32) -> u32, successor: impl Fn(u32, u32) -> Option<u32>) -> Vec<u32> {
     let mut component = vec![NONE; count as usize];
     let mut order = vec![NONE; count as usize];

@@ -2,12 +2,12 @@
 
 use super::{Network, Open, Queue, Reversible};
 
-/// Costs from a vertex to each one; infinite where there is no path.
+/// Costs from one vertex to every vertex; infinite if there is no path.
 pub fn costs_from(network: &impl Network, start: u32) -> Vec<f64> {
     settle(network.len(), start, |vertex, visit| network.edges(vertex, visit))
 }
 
-/// Costs from each vertex to one; infinite where there is no path.
+/// Costs from every vertex to one vertex; infinite if there is no path.
 pub fn costs_to(network: &impl Reversible, goal: u32) -> Vec<f64> {
     settle(network.len(), goal, |vertex, visit| network.edges_into(vertex, visit))
 }

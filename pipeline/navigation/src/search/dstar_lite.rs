@@ -1,34 +1,34 @@
-//! D* Lite (Koenig and Likhachev, 2002): after an edit of the ground only what the edit changes is searched again.
+//! D* Lite (Koenig and Likhachev, 2002): after an edit of the ground, only what the edit affects is searched again.
 //!
-//! The search runs from the goal back to the start. The look-ahead value of a vertex is always the minimum over its edges, computed
-//! afresh and never patched by comparing `cost + old value`: floating-point comparisons of that kind are known to loop between two
-//! vertices or to miss a path. Values therefore have the bits of a fresh search, and so has the path, which is read off the values by
-//! one rule: the edge with the smallest sum, then the smallest number. Bounds are shortened by a little more than rounding, so that
-//! every vertex on a cheapest path comes before the start.
+//! The search runs from the goal back to the start. The look-ahead value of a vertex is always the minimum over its edges, recomputed and never
+//! patched by comparing `cost + old value`: floating-point comparisons of that kind are known to loop between two vertices or to miss a path. Values
+//! therefore have the same bits as those of a fresh search. So has the path, which follows from the values by one rule: the edge with the smallest
+//! sum, then with the smallest target. Bounds are shortened by slightly more than rounding, so that every vertex on a cheapest path comes before the
+//! start.
 
 use super::{Found, Reversible};
 use std::cmp::Reverse;
 use std::collections::BinaryHeap;
 
-/// What bounds are shortened by, as a share: rounding of sums along a path stays far below.
+/// Share by which bounds are shortened; the rounding of sums along a path is far smaller.
 const SHORTENED: f64 = 1e-7;
 
-/// Bits of the sum with the bound, and of the value itself.
+/// Bits of value plus bound, and of the value itself.
 type Key = [u64; 2];
 
 /// Key of a vertex that is not in the queue.
 const OUTSIDE: Key = [u64::MAX; 2];
 
-/// Values of a search that follows the edits of a network. The network is passed to every call, as it changes in between.
+/// State of a search that follows edits of a network. The network is passed to every call, because it changes between calls.
 #[derive(Clone, Debug)]
 pub struct DStarLite {
     start: u32,
     goal: u32,
-    /// Sum of the bounds between successive starts: what keys have grown by.
+    /// Sum of the bounds between successive starts, by which keys have grown.
     grown: f64,
-    /// Cost to the goal as far as it is known.
+    /// Known cost to the goal.
     values: Vec<f64>,
-    /// The same looked up one edge ahead.
+    /// The same, computed one edge ahead.
     ahead: Vec<f64>,
     keys: Vec<Key>,
     queue: BinaryHeap<Reverse<(Key, u32)>>,
@@ -36,7 +36,7 @@ pub struct DStarLite {
 }
 
 impl DStarLite {
-    /// A search from `start` to `goal`; nothing is expanded yet.
+    /// A search from `start` to `goal`, with nothing expanded yet.
     pub fn new(network: &impl Reversible, start: u32, goal: u32) -> Self {
         let unknown = || vec![f64::INFINITY; network.len()];
         let mut search = Self {
@@ -59,24 +59,23 @@ impl DStarLite {
         self.expansions
     }
 
-    /// Cost from a vertex to the goal as far as it is known; that of a vertex on the path found is final.
+    /// Known cost from a vertex to the goal; final for vertices on the path found.
     pub fn value(&self, vertex: u32) -> f64 {
         self.values[vertex as usize]
     }
 
-    /// Goes on to another start.
+    /// Moves the start.
     pub fn move_to(&mut self, network: &impl Reversible, start: u32) {
         self.grown += network.bound(self.start, start) * (1.0 - SHORTENED);
         self.start = start;
     }
 
-    /// Takes note of vertices whose outgoing edges have changed; on a map those are all nodes around each edited one
-    /// ([`crate::map::TravelMap::around`]).
+    /// Registers vertices whose outgoing edges have changed; on a map these are all nodes around each edited one ([`crate::map::TravelMap::around`]).
     pub fn changed(&mut self, network: &impl Reversible, vertices: impl IntoIterator<Item = u32>) {
         vertices.into_iter().for_each(|vertex| self.look_ahead(network, vertex));
     }
 
-    /// Searches as far as needed; the cheapest path, or `None` where there is none. Expansions are those of this call.
+    /// Searches as far as necessary; returns the cheapest path, or `None` if there is none. Expansions are those of this call.
     pub fn search(&mut self, network: &impl Reversible) -> Option<Found> {
         let before = self.expansions;
         while let Some((key, vertex)) = self.first() {
@@ -114,7 +113,7 @@ impl DStarLite {
         });
     }
 
-    /// The minimum over the edges of a vertex.
+    /// Recomputes the minimum over the edges of a vertex.
     fn look_ahead(&mut self, network: &impl Reversible, vertex: u32) {
         if vertex != self.goal {
             let mut least = f64::INFINITY;
@@ -130,7 +129,7 @@ impl DStarLite {
         [value + bound + self.grown, value].map(f64::to_bits)
     }
 
-    /// Puts a vertex in its place in the queue, or takes it out where both values agree.
+    /// Inserts or updates a vertex in the queue, or removes it if both values agree.
     fn place(&mut self, network: &impl Reversible, vertex: u32) {
         let v = vertex as usize;
         let key = if self.values[v] == self.ahead[v] { OUTSIDE } else { self.key(network, vertex) };
@@ -140,7 +139,7 @@ impl DStarLite {
         self.keys[v] = key;
     }
 
-    /// First of the queue; entries that a later one has replaced are dropped.
+    /// First of the queue, after dropping outdated entries.
     fn first(&mut self) -> Option<(Key, u32)> {
         while let Some(&Reverse((key, vertex))) = self.queue.peek() {
             if self.keys[vertex as usize] == key {

@@ -1,18 +1,18 @@
-//! A graph as arrays: the edges of each vertex side by side.
+//! A graph in arrays, with the edges of each vertex contiguous (CSR).
 
 use super::Network;
 
 /// Directed graph with costs.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Graph {
-    /// First edge of each vertex, and the end of the last one's.
+    /// Index of the first edge of each vertex, and the total number of edges.
     offsets: Vec<u32>,
     targets: Vec<u32>,
     costs: Vec<f64>,
 }
 
 impl Graph {
-    /// A graph from the targets and costs of the edges of each vertex in turn.
+    /// Builds a graph from the targets and costs of the edges of each vertex in turn.
     pub fn new(count: u32, mut edges: impl FnMut(u32, &mut dyn FnMut(u32, f64))) -> Self {
         let mut graph = Self { offsets: vec![0], ..Self::default() };
         for vertex in 0..count {
@@ -30,7 +30,7 @@ impl Graph {
         self.targets.len()
     }
 
-    /// The graph with every edge turned round; edges of a vertex in the order of their sources.
+    /// The graph with every edge reversed; the edges of a vertex are in the order of their sources.
     pub fn reversed(&self) -> Self {
         let mut offsets = vec![0; self.offsets.len()];
         self.targets.iter().for_each(|target| offsets[*target as usize + 1] += 1);

@@ -1,4 +1,4 @@
-//! Every cell of a map as a network.
+//! All cells of a map as a network.
 
 use super::{Network, Reversible};
 use crate::line::Ground;
@@ -9,7 +9,7 @@ use crate::map::{Direction, Neighbourhood, Node};
 pub struct GridNetwork<'a> {
     /// Ground and costs.
     pub ground: Ground<'a>,
-    /// Steps that may be taken.
+    /// Allowed steps.
     pub neighbourhood: Neighbourhood,
 }
 
@@ -21,7 +21,7 @@ impl GridNetwork<'_> {
         costs.step(map, node, target, direction) * (room(node) * room(target))
     }
 
-    /// Directed steps that may be taken.
+    /// Number of allowed directed steps.
     pub fn edge_count(&self) -> usize {
         let map = self.ground.map;
         let steps = |node| (0..self.neighbourhood.directions().len()).filter(|k| map.may_step(node, *k)).count();

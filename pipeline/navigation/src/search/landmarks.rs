@@ -1,12 +1,12 @@
 //! Landmarks: tighter bounds for many searches on one network (ALT; Goldberg and Harrelson, 2005).
 //!
-//! From the costs to and from a few far-off vertices the triangle inequality gives a bound between any two. Costs are directional, so that
-//! both tables are needed. A cost that falls invalidates them: after an edit they have to be made again.
+//! The costs to and from a few distant vertices give a bound between any two vertices by the triangle inequality. Costs are directional, so both
+//! tables are needed. A lowered cost invalidates them; rebuild them after an edit.
 
 use super::graph::Graph;
 use super::{Network, dijkstra};
 
-/// Costs from and to landmarks.
+/// Costs from and to the landmarks.
 #[derive(Clone, Debug)]
 pub struct Landmarks {
     count: usize,
@@ -14,15 +14,15 @@ pub struct Landmarks {
     costs: Vec<[f64; 2]>,
 }
 
-/// What is known of the goal of one search.
+/// Landmark costs of the goal of one search.
 #[derive(Clone, Debug)]
 pub struct Target {
-    /// For each landmark, the least cost from it to the goal, and the greatest from a last vertex to it less the last edge.
+    /// For each landmark, the least cost from it to the goal, and the greatest cost to it from a last vertex, less the last edge.
     costs: Vec<[f64; 2]>,
 }
 
 impl Landmarks {
-    /// `count` landmarks, the first far from vertex 0, each other one as far as possible, there and back, from the nearest before it.
+    /// Selects `count` landmarks: the first far from vertex 0, each other one as far as possible, there and back, from the nearest selected before.
     pub fn new(graph: &Graph, count: usize) -> Self {
         let reversed = graph.reversed();
         let mut costs = vec![[f64::INFINITY; 2]; graph.len() * count];
@@ -54,7 +54,7 @@ impl Landmarks {
         &self.costs[first..first + self.count]
     }
 
-    /// A goal that is reached over last edges: the vertices that they come from, and their costs.
+    /// A goal that is reached over last edges, given by their source vertices and costs.
     pub fn target(&self, last_edges: &[(u32, f64)]) -> Target {
         let mut costs = vec![[f64::INFINITY, f64::NEG_INFINITY]; self.count];
         for &(vertex, cost) in last_edges {
@@ -67,13 +67,13 @@ impl Landmarks {
 
     /// A lower bound on the cost from a vertex to a goal, 0 or above.
     pub fn bound(&self, vertex: u32, target: &Target) -> f64 {
-        // A landmark that cannot reach the vertex, or that the goal cannot reach, says nothing: `max` drops NaN and -inf.
+        // A landmark that cannot reach the vertex, or that the goal cannot reach, gives no bound: `max` drops NaN and -inf.
         let bounds = self.of(vertex).iter().zip(&target.costs);
         bounds.fold(0.0, |least, (here, there)| least.max(there[0] - here[0]).max(here[1] - there[1]))
     }
 }
 
-/// The first vertex at the greatest finite distance.
+/// The first vertex with the greatest finite distance.
 fn farthest(distances: &[f64]) -> Option<u32> {
     let finite = (0u32..).zip(distances).filter(|(_, distance)| distance.is_finite());
     finite

@@ -1,9 +1,9 @@
-//! The vertices still to be looked at, as a heap of four children a node: half as deep as a binary one, and children share a cache line.
+//! Priority queue of open vertices, as a heap with four children per node: half as deep as a binary one, and siblings share a cache line.
 
-/// A vertex to look at.
+/// An open vertex.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(crate) struct Open {
-    /// Bits of the sum and of the cost so far: floats of 0 or above are in the order of their bits.
+    /// Bits of the sum and of the cost so far; for floats of 0 or above, the order of the bits is the order of the values.
     pub(super) sum: u64,
     pub(super) so_far: u64,
     pub(super) vertex: u32,
@@ -18,7 +18,7 @@ impl Open {
         self.vertex
     }
 
-    /// What the vertices are ordered by.
+    /// Sort key: cost so far plus bound.
     pub(crate) fn sum(&self) -> f64 {
         f64::from_bits(self.sum)
     }
@@ -28,7 +28,7 @@ impl Open {
         f64::from_bits(self.so_far)
     }
 
-    /// The smaller sum first, then the one farther along, then the smaller number.
+    /// Smaller sum first, then larger cost so far, then smaller number.
     fn is_before(&self, other: &Self) -> bool {
         if self.sum != other.sum {
             return self.sum < other.sum;
@@ -47,7 +47,7 @@ pub(crate) struct Queue {
 }
 
 impl Queue {
-    /// In no particular order.
+    /// All open vertices, in no particular order.
     pub(crate) fn iter(&self) -> impl Iterator<Item = &Open> {
         self.heap.iter()
     }
@@ -75,7 +75,7 @@ impl Queue {
         Some(first)
     }
 
-    /// Puts a vertex in place of the first one, and down to where it belongs.
+    /// Replaces the root and sifts the vertex down.
     fn sink(&mut self, open: Open) {
         let mut at = 0;
         loop {

@@ -43,7 +43,7 @@ fn check(network: &impl Network, [start, goal]: [u32; 2]) -> bool {
     true
 }
 
-/// Whether no bound exceeds the true cost to the goal, and none falls along an edge by more than the edge costs.
+/// Whether no bound exceeds the true cost to the goal, and none decreases along an edge by more than the edge costs.
 fn bounds_hold(network: &impl Reversible, goal: u32) -> bool {
     let costs = dijkstra::costs_to(network, goal);
     (0..network.len() as u32).all(|vertex| {
@@ -52,13 +52,13 @@ fn bounds_hold(network: &impl Reversible, goal: u32) -> bool {
         network.edges(vertex, |target, cost| {
             consistent &= bound <= (cost + network.bound(target, goal)) * (1.0 + 1e-12);
         });
-        // Blocked nodes without height have no bound, and no cost either.
+        // Blocked nodes without height have neither a bound nor a cost.
         bound.is_nan() || consistent && bound <= costs[vertex as usize] * (1.0 + 1e-12)
     })
 }
 
 #[test]
-fn val_astar_costs_what_dijkstra_does_on_200_maps_and_their_roadmaps() {
+fn val_astar_costs_equal_those_of_dijkstra_on_200_maps_and_their_roadmaps() {
     let mut random = Random(10);
     let mut found = 0;
     for k in 0..200 {
@@ -85,7 +85,7 @@ fn val_astar_costs_what_dijkstra_does_on_200_maps_and_their_roadmaps() {
 }
 
 #[test]
-fn val_astar_costs_what_the_pathfinding_crate_finds() {
+fn val_astar_costs_equal_those_of_the_pathfinding_crate() {
     let map = hills(60, 3000.0, 6, 11);
     let costs = thesis_costs(&map);
     let mut random = Random(12);
@@ -93,7 +93,7 @@ fn val_astar_costs_what_the_pathfinding_crate_finds() {
         let grid = GridNetwork { ground: ground(&map, &costs), neighbourhood };
         for _ in 0..20 {
             let [start, goal] = ends(&map, &mut random).unwrap();
-            // Its costs must be ordered: whole billionths.
+            // Its costs must implement Ord, so use integers in billionths.
             let successors = |vertex: &u32| {
                 let mut next = Vec::new();
                 grid.edges(*vertex, |target, cost| next.push((target, (cost * 1e9).round() as u64)));
@@ -148,13 +148,13 @@ fn val_ties_go_to_the_vertex_farther_along_and_then_to_the_smaller_number() {
     let costs = thesis_costs(&map);
     let grid = GridNetwork { ground: ground(&map, &costs), neighbourhood: Neighbourhood::Four };
     let found = astar::search(&grid, 12, 3).unwrap();
-    // Straight to one side, never across: 6 expansions for 6 steps.
+    // Straight along two sides, never through the middle: 6 expansions for 6 steps.
     assert_eq!(found.expansions, 6);
     assert_eq!(found.path, [12, 8, 4, 0, 1, 2, 3]);
 }
 
 #[test]
-fn val_the_way_there_costs_what_the_way_back_does_with_the_weights_exchanged() {
+fn val_the_way_back_costs_the_same_with_the_weights_exchanged() {
     let map = map_of(50, 50, limits(30.0, 30.0), |r, c| 0.25 * ((r + 2 * c) % 3) as f64);
     let model = |up, down| CostModel::new(SlopeCost::Linear { up, down }, None, &map).unwrap();
     let (there, back) = (model(2.0, 0.5), model(0.5, 2.0));
@@ -169,8 +169,8 @@ fn val_the_way_there_costs_what_the_way_back_does_with_the_weights_exchanged() {
 }
 
 #[test]
-fn val_a_tilted_plane_costs_what_its_zigzags_do() {
-    // Cost of a metre up-slope of zigzags along the diagonals: l (1 + s), s = tan(a) / sqrt(2), l = sqrt(2 + tan(a)^2).
+fn val_a_tilted_plane_costs_as_much_as_its_zigzags() {
+    // Cost per metre up-slope of zigzags along the diagonals: l (1 + s), s = tan(a) / sqrt(2), l = sqrt(2 + tan(a)^2).
     const ROWS: usize = 61;
     for (deg, expected) in [(31.0f64, 2.1894), (35.0, 2.3594), (39.0, 2.5628)] {
         let map = plane(ROWS, 9, libm::tan(deg.to_radians()), 30.0);
@@ -199,7 +199,7 @@ fn val_on_a_tilted_plane_the_neighbourhood_decides_what_can_be_reached() {
 }
 
 #[test]
-fn val_a_reversed_graph_has_the_same_edges_turned_round() {
+fn val_a_reversed_graph_has_the_same_edges_reversed() {
     let map = rough(9, 9, 0.1, 0.5, &mut Random(14));
     let costs = thesis_costs(&map);
     let grid = GridNetwork { ground: ground(&map, &costs), neighbourhood: Neighbourhood::Eight };
@@ -225,7 +225,7 @@ fn val_a_reversed_graph_has_the_same_edges_turned_round() {
 }
 
 #[test]
-fn prop_the_queue_gives_what_a_sorted_list_does() {
+fn prop_the_queue_agrees_with_a_sorted_list() {
     let mut random = Random(15);
     for _ in 0..200 {
         let mut draw = || Open::new(random.below(5) as f64, random.below(4) as f64, random.below(6) as u32);

@@ -1,22 +1,22 @@
-//! Lazy Theta* (Nash, Koenig and Tovey, 2010): paths over every cell whose legs run at any angle.
+//! Lazy Theta* (Nash, Koenig and Tovey, 2010): paths over all cells with legs at any angle.
 //!
-//! A vertex that is met gets the parent of the one it was met from, at the least that a line from there can cost. Only when it comes first
-//! is it settled: by the cheapest of the lines from the expanded nodes around it, from their parents, and from the parents of these. (The
-//! original trusts the triangle inequality and takes the line from the parent whenever there is one. Where costs depend on slope the way
-//! over the neighbour can be cheaper; and where lines keep clear of corners the grandparents halve the excess.) Lines and their costs are
-//! those of [`crate::line`].
+//! A vertex takes the parent of the vertex that it was reached from, with a lower bound on the cost of the line from there. Only when it comes first
+//! in the queue is it settled, by the cheapest of the lines from the expanded nodes around it, from their parents, and from the parents of these.
+//! (The original trusts the triangle inequality and takes the line from the parent whenever it is passable. If costs depend on slope, the path via
+//! the neighbour can be cheaper; and if lines keep clear of corners, the grandparents halve the excess.) Lines and their costs are those of
+//! [`crate::line`].
 //!
-//! Every vertex costs several line integrals: meant for maps of up to some hundred cells to a side. The cost found is never below the
-//! any-angle optimum; on maps of 18 x 18 cells, 15 % of them blocked at random, half of all paths meet it and 99 % are within 6 %.
+//! Every vertex costs several line integrals, so use this for maps of up to a few hundred cells per side. The cost found is never below the any-angle
+//! optimum; on maps of 18 x 18 cells, 15 % of them blocked at random, half of all paths attain it and 99 % are within 6 %.
 
 use super::grid::GridNetwork;
 use super::{Found, NONE, Network, Open, Queue, path_to};
 use crate::map::Node;
 
-/// An expanded node, its parent, and the parent of that one.
+/// An expanded node, its parent, and its grandparent.
 const ANCESTORS: usize = 3;
 
-/// A path of straight lines; `None` where there is no path.
+/// A path of straight lines; `None` if there is no path.
 pub fn search(grid: &GridNetwork<'_>, start: Node, goal: Node) -> Option<Found> {
     let mut search = Search::new(grid, start, goal);
     let mut expansions = 0;
@@ -79,17 +79,17 @@ impl<'a> Search<'a> {
         self.open.push(Open::new(cost + self.least(node, self.goal), cost, node));
     }
 
-    /// The least that a line between two nodes can cost.
+    /// Lower bound on the cost of a line between two nodes.
     fn least(&self, from: Node, to: Node) -> f64 {
         self.grid.ground.costs.straight(self.grid.ground.map, from, to)
     }
 
-    /// Cost of the line from an expanded node to another; infinite where it may not be travelled.
+    /// Cost via the line from an expanded node to another; infinite if the line is not passable.
     fn by_line(&self, from: Node, to: Node) -> f64 {
         self.grid.ground.line(from, to).map_or(f64::INFINITY, |line| self.costs[from as usize] + line.cost)
     }
 
-    /// Gives a node the cheapest line from the expanded nodes around it, their parents, or the parents of these.
+    /// Settles a node by the cheapest line from the expanded nodes around it, their parents, or their grandparents.
     fn settle(&mut self, node: Node) {
         let parent = |node: &Node| Some(self.parents[*node as usize]).filter(|parent| *parent != NONE);
         let around = self.grid.ground.map.around(node).filter(|n| self.states[*n as usize] == State::Closed);
@@ -115,13 +115,13 @@ impl<'a> Search<'a> {
         });
         for &target in &targets[..count] {
             for source in parent.into_iter().chain([node]) {
-                self.offer(source, target);
+                self.relax(source, target);
             }
         }
     }
 
-    /// Offers a node the line from an expanded one.
-    fn offer(&mut self, source: Node, target: Node) {
+    /// Relaxes a node by the line from an expanded one.
+    fn relax(&mut self, source: Node, target: Node) {
         let state = self.states[target as usize];
         let least = self.costs[source as usize] + self.least(source, target);
         if state == State::Closed || least >= self.costs[target as usize] {

@@ -28,7 +28,7 @@ fn val_on_level_free_ground_the_smoothed_path_is_the_straight_line() {
 }
 
 #[test]
-fn prop_smoothing_raises_no_cost_and_every_leg_may_be_travelled() {
+fn prop_smoothing_raises_no_cost_and_every_leg_is_passable() {
     let mut random = Random(41);
     let mut smoothed_some = 0;
     for k in 0..60 {
@@ -54,8 +54,8 @@ fn prop_smoothing_raises_no_cost_and_every_leg_may_be_travelled() {
 }
 
 #[test]
-fn val_collinear_waypoints_go_in_spite_of_rounding() {
-    // 0.1 m a cell: sums of steps differ from the line by some units in the last place.
+fn val_collinear_waypoints_are_removed_despite_rounding() {
+    // 0.1 m per cell: sums of steps differ from the line by a few units in the last place.
     let heights = sastrugi_numeric::Grid::filled(sastrugi_numeric::Geometry::square(2, 200, 0.1), 7.3);
     let map = TravelMap::new(heights, crate::testing::limits(30.0, 30.0)).unwrap();
     let costs = thesis_costs(&map);
@@ -64,7 +64,7 @@ fn val_collinear_waypoints_go_in_spite_of_rounding() {
 }
 
 #[test]
-fn val_a_path_that_may_not_be_travelled_is_not_smoothed() {
+fn val_an_impassable_path_is_not_smoothed() {
     let map = drawn(&[".#.", "..."]);
     let costs = thesis_costs(&map);
     assert_eq!(smoothed(&ground(&map, &costs), &[0, 2], 0.0), None);

@@ -1,12 +1,12 @@
-//! Points that join lone ones (the thesis, Algorithm 3).
+//! Points that join isolated ones (the thesis, Algorithm 3).
 //!
-//! Rows are looked at from north to south. A row with a single mark has no line along it; the node above that mark in the last such
-//! row is marked, so that a column joins the two rows. Then the same for columns, from west to east, with the new marks. (The listing
-//! remembers a lone row only if it already remembers one, so it never marks anything.)
+//! Rows are scanned from north to south. A row with a single mark has no edge along it; the node above that mark in the previous such row is marked,
+//! so that a column joins the two rows. Then columns are scanned in the same way from west to east, including the new marks. (The listing remembers
+//! an isolated row only if it already remembers one, so it never marks anything.)
 
 use crate::map::{Node, TravelMap};
 
-/// Marks points that join lone ones; blocked nodes stay unmarked.
+/// Marks points that join isolated ones; blocked nodes stay unmarked.
 pub fn mark(map: &TravelMap, marks: &mut [bool]) {
     let [rows, cols] = map.shape();
     join(map, marks, rows, cols, |line, at| line * cols + at);

@@ -1,7 +1,7 @@
 //! Critical points (the thesis, Algorithm 1): nodes above or below all four neighbours, and saddles.
 //!
-//! A saddle lies above two opposite neighbours and below the other two. All comparisons are strict: a plateau has no critical points. Nodes
-//! at the border, or beside a node without height, lack neighbours and are never critical.
+//! A saddle lies above two opposite neighbours and below the other two. All comparisons are strict, so a plateau has no critical points. Nodes at the
+//! border, or next to a node without height, lack neighbours and are never critical.
 
 use crate::map::{Direction, Node, TravelMap};
 

@@ -1,20 +1,20 @@
-//! Critical points that are easily stepped over are dropped (the thesis, section 3.1).
+//! Filter that drops critical points which are easily stepped over (the thesis, section 3.1).
 //!
-//! A point is dropped if the nearest marked points along both axes, as far as there are any, differ from it by no more than the step in
-//! height. (The printed formula says "more than", the opposite of the prose around it.) All points are looked at before any is dropped, so that
-//! their order does not matter; a point that sees no other stays.
+//! A point is dropped if it has marked neighbours along its row or column and the nearest ones differ from it in height by no more than the step.
+//! (The printed formula says "more than", the opposite of the surrounding text.) All points are examined before any is dropped, so their order does
+//! not matter; a point without marked neighbours stays.
 
 use crate::map::TravelMap;
 
-/// What a point has seen along its row and column.
+/// Marked neighbours found along the row and column of a point.
 #[derive(Clone, Copy, Default)]
 struct Seen {
     any: bool,
-    /// One of them keeps it: it differs by more than the step, or by no more where the formula is taken as printed.
+    /// One of them keeps the point: it differs by more than the step or, with the formula as printed, by no more.
     apart: bool,
 }
 
-/// Drops marks; `literal`: those that the printed formula drops.
+/// Drops marks; `literal` applies the printed formula.
 pub fn filter(map: &TravelMap, marks: &mut [bool], step_m: f64, literal: bool) {
     let [rows, cols] = map.shape();
     let heights = &map.heights().values;

@@ -1,8 +1,8 @@
-//! Vertices: the nodes where the ground changes, so that few of them carry the routes (the thesis, section 3).
+//! Vertices: the nodes where the ground changes, so that few nodes suffice for routes (the thesis, section 3).
 //!
-//! In order: [`critical`] points that the [`filter`] leaves, [`singular`] points beside steps that may not be taken, the rims of what is
-//! blocked, start and goal, [`alone`] points that join lone ones, and points wherever the ground has changed by a [`threshold`]. The
-//! thesis claims that a path is found whenever there is one; joining lone points does not give that, [`repair`] does.
+//! In order: [`critical`] points that pass the [`filter`], [`singular`] points next to steps that are not allowed, rims of blocked cells, start and
+//! goal, points that join isolated ones ([`alone`]), and points wherever the height has changed by a [`threshold`]. The thesis claims that a path is
+//! found whenever one exists; joining isolated points does not guarantee that, [`repair`] does.
 
 pub mod alone;
 pub mod critical;
@@ -19,27 +19,27 @@ use serde::{Deserialize, Serialize};
 #[cfg(test)]
 mod tests;
 
-/// Which nodes become vertices.
+/// Selection of vertices.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct VertexSettings {
-    /// Critical points that differ from the next ones by no more than this are dropped, m; 0 or above.
+    /// Critical points that differ in height from the adjacent ones by no more than this are dropped, m; at least 0.
     pub step_over_m: f64,
-    /// Change of height after which a line gets another vertex, m, above 0; without one there are none of these (NoHDT).
+    /// Change of height after which a line gets another vertex, m, above 0; none if absent (NoHDT).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub threshold_m: Option<f64>,
-    /// Whether vertices are added until they connect what the ground connects.
+    /// Whether to add vertices until they connect everything that the ground connects.
     pub repair: bool,
-    /// The filter as the thesis prints it: points that differ by more than `step_over_m` are dropped.
+    /// Use the filter as printed in the thesis, which drops points that differ by more than `step_over_m`.
     pub literal_filter: bool,
-    /// The border of obstacles as the thesis has it: blocked nodes beside free ones are marked, in place of the free ones beside them.
+    /// Use the border of obstacles as in the thesis: mark blocked nodes next to free ones, instead of the free ones next to them.
     pub literal_border: bool,
-    /// The listing of Algorithm 3 as printed, which joins no lone points.
+    /// Use the listing of Algorithm 3 as printed, which never joins isolated points.
     pub literal_alone: bool,
 }
 
 impl Default for VertexSettings {
-    /// NoHDT, repaired, with the listings put right; the step of 1 m is ours, as the thesis prints none.
+    /// NoHDT, repaired, with corrected listings; the step of 1 m is our choice, as the thesis gives none.
     fn default() -> Self {
         Self {
             step_over_m: 1.0,
@@ -53,10 +53,10 @@ impl Default for VertexSettings {
 }
 
 impl VertexSettings {
-    /// Refuses settings out of range.
+    /// Refuses values out of range.
     ///
     /// # Errors
-    /// The first one.
+    /// The first value out of range.
     pub fn check(&self) -> Result<(), ParameterError> {
         ParameterError::not_negative("step_over_m", self.step_over_m)?;
         self.threshold_m.map(|m| ParameterError::positive("threshold_m", m)).transpose().map(drop)
@@ -66,14 +66,14 @@ impl VertexSettings {
 /// The vertices of a map.
 #[derive(Clone, Debug)]
 pub struct Vertices {
-    /// Whether each node is one.
+    /// Whether each node is a vertex.
     pub marks: Vec<bool>,
-    /// How many of them the repair added.
+    /// Number of vertices that the repair added.
     pub repaired: usize,
 }
 
 impl Vertices {
-    /// Every free node.
+    /// All free nodes.
     pub fn every(map: &TravelMap) -> Self {
         let marks = (0..map.len() as Node).map(|node| !map.is_blocked(node)).collect();
         Self { marks, repaired: 0 }

@@ -1,9 +1,9 @@
-//! Vertices that connect what the ground connects.
+//! Repair: vertices that make the roadmap connect everything that the ground connects.
 //!
-//! Nodes that can all reach one another by steps form a component of the ground; vertices of one component must form one component of
-//! the roadmap. Where they do not, trees of shortest walks are grown from one of the vertices over the ground's component, forwards and
-//! backwards, and the corners of the walks to and from one vertex of each other part are marked: between two corners a walk is straight, and
-//! every step of it may be taken, so that the roadmap has its edges.
+//! Nodes that can all reach one another by steps form a component of the ground; the vertices of one component must form one component of the
+//! roadmap. If they do not, trees of shortest walks are grown over the ground's component from one of its vertices, forwards and backwards, and the
+//! corners of the walks to and from one vertex of each other part are marked. Between two corners a walk is straight and every step of it is allowed,
+//! so the roadmap gets these edges.
 
 use crate::map::{Direction, Neighbourhood, Node, TravelMap};
 use crate::roadmap::Lines;
@@ -11,13 +11,13 @@ use crate::search::NONE;
 use crate::search::components::components;
 use std::collections::{BTreeMap, VecDeque};
 
-/// Marks what is missing; returns how many nodes that are.
+/// Marks the missing vertices; returns their number.
 pub fn mark(map: &TravelMap, marks: &mut [bool], neighbourhood: Neighbourhood) -> usize {
     let before = marks.iter().filter(|mark| **mark).count();
     let ground = of_ground(map, neighbourhood);
     let roads = Lines::new(map, marks, neighbourhood);
     let parts = roads.components();
-    // The first vertex of each part of the roadmap, by component of the ground.
+    // The first vertex of each part of the roadmap, per component of the ground.
     let mut firsts: BTreeMap<u32, BTreeMap<u32, Node>> = BTreeMap::new();
     for (vertex, &node) in roads.nodes().iter().enumerate() {
         firsts.entry(ground[node as usize]).or_default().entry(parts[vertex]).or_insert(node);
@@ -40,7 +40,7 @@ fn of_ground(map: &TravelMap, neighbourhood: Neighbourhood) -> Vec<u32> {
     components(map.len() as u32, |_| directions.len() as u32, |node, k| map.accessible(node, directions[k as usize]))
 }
 
-/// The node before each one on a shortest walk from the root (`forwards`), or the one after it on a walk to the root.
+/// For each node, its predecessor on a shortest walk from the root (`forwards`), or its successor on a walk to the root.
 fn grow(
     map: &TravelMap,
     neighbourhood: Neighbourhood,
@@ -67,7 +67,7 @@ fn grow(
     }
 }
 
-/// Marks the corners of the walk from a node to the root of a tree, up to where an earlier walk has come by.
+/// Marks the corners of the walk from a node to the root of a tree, up to the first node of an earlier walk.
 fn mark_corners(map: &TravelMap, tree: &[Node], node: Node, marks: &mut [bool], walked: &mut [bool]) {
     let mut at = node;
     let mut heading: Option<Direction> = None;

@@ -1,11 +1,11 @@
-//! Singular points (the thesis, Algorithm 2): nodes beside a step that may not be taken, in one direction or the other.
+//! Singular points (the thesis, Algorithm 2): nodes next to a step that is not allowed in at least one direction.
 //!
-//! With them come the rims of obstacles: free nodes beside blocked ones, diagonally as well. (The thesis marks the obstacles' own edges,
-//! so that vertices would lie inside them.)
+//! The rims of obstacles are marked too: free nodes next to blocked ones, including diagonally. (The thesis marks the obstacles' own edges, so
+//! vertices would lie inside them.)
 
 use crate::map::{Neighbourhood, Node, TravelMap};
 
-/// Marks free nodes beside a step that is too steep one way or the other.
+/// Marks free nodes next to a step that is too steep in either direction.
 pub fn mark(map: &TravelMap, marks: &mut [bool], neighbourhood: Neighbourhood) {
     let [rows, cols] = map.shape();
     for (k, &direction) in neighbourhood.directions().iter().enumerate() {
@@ -22,12 +22,12 @@ pub fn mark(map: &TravelMap, marks: &mut [bool], neighbourhood: Neighbourhood) {
     }
 }
 
-/// Marks the free nodes beside blocked ones.
+/// Marks the free nodes next to blocked ones.
 pub fn mark_rims(map: &TravelMap, marks: &mut [bool]) {
     blocked(map).flat_map(|node| map.around(node)).for_each(|node| marks[node as usize] |= !map.is_blocked(node));
 }
 
-/// Marks the blocked nodes beside free ones.
+/// Marks the blocked nodes next to free ones.
 pub fn mark_obstacles(map: &TravelMap, marks: &mut [bool]) {
     let on_edge = |node: &Node| map.around(*node).any(|beside| !map.is_blocked(beside));
     blocked(map).filter(on_edge).for_each(|node| marks[node as usize] = true);

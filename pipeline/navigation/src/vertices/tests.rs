@@ -27,6 +27,24 @@ fn val_a_cone_has_one_maximum() {
 }
 
 #[test]
+fn val_a_pit_is_critical_and_a_shoulder_is_not() {
+    let marks = |centre: f64, east: f64| {
+        let map = map_of(3, 3, limits(80.0, 80.0), move |r, c| match [r, c] {
+            [1, 1] => centre,
+            [1, 2] => east,
+            _ => 0.0,
+        });
+        marked(&critical::marks(&map))
+    };
+    assert_eq!(marks(-1.0, 0.0), [4]);
+    assert_eq!(marks(1.0, 0.0), [4]);
+    assert!(marks(1.0, 2.0).is_empty());
+    // As high as one neighbour, or next to a missing height.
+    assert!(marks(1.0, 1.0).is_empty());
+    assert!(marks(1.0, f64::NAN).is_empty());
+}
+
+#[test]
 fn val_a_saddle_is_marked_either_way_round() {
     let saddle = |high: [usize; 2]| {
         map_of(3, 3, limits(80.0, 80.0), move |r, c| match [r, c] {
@@ -61,12 +79,12 @@ fn val_bumps_up_to_the_step_vanish_and_higher_ones_stay() {
         [kept(1.0, false), kept(1.001, false), kept(-1.0, false), kept(-1.5, false)],
         [false, true, false, true]
     );
-    // The formula as printed drops the high one and keeps the low one.
+    // The formula as printed drops the high peak and keeps the low one.
     assert_eq!([kept(1.0, true), kept(1.001, true)], [true, false]);
 }
 
 #[test]
-fn val_a_lone_critical_point_stays() {
+fn val_an_isolated_critical_point_stays() {
     let map = map_of(3, 3, limits(85.0, 85.0), |r, c| if [r, c] == [1, 1] { 0.2 } else { 0.0 });
     let mut marks = critical::marks(&map);
     filter::filter(&map, &mut marks, 1.0, false);
@@ -118,20 +136,20 @@ fn val_the_rim_of_an_obstacle_is_free_and_the_literal_one_is_not() {
 }
 
 #[test]
-fn val_lone_points_of_rows_and_columns_are_joined_and_the_listing_joins_none() {
+fn val_isolated_points_of_rows_and_columns_are_joined_and_the_listing_joins_none() {
     let map = drawn(&["......"; 6]);
     let mut marks = vec![false; 36];
     // Rows 0, 2 and 5 have one mark each: (0, 1), (2, 4), (5, 3).
     [1, 16, 33].into_iter().for_each(|node| marks[node] = true);
     alone::mark(&map, &mut marks);
-    // Rows: (0, 4) above (2, 4), then (2, 3) above (5, 3). Columns with one mark: 1 alone; 3 and 4 have two.
+    // Rows: (0, 4) above (2, 4), then (2, 3) above (5, 3). Columns with one mark: only 1; 3 and 4 have two.
     assert_eq!(marked(&marks), [1, 4, 15, 16, 33]);
     let settings = VertexSettings { literal_alone: true, repair: false, ..VertexSettings::default() };
     assert_eq!(marked(&Vertices::of(&map, Neighbourhood::Four, &settings, &[1, 16, 33]).marks), [1, 16, 33]);
 }
 
 #[test]
-fn val_a_blocked_node_is_not_marked_to_join_lone_points() {
+fn val_a_blocked_node_is_not_marked_to_join_isolated_points() {
     let mut map = drawn(&["....", "....", "...."]);
     map.block(3);
     let mut marks = vec![false; 12];
@@ -142,7 +160,7 @@ fn val_a_blocked_node_is_not_marked_to_join_lone_points() {
 
 #[test]
 fn val_the_threshold_marks_every_change_since_the_last_mark() {
-    // A ramp of 0.25 m a cell eastward between two marks.
+    // A ramp of 0.25 m per cell eastward between two marks.
     let map = map_of(2, 17, limits(30.0, 30.0), |_, c| 0.25 * c as f64);
     let mut marks = vec![false; 34];
     [0, 16].into_iter().for_each(|node| marks[node] = true);
@@ -169,7 +187,7 @@ fn prop_lower_thresholds_have_more_vertices() {
     }
 }
 
-/// A maze on every other cell of a square, with some walls taken out again.
+/// A maze on every other cell of a square, with some walls removed again.
 fn maze(size: usize, openings: usize, random: &mut Random) -> TravelMap {
     let mut map = drawn(&vec![".".repeat(size).as_str(); size]);
     let walls: Vec<u32> = (0..map.len() as u32).filter(|n| map.place(*n).iter().any(|k| k % 2 == 1)).collect();
@@ -188,7 +206,7 @@ fn prop_repaired_roadmaps_reach_what_the_ground_reaches() {
         let map = match k % 3 {
             0 => maze(15, 60 + k / 3, &mut random),
             1 => rough(14, 14, 0.25, 0.0, &mut random),
-            // Steep ground whose steps often go one way only.
+            // Steep ground, many of whose steps are allowed in one direction only.
             _ => rough(14, 14, 0.05, 1.4, &mut random),
         };
         let Some([start, goal]) = ends(&map, &mut random) else { continue };

@@ -1,11 +1,11 @@
-//! More vertices where the ground changes between them (the thesis' height-difference threshold, HDT).
+//! Additional vertices where the height changes between marks (the thesis' height-difference threshold, HDT).
 //!
-//! Along each row, and each column, between one mark and the next: whenever the height differs from that of the last mark by the threshold or
-//! more, there is another. Rows and columns start from the same marks.
+//! Along each row and each column, between the first and the last mark: a node is marked when its height differs from that of the previous mark by
+//! the threshold or more. Rows and columns start from the same marks.
 
 use crate::map::TravelMap;
 
-/// Marks nodes by the change of height since the last mark, m.
+/// Marks nodes where the height has changed by `threshold_m` since the previous mark.
 pub fn mark(map: &TravelMap, marks: &mut [bool], threshold_m: f64) {
     let [rows, cols] = map.shape();
     let heights = &map.heights().values;

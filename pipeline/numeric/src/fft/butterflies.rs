@@ -1,19 +1,19 @@
-//! Transforms of 2 to 5 points, for one complex number at a time or several side by side.
+//! Transforms of 2 to 5 points, for single complex numbers or several side by side.
 //!
-//! Both take the same sums and products in the same order, so their bits are equal.
+//! Both use the same sums and products in the same order, so their bits are equal.
 
 use super::Complex64;
 use std::ops::{Add, Sub};
 
-/// A complex number, or several that share each operation.
+/// A complex number, or several that are processed together.
 pub trait Number: Copy + Add<Output = Self> + Sub<Output = Self> {
-    /// Times a real number.
+    /// Multiplied by a real number.
     fn scaled(self, by: f64) -> Self;
 
-    /// Times `turn`, or its conjugate in an inverse transform.
+    /// Multiplied by `turn`, or by its conjugate in an inverse transform.
     fn turned<const INVERSE: bool>(self, turn: Complex64) -> Self;
 
-    /// `self + t` and `self - t`, `t` being `-i side`, or `i side` in an inverse transform.
+    /// `self + t` and `self - t`, where `t` is `-i side`, or `i side` in an inverse transform.
     fn either_side<const INVERSE: bool>(self, side: Self) -> [Self; 2];
 }
 
@@ -39,8 +39,8 @@ impl Number for Complex64 {
 /// The transform of `R` points.
 pub struct Butterfly<const R: usize, const INVERSE: bool>;
 
-/// A transform of `R` points, as a trait: its one method can be inlined for certain, where a closure's call is a call of
-/// its own, compiled without wide vectors.
+/// A transform of `R` points. It is a trait because its method is certain to be inlined, whereas a closure could be compiled as a
+/// separate function without wide vectors.
 pub trait Radix<const R: usize> {
     fn apply<N: Number>(points: [N; R]) -> [N; R];
 }

@@ -1,14 +1,28 @@
-//! Transform of an even field, which is real and even too: a quarter of it is computed.
+//! Transform of an even field. The result is real and even too, so only a quarter of it is computed.
 
 use super::plane::{GROUP, gathered, store_lines};
 use super::quads::{Buffers, QuadTransform};
 use rayon::prelude::*;
 
-/// Transform of the field of `rows` by `cols` that is even in both directions and whose rows `0..=rows / 2` `fill` writes,
-/// each at columns `0..=cols / 2`. The value at column frequency `kx <= cols / 2` and row frequency `ky <= rows / 2` is at
+/// Transform of a field of `rows` by `cols` that is even in both directions. `fill` writes its rows `0..=rows / 2`, each at
+/// columns `0..=cols / 2`. The value at column frequency `kx <= cols / 2` and row frequency `ky <= rows / 2` is stored at
 /// `kx * (rows / 2 + 1) + ky`.
 ///
-/// Eight lines run side by side, in pairs that share a complex transform. Memory: the result.
+/// Eight lines are transformed side by side, in pairs that share a complex transform. Memory: the result.
+///
+/// ```
+/// use sastrugi_numeric::fft::even_spectrum;
+///
+/// // White noise of variance 2: the covariance is 2 at lag 0 and 0 elsewhere, so the spectrum is 2 everywhere.
+/// let spectrum = even_spectrum([6, 8], |row, line| {
+///     line.fill(0.0);
+///     if row == 0 {
+///         line[0] = 2.0;
+///     }
+/// });
+/// assert_eq!(spectrum.len(), (6 / 2 + 1) * (8 / 2 + 1));
+/// assert!(spectrum.iter().all(|power| (power - 2.0).abs() < 1e-12));
+/// ```
 pub fn even_spectrum([rows, cols]: [usize; 2], fill: impl Fn(usize, &mut [f64]) + Sync) -> Vec<f64> {
     let (half_rows, half_cols) = (rows / 2 + 1, cols / 2 + 1);
     let along_row = QuadTransform::new(cols);
@@ -20,7 +34,7 @@ pub fn even_spectrum([rows, cols]: [usize; 2], fill: impl Fn(usize, &mut [f64]) 
         || (vec![0.0; half_cols], along_row.buffers()),
         |(line, buffers), (group, mut blocks)| {
             let mut empty = true;
-            // A line that is not there is zero: what an earlier group left would change the rounding of its partner.
+            // Missing lines are set to zero: values left by an earlier group would change the rounding of their partners.
             let there = GROUP.min(half_rows - group * GROUP);
             buffers.data[..half_cols]
                 .iter_mut()
@@ -56,7 +70,7 @@ pub fn even_spectrum([rows, cols]: [usize; 2], fill: impl Fn(usize, &mut [f64]) 
     values
 }
 
-/// Continues the values 0 to `len / 2` of even sequences of `len`.
+/// Completes even sequences of length `len` from their values 0 to `len / 2`.
 fn mirror(buffers: &mut Buffers, len: usize) {
     (1..len.div_ceil(2)).for_each(|k| buffers.data[len - k] = buffers.data[k]);
 }

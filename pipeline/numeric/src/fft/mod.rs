@@ -1,10 +1,16 @@
 //! Fourier transforms whose bits do not depend on the CPU.
 //!
-//! Lengths 2^a 3^b 5^c are transformed by `stockham.rs` with `libm` twiddles, other lengths through Bluestein's chirp (1970)
-//! on such a length. Forward transforms are unnormalised with
-//! `exp(-2 pi i k n / N)`; inverse transforms divide by the number of points.
+//! Lengths 2^a 3^b 5^c are transformed by `stockham.rs` with `libm` twiddles, other lengths by Bluestein's chirp algorithm (1970)
+//! on a padded length of that form. Forward transforms are unnormalised, with `exp(-2 pi i k n / N)`; inverse transforms are divided
+//! by the number of points.
 //!
-//! Transforms of two dimensions take four lines at a time (`quads.rs`), with vectors as wide as the CPU's and the same bits.
+//! Two-dimensional transforms process four lines at a time (`quads.rs`) with the widest vectors of the CPU, and give the same bits.
+//!
+//! | transform of | function |
+//! |---|---|
+//! | a real field | [`RealFft2::forward`], [`RealFft2::inverse`]; [`RealFft2::inverse_of`] for a spectrum that is written column by column |
+//! | a field that is even in both directions, such as a covariance | [`even_spectrum`] |
+//! | complex numbers in one dimension | [`Transform`] |
 
 mod butterflies;
 mod even;
@@ -30,6 +36,13 @@ pub fn is_smooth(mut n: usize) -> bool {
 }
 
 /// The smallest 2^a 3^b 5^c that is at least `n`.
+///
+/// ```
+/// use sastrugi_numeric::fft::{is_smooth, smooth_length};
+///
+/// assert!(is_smooth(360) && !is_smooth(14));
+/// assert_eq!([7, 360, 1009].map(smooth_length), [8, 360, 1024]);
+/// ```
 pub fn smooth_length(n: usize) -> usize {
     (n.max(1)..).find(|&m| is_smooth(m)).unwrap_or(n)
 }
@@ -47,7 +60,7 @@ mod tests {
         (0..n).map(|_| s.normal()).collect()
     }
 
-    /// Numbers one by one, four side by side with the baseline's vectors, and with the widest: the same bits.
+    /// Single transforms, four side by side with the vectors of the baseline, and with the widest vectors give the same bits.
     #[test]
     fn prop_vectors_change_no_bit() {
         for n in [1, 2, 3, 5, 8, 16, 30, 45, 64, 81, 125, 128, 512, 1024, 2560, 4096, 4320, 7, 97, 1009] {
@@ -110,8 +123,8 @@ mod tests {
         }
     }
 
-    /// Every stored mode once, with its conjugate where the half spectrum leaves it out; what columns 0 and `cols / 2` hold
-    /// beyond the Hermitian part does not count.
+    /// Every stored mode counts once, plus its conjugate if the half spectrum omits it; columns 0 and `cols / 2` contribute only
+    /// their Hermitian part.
     #[test]
     fn val_inverse_equals_the_definition() {
         for (rows, cols) in [(1, 1), (2, 2), (5, 8), (6, 7), (7, 11), (9, 1), (1, 10), (17, 18), (24, 13)] {
@@ -135,13 +148,13 @@ mod tests {
         }
     }
 
-    /// A quarter of the transform of the whole field.
+    /// The even spectrum is a quarter of the transform of the complete field.
     #[test]
     fn val_even_spectrum() {
         for [rows, cols] in [[1, 1], [2, 3], [9, 8], [16, 31], [40, 33], [7, 22]] {
             let (half_rows, half_cols) = (rows / 2 + 1, cols / 2 + 1);
             let mut quarter = noise(half_rows * half_cols, "quarter");
-            // Eight lines without a value.
+            // Eight lines of zeros.
             quarter.iter_mut().skip(8 * half_cols).take(8 * half_cols).for_each(|v| *v = 0.0);
             let mirrored = |k: usize, n: usize| k.min(n - k);
             let whole: Vec<f64> = (0..rows * cols)
@@ -159,8 +172,8 @@ mod tests {
         }
     }
 
-    /// Groups that are not full come out the same whatever their buffers held before: large values in all other groups, on one
-    /// thread (whose buffers have seen them) and on as many as there are groups.
+    /// Incomplete groups do not depend on the previous contents of their buffers: with large values in all other groups, one thread
+    /// (whose buffers held them before) and one thread per group give the same bits.
     #[test]
     fn prop_threads_change_no_bit() {
         let [rows, cols] = [64, 36];
@@ -196,7 +209,41 @@ mod tests {
 
     #[test]
     fn val_smooth_lengths() {
-        assert_eq!([1, 7, 11, 1009, 2048].map(smooth_length), [1, 8, 12, 1024, 2048]);
+        assert_eq!([0, 1, 7, 11, 1009, 2048].map(smooth_length), [1, 1, 8, 12, 1024, 2048]);
+        let smooth: Vec<usize> = (0..=32).filter(|n| is_smooth(*n)).collect();
+        assert_eq!(smooth, [1, 2, 3, 4, 5, 6, 8, 9, 10, 12, 15, 16, 18, 20, 24, 25, 27, 30, 32]);
+    }
+
+    /// Parseval: each stored mode counts as often as it occurs in the full spectrum.
+    #[test]
+    fn val_power_of_the_half_spectrum() {
+        for (rows, cols) in [(1, 1), (2, 2), (5, 8), (6, 7), (9, 1), (1, 10), (1, 9), (24, 13)] {
+            let field = noise(rows * cols, "field");
+            let spectrum = RealFft2::new(rows, cols).forward(&field);
+            assert_eq!(spectrum.values.len(), rows * spectrum.half_cols());
+            let of_mode = |(mode, v): (usize, &Complex64)| spectrum.multiplicity(mode / rows) * v.norm_sqr();
+            let power: f64 = spectrum.values.iter().enumerate().map(of_mode).sum();
+            let squares: f64 = field.iter().map(|v| v * v).sum();
+            assert!((power / (rows * cols) as f64 / squares - 1.0).abs() < 1e-12, "{rows}x{cols}");
+        }
+    }
+
+    /// Several runs in one slice are transformed like each of them alone.
+    #[test]
+    fn prop_consecutive_runs_are_separate() {
+        for n in [12, 7] {
+            let transform = Transform::new(n);
+            let input: Vec<Complex64> = noise(3 * n, "re").into_iter().map(|v| Complex64::new(v, 0.5)).collect();
+            let (mut together, mut alone) = (input.clone(), input.clone());
+            transform.forward(&mut together, &mut transform.scratch());
+            alone.chunks_mut(n).for_each(|run| transform.forward(run, &mut transform.scratch()));
+            assert_eq!(together, alone, "{n}");
+            transform.inverse_unscaled(&mut together, &mut transform.scratch());
+            alone.chunks_mut(n).for_each(|run| transform.inverse_unscaled(run, &mut transform.scratch()));
+            assert_eq!(together, alone, "{n}");
+            let worst = together.iter().zip(&input).fold(0.0, |m, (a, b)| f64::max(m, (a / n as f64 - b).norm()));
+            assert!(worst < 1e-13, "{n}: {worst}");
+        }
     }
 
     #[test]
@@ -211,10 +258,10 @@ mod tests {
         }
     }
 
-    /// `rustfft` as an independent reference, on lengths of every mixture of radices.
+    /// `rustfft` as an independent reference, for lengths with all mixtures of radices, and for others (Bluestein).
     #[test]
     fn val_matches_rustfft() {
-        for n in [2, 3, 4, 5, 6, 8, 15, 16, 30, 60, 81, 125, 128, 2560, 4320, 8192] {
+        for n in [2, 3, 4, 5, 6, 8, 15, 16, 30, 60, 81, 125, 128, 2560, 4320, 8192, 7, 14, 97, 1009] {
             let (re, im) = (noise(n, "re"), noise(n, "im"));
             let input: Vec<Complex64> = re.iter().zip(&im).map(|(&a, &b)| Complex64::new(a, b)).collect();
             let transform = Transform::new(n);
@@ -235,7 +282,7 @@ mod tests {
         }
     }
 
-    /// Bits of transforms at lengths where twiddles from the C library change with the CPU.
+    /// Bits of transforms at lengths for which twiddles from the C library depend on the CPU.
     #[test]
     fn gold_bits_are_frozen() {
         let mut digest = 0u64;

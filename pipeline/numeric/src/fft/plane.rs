@@ -1,15 +1,15 @@
-//! Real transforms of two dimensions.
+//! Two-dimensional transforms of real fields.
 //!
-//! Two rows share a complex transform (one is its real part, the other the imaginary one) and four such pairs, or four
-//! columns, run side by side. Between the directions the numbers lie in blocks of [`GROUP`] rows by [`LANES`] columns inside
-//! the vector that will be the result, so that no transposition of the whole and no second vector is needed.
+//! Two rows share a complex transform (one is its real part, the other its imaginary part), and four such pairs, or four columns,
+//! are transformed side by side. Between the two directions, the numbers are stored in blocks of [`GROUP`] rows by [`LANES`] columns
+//! inside the vector of the result, which avoids both a complete transposition and a second vector.
 
 use super::Complex64;
 use super::quads::{Buffers, LANES, Quad, QuadTransform};
 use rayon::prelude::*;
 use std::slice::ChunksMut;
 
-/// Rows transformed together.
+/// Number of rows transformed together.
 pub const GROUP: usize = 2 * LANES;
 
 /// Transforms of fields of one shape.
@@ -46,10 +46,10 @@ impl Plane {
         values
     }
 
-    /// The field of the half spectrum whose columns `fill` writes.
+    /// The field of the half spectrum whose columns are written by `fill`.
     pub fn inverse_of(&self, fill: impl Fn(usize, &mut [Complex64]) + Sync) -> Vec<f64> {
         let Self { rows, cols, .. } = *self;
-        // Columns 0 and `cols / 2` are real after their transforms: one complex column holds both.
+        // Columns 0 and `cols / 2` are real after their transforms, so one complex column holds both.
         let packed = cols.next_multiple_of(2 * LANES);
         let last = cols.is_multiple_of(2).then(|| self.column_alone(cols / 2, &fill));
         let mut field = vec![0.0; rows * packed];
@@ -85,7 +85,7 @@ impl Plane {
         out[..self.rows].iter().map(|quad| quad.re[0]).collect()
     }
 
-    /// Transforms up to eight `rows` into one block for each strip of columns.
+    /// Transforms up to eight `rows` into one block per strip of columns.
     fn forward_rows(&self, rows: &[f64], blocks: &mut [&mut [Complex64]], buffers: &mut Buffers) {
         let cols = self.cols;
         load_lines(rows, cols, &mut buffers.data);
@@ -101,7 +101,7 @@ impl Plane {
         }
     }
 
-    /// Transforms the four columns that lie row by row in `strip`, and leaves them there one by one.
+    /// Transforms the four columns stored row by row in `strip`, and stores them there column by column.
     fn forward_columns(&self, strip: &mut [Complex64], buffers: &mut Buffers) {
         for (quad, values) in buffers.data.iter_mut().zip(strip.as_chunks::<LANES>().0) {
             *quad = Quad { re: values.map(|v| v.re), im: values.map(|v| v.im) };
@@ -114,8 +114,8 @@ impl Plane {
         }
     }
 
-    /// Transforms four `columns` into one block for each group of rows: in each row the real parts, then the imaginary
-    /// ones, of which `last` replaces the first.
+    /// Transforms four `columns` into one block per group of rows. Each row holds the real parts, then the imaginary parts,
+    /// the first of which is replaced by `last`.
     fn inverse_columns(
         &self,
         columns: &[Complex64],
@@ -139,7 +139,7 @@ impl Plane {
         }
     }
 
-    /// Transforms up to eight rows from the blocks in `group` to lines in the same place.
+    /// Transforms up to eight rows from the blocks in `group` to lines, in place.
     fn inverse_rows(&self, group: &mut [f64], packed: usize, buffers: &mut Buffers) {
         let cols = self.cols;
         let height = group.len() / packed;
@@ -176,8 +176,8 @@ impl Plane {
     }
 }
 
-/// Four pairs of rows `a` and `b` at one column frequency: `a + i b`, and at the opposite frequency the same of their
-/// conjugates.
+/// Combines four pairs of rows `a` and `b` at one column frequency to `a + i b`, and their conjugates likewise at the opposite
+/// frequency.
 #[inline(always)]
 fn combined(lines: &[[f64; 2 * LANES]; GROUP], lane: usize) -> (Quad, Quad) {
     let (mut ahead, mut behind) = (Quad::default(), Quad::default());
@@ -189,7 +189,7 @@ fn combined(lines: &[[f64; 2 * LANES]; GROUP], lane: usize) -> (Quad, Quad) {
     (ahead, behind)
 }
 
-/// The rows of four pairs `a + i b` whose transforms are `ahead` and at the opposite frequency `behind`.
+/// Separates the rows of four pairs `a + i b` whose transforms are `ahead` and, at the opposite frequency, `behind`.
 #[inline(always)]
 fn separated(ahead: &Quad, behind: &Quad) -> [Complex64; GROUP] {
     let mut rows = [Complex64::default(); GROUP];
@@ -202,7 +202,7 @@ fn separated(ahead: &Quad, behind: &Quad) -> [Complex64; GROUP] {
     rows
 }
 
-/// Up to eight lines of `len` as four pairs; a line that is not there is zero.
+/// Loads up to eight lines of `len` as four pairs; missing lines are zero.
 fn load_lines(lines: &[f64], len: usize, quads: &mut [Quad]) {
     let nothing = vec![0.0; if lines.len() < GROUP * len { len } else { 0 }];
     let line = |k: usize| lines.get(k * len..(k + 1) * len).unwrap_or(&nothing);
@@ -213,7 +213,7 @@ fn load_lines(lines: &[f64], len: usize, quads: &mut [Quad]) {
     }
 }
 
-/// Four pairs, times `scale`, as up to eight lines that start `pitch` apart; a cache line of each at a time.
+/// Stores four pairs, multiplied by `scale`, as up to eight lines that start `pitch` apart, one cache line of each at a time.
 pub fn store_lines(quads: &[Quad], scale: f64, lines: &mut [f64], pitch: usize) {
     for (tile, quads) in quads.chunks(GROUP).enumerate() {
         for (k, line) in lines.chunks_mut(pitch).enumerate() {
@@ -226,7 +226,7 @@ pub fn store_lines(quads: &[Quad], scale: f64, lines: &mut [f64], pitch: usize) 
     }
 }
 
-/// The first of the blocks of every part, the second of every part, and so on.
+/// The first block of every part, then the second block of every part, and so on.
 pub fn gathered<'a, T>(parts: impl Iterator<Item = ChunksMut<'a, T>>) -> Vec<Vec<&'a mut [T]>> {
     let mut all = Vec::new();
     for blocks in parts {

@@ -1,8 +1,8 @@
-//! Four complex transforms of one length side by side, so that each operation is one of vectors and no number is moved
+//! Four complex transforms of the same length side by side, so that all operations act on vectors and no number moves
 //! between lanes.
 //!
-//! The arithmetic is that of [`super::transform::Transform`], number by number: the passes of `stockham.rs`, of which two
-//! at a time are done while their 16 points are at hand (half the traffic between the buffers), and Bluestein's chirp.
+//! For each number, the arithmetic is that of [`super::transform::Transform`]: the passes of `stockham.rs`, fused in pairs where possible
+//! so that their 16 points stay in registers (half the traffic between the buffers), and Bluestein's chirp.
 
 use super::Complex64;
 use super::butterflies::{Butterfly, Number, Radix};
@@ -13,10 +13,10 @@ use pulp::{Simd, WithSimd, cast};
 use std::ops::{Add, Sub};
 use std::sync::Arc;
 
-/// Transforms side by side.
+/// Number of transforms side by side.
 pub const LANES: usize = 4;
 
-/// One number of each of [`LANES`] transforms: a cache line.
+/// One number of each of [`LANES`] transforms, which fill a cache line.
 #[derive(Clone, Copy, Debug, Default)]
 #[repr(C, align(64))]
 pub struct Quad {
@@ -25,7 +25,7 @@ pub struct Quad {
 }
 
 impl Quad {
-    /// Of eight lines in four pairs, the value of one: those with even numbers are real parts, the others imaginary.
+    /// The value of one of eight lines stored in four pairs: lines with even numbers are real parts, the others imaginary parts.
     pub fn part(&self, line: usize) -> f64 {
         [&self.re, &self.im][line % 2][line / 2]
     }
@@ -59,7 +59,7 @@ enum Kind {
     Bluestein(Arc<(Chirp, Plan)>),
 }
 
-/// Two buffers of one transform.
+/// The two buffers of a transform.
 pub struct Buffers {
     pub data: Vec<Quad>,
     other: Vec<Quad>,
@@ -92,7 +92,7 @@ impl QuadTransform {
         Buffers { data: vec![Quad::default(); len], other: vec![Quad::default(); len] }
     }
 
-    /// Unscaled transforms of the first numbers of `buffers.data`, which are overwritten.
+    /// Unscaled transforms of the leading numbers of `buffers.data`, which are overwritten.
     pub fn process<'a, const INVERSE: bool>(&self, buffers: &'a mut Buffers) -> &'a [Quad] {
         let Buffers { data, other } = buffers;
         match &self.kind {
@@ -137,8 +137,8 @@ pub(super) struct Plan {
     passes: Vec<Pass>,
 }
 
-/// Two passes of radix 4 as one of radix 16: for each `p` the factors of the first at `p + m n / 16`, m from 0 to 3, then those
-/// of the second at `p`.
+/// Two passes of radix 4 fused into one of radix 16. For each `p`, it holds the factors of the first pass at `p + m n / 16`, m from 0 to 3, then
+/// those of the second pass at `p`.
 fn fused(stride: usize, left: usize) -> Pass {
     let blocks = left / 16;
     let first = |p: usize| (0..4).flat_map(move |m| turns(4, left, p + m * blocks));
@@ -163,7 +163,7 @@ impl Plan {
     }
 }
 
-/// All passes of a plan; gives the buffer that holds the transforms, then the other.
+/// All passes of a plan. Returns the buffer with the transforms, then the other buffer.
 struct Passes<'a, 'b, const INVERSE: bool> {
     plan: &'b Plan,
     data: &'a mut [Quad],
@@ -214,7 +214,7 @@ where
     }
 }
 
-/// Two passes of radix 4. No loop over the 16 points: they would go through memory.
+/// Two passes of radix 4. The 16 points are written out without a loop, which would move them through memory.
 #[inline(always)]
 fn run_two<S: Simd, const INVERSE: bool>(simd: S, pass: &Pass, from: &[Quad], to: &mut [Quad]) {
     let (stride, part) = (pass.stride, from.len() / 16);
@@ -234,7 +234,7 @@ fn run_two<S: Simd, const INVERSE: bool>(simd: S, pass: &Pass, from: &[Quad], to
     }
 }
 
-/// Transform of four points and its factors.
+/// Transform of four points, multiplied by its twiddle factors.
 #[inline(always)]
 fn four<S: Simd, const INVERSE: bool>(points: [Wide<S>; 4], turns: &[Complex64; 3]) -> [Wide<S>; 4] {
     let [a, b, c, d] = Butterfly::<4, INVERSE>::apply(points);
@@ -259,7 +259,7 @@ fn store_four<S: Simd>(values: [Wide<S>; 4], to: &mut [Quad], at: usize, step: u
     values[3].store(&mut to[at + 3 * step]);
 }
 
-/// A [`Quad`] in vectors.
+/// A [`Quad`] in vector registers.
 #[derive(Clone, Copy)]
 struct Wide<S: Simd> {
     simd: S,

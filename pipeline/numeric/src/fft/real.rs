@@ -3,9 +3,25 @@
 use super::plane::Plane;
 use super::{Complex64, Transform};
 
-/// Real two-dimensional transform of a fixed shape.
+/// Two-dimensional transform of real fields of a fixed shape.
 ///
-/// Cost: two complex half transforms. Memory: the field and its half spectrum ([`RealFft2::inverse_of`]: the field alone).
+/// Cost: two complex half transforms. Memory: the field and its half spectrum (only the field for [`RealFft2::inverse_of`]).
+///
+/// ```
+/// use sastrugi_numeric::fft::RealFft2;
+///
+/// let (rows, cols) = (3, 8);
+/// // The same wave of two cells along every row: one mode, at column frequency `cols / 2` and row frequency 0.
+/// let field: Vec<f64> = (0..rows * cols).map(|k| if k % cols % 2 == 0 { 1.0 } else { -1.0 }).collect();
+/// let fft = RealFft2::new(rows, cols);
+/// let spectrum = fft.forward(&field);
+/// for (mode, value) in spectrum.values.iter().enumerate() {
+///     let expected = if mode == cols / 2 * rows { 24.0 } else { 0.0 };
+///     assert!((value.re - expected).abs() < 1e-12 && value.im.abs() < 1e-12);
+/// }
+/// let back = fft.inverse(spectrum);
+/// assert!(back.iter().zip(&field).all(|(a, b)| (a - b).abs() < 1e-12));
+/// ```
 #[derive(Clone)]
 pub struct RealFft2 {
     rows: usize,
@@ -15,13 +31,13 @@ pub struct RealFft2 {
 
 #[derive(Clone)]
 enum Kind {
-    /// One row or one column, for which the transforms side by side would be empty.
+    /// One row or one column, which would leave side-by-side transforms mostly empty.
     Line(Transform),
     Plane(Plane),
 }
 
-/// The non-negative column frequencies of a real field's transform, stored column frequency first:
-/// the value at column frequency `kx` in `0..=cols / 2` and row frequency `ky` in `0..rows` is `values[kx * rows + ky]`.
+/// The transform of a real field at non-negative column frequencies. The value at column frequency `kx` in `0..=cols / 2` and
+/// row frequency `ky` in `0..rows` is `values[kx * rows + ky]`.
 #[derive(Clone, Debug)]
 pub struct HalfSpectrum {
     /// Rows of the field.
@@ -38,7 +54,7 @@ impl HalfSpectrum {
         self.cols / 2 + 1
     }
 
-    /// How often the mode at column frequency `kx` stands in the full spectrum: 1 on the self-conjugate columns, else 2.
+    /// Number of times the mode at column frequency `kx` occurs in the full spectrum: 1 in the self-conjugate columns, otherwise 2.
     pub fn multiplicity(&self, kx: usize) -> f64 {
         if kx == 0 || 2 * kx == self.cols { 1.0 } else { 2.0 }
     }
@@ -60,7 +76,7 @@ impl RealFft2 {
     /// If the field does not have `rows * cols` values.
     pub fn forward(&self, field: &[f64]) -> HalfSpectrum {
         let Self { rows, cols, .. } = *self;
-        assert_eq!(field.len(), rows * cols, "field of the transform's shape");
+        assert_eq!(field.len(), rows * cols, "field must have the shape of the transform");
         let values = match &self.kind {
             Kind::Line(transform) => self.forward_line(transform, field),
             Kind::Plane(plane) => plane.forward(field),
@@ -68,16 +84,20 @@ impl RealFft2 {
         HalfSpectrum { rows, cols, values }
     }
 
-    /// Field of a spectrum. Only the Hermitian part counts: what the stored columns 0 and `cols / 2` hold beyond it is
-    /// dropped.
+    /// Field of a spectrum. Only the Hermitian part counts: the rest of the stored columns 0 and `cols / 2` is
+    /// ignored.
     pub fn inverse(&self, spectrum: HalfSpectrum) -> Vec<f64> {
-        assert_eq!((spectrum.rows, spectrum.cols), (self.rows, self.cols), "spectrum of the transform's shape");
+        assert_eq!(
+            (spectrum.rows, spectrum.cols),
+            (self.rows, self.cols),
+            "spectrum must have the shape of the transform"
+        );
         let rows = self.rows;
         self.inverse_of(|kx, column| column.copy_from_slice(&spectrum.values[kx * rows..(kx + 1) * rows]))
     }
 
-    /// Field of the spectrum whose columns `fill` writes, each of `rows` values, for column frequencies `0..=cols / 2` in
-    /// any order: the half spectrum is never there as a whole. Only its Hermitian part counts.
+    /// Field of the spectrum whose columns are written by `fill`, each of `rows` values, for column frequencies `0..=cols / 2` in
+    /// any order. The half spectrum is never held completely in memory. Only its Hermitian part counts.
     pub fn inverse_of(&self, fill: impl Fn(usize, &mut [Complex64]) + Sync) -> Vec<f64> {
         match &self.kind {
             Kind::Line(transform) => self.inverse_line(transform, fill),

@@ -1,8 +1,8 @@
 //! Complex transform of length 2^a 3^b 5^c: Stockham's self-sorting passes (Cochran et al., 1967) of radix 4, 2, 3 and 5.
 //!
-//! Own code for one reason: `rustfft` takes its twiddle factors from the C library, whose sine and cosine change their
-//! last bits with the CPU (seen for lengths 60, 2560, 8192 and many others), and every surface that passed through such a
-//! transform would change with them. Here twiddles come from `libm`, and the passes are plain `+ - *`.
+//! Why not `rustfft`: it takes its twiddle factors from the C library, whose sine and cosine differ in their last bits between CPUs
+//! (observed for lengths 60, 2560, 8192 and many others), and so would every surface computed with such a transform. Here twiddles
+//! come from `libm`, and the passes use only `+ - *`.
 //!
 //! With `n` points left, stride `s` and radix `r`, one pass computes for `p < n / r`, `q < s`, `k < r`
 //!
@@ -10,7 +10,7 @@
 //! y[q + s (r p + k)] = exp(-2 pi i p k / n) * sum over m < r of x[q + s (p + m n / r)] exp(-2 pi i m k / r)
 //! ```
 //!
-//! Here one run at a time, the plain form; `quads.rs` takes the same passes for four runs at a time.
+//! This file processes one run at a time; `quads.rs` applies the same passes to four runs at a time.
 //!
 //! Cost: about `5 n log2 n` operations in `log4 n` passes between two buffers; tables of about `n` complex numbers.
 
@@ -38,7 +38,7 @@ fn twiddle(turn: usize, of: usize) -> Complex64 {
     Complex64::new(cos, sin)
 }
 
-/// The radices of a length in the order of the passes; `None` unless it is 2^a 3^b 5^c.
+/// The radices of a length in the order of the passes; `None` unless the length is 2^a 3^b 5^c.
 pub fn radices(len: usize) -> Option<Vec<usize>> {
     let (mut all, mut left) = (Vec::new(), len);
     for radix in [4, 2, 3, 5] {
@@ -74,7 +74,7 @@ impl Stockham {
         Some(Self { len, passes: passes.collect() })
     }
 
-    /// Transforms `data` (of the planned length) in place, unscaled; `other` is as long and is overwritten.
+    /// Transforms `data` (of the planned length) in place, unscaled; `other` has the same length and is overwritten.
     pub fn process<const INVERSE: bool>(&self, data: &mut [Complex64], other: &mut [Complex64]) {
         let (data, other) = (&mut data[..self.len], &mut other[..self.len]);
         let (mut from, mut to) = (&mut *data, &mut *other);

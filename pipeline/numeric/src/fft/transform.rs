@@ -1,4 +1,4 @@
-//! One complex transform of any length.
+//! One-dimensional complex transform of any length.
 
 use super::stockham::Stockham;
 use super::{Complex64, smooth_length};
@@ -6,6 +6,21 @@ use std::f64::consts::PI;
 use std::sync::Arc;
 
 /// A one-dimensional complex transform of a fixed length, in place.
+///
+/// ```
+/// use sastrugi_numeric::fft::{Complex64, Transform};
+///
+/// let transform = Transform::new(4);
+/// let [zero, one, i] = [(0.0, 0.0), (1.0, 0.0), (0.0, 1.0)].map(|(re, im)| Complex64::new(re, im));
+/// let mut data = [zero, one, zero, zero];
+/// // Forward: exp(-2 pi i k / 4) for k = 0, 1, 2, 3.
+/// transform.forward(&mut data, &mut transform.scratch());
+/// let expected = [one, -i, -one, i];
+/// assert!(data.iter().zip(&expected).all(|(a, b)| (a - b).norm() < 1e-15));
+/// // The inverse is not divided by the number of points.
+/// transform.inverse_unscaled(&mut data, &mut transform.scratch());
+/// assert!((data[1] - one * 4.0).norm() < 1e-15);
+/// ```
 #[derive(Clone)]
 pub struct Transform {
     len: usize,
@@ -24,7 +39,7 @@ impl Transform {
     /// # Panics
     /// If `len` is 0.
     pub fn new(len: usize) -> Self {
-        assert!(len > 0, "a transform needs points");
+        assert!(len > 0, "a transform needs at least one point");
         let kind = match Stockham::new(len) {
             Some(direct) => Kind::Direct(Arc::new(direct)),
             None => Kind::Bluestein(Arc::new(Bluestein::new(len))),
@@ -37,7 +52,7 @@ impl Transform {
         self.len
     }
 
-    /// Never true: a transform has points.
+    /// Always false: a transform has at least one point.
     pub fn is_empty(&self) -> bool {
         false
     }
@@ -82,7 +97,7 @@ impl Transform {
 pub(super) struct Chirp {
     /// `exp(-pi i k^2 / len)`.
     pub values: Vec<Complex64>,
-    /// Transform of the conjugate chirp, wrapped round a smooth length and divided by it.
+    /// Transform of the conjugate chirp, wrapped to a smooth length and divided by that length.
     pub spectrum: Vec<Complex64>,
 }
 
@@ -91,7 +106,7 @@ impl Chirp {
         let inner = Transform::new(smooth_length(2 * len - 1));
         let values: Vec<Complex64> = (0..len)
             .map(|k| {
-                // k^2 modulo 2 len keeps the phase small and therefore exact.
+                // Taking k^2 modulo 2 len keeps the phase small and therefore exact.
                 let square = (k as u128 * k as u128 % (2 * len as u128)) as f64;
                 let (sin, cos) = libm::sincos(-PI * square / len as f64);
                 Complex64::new(cos, sin)

@@ -1,16 +1,16 @@
-//! Delaunay triangulation of whole-numbered points in a rectangle, point by point (Lawson, 1977; Guibas and Stolfi, 1985).
+//! Incremental Delaunay triangulation of integer points in a rectangle (Lawson, 1977; Guibas and Stolfi, 1985).
 //!
-//! Points are columns and rows of a grid, so that both tests, on which side of an edge and inside of which circle a point lies, are
-//! exact in integers: nothing depends on rounding. Half-edge `3 t + k` leads from corner `k` of triangle `t` to the next one; its
-//! twin is the same edge of the neighbour, in the other direction.
+//! Points are columns and rows of a grid, so that both the orientation test and the in-circle test are exact in integers: nothing
+//! depends on rounding. Half-edge `3 t + k` leads from corner `k` of triangle `t` to the next corner; its twin is the same edge of the
+//! neighbouring triangle, in the opposite direction.
 
-/// No twin: an edge of the rectangle.
+/// Marks an edge without a twin, which lies on the rectangle.
 const NONE: u32 = u32::MAX;
 
 /// A point, column from the west and row from the south.
 pub(super) type Point = [i64; 2];
 
-/// An edge around the place of a new vertex.
+/// An edge of the polygon around a new vertex.
 #[derive(Clone, Copy, Debug)]
 struct Link {
     from: u32,
@@ -18,21 +18,21 @@ struct Link {
     twin: u32,
 }
 
-/// A Delaunay triangulation that grows.
+/// A Delaunay triangulation that grows point by point.
 #[derive(Clone, Debug)]
 pub(super) struct Delaunay {
     points: Vec<Point>,
     /// Corners of the triangles, counter-clockwise seen from above.
     corners: Vec<u32>,
     twins: Vec<u32>,
-    /// Triangles that the last insertion made or changed, some of them several times.
+    /// Triangles that the last insertion created or changed, with duplicates.
     touched: Vec<u32>,
-    /// Edges that may break the rule of circles.
+    /// Edges that may violate the Delaunay condition.
     doubtful: Vec<u32>,
 }
 
 impl Delaunay {
-    /// The rectangle from (0, 0) to `far` as two triangles.
+    /// The rectangle from (0, 0) to `[right, top]` as two triangles.
     pub(super) fn new([right, top]: Point) -> Self {
         Self {
             points: vec![[0, 0], [right, 0], [right, top], [0, top]],
@@ -54,17 +54,17 @@ impl Delaunay {
         [first, first + 1, first + 2].map(|edge| self.origin(edge))
     }
 
-    /// Triangles that the last insertion made or changed, ascending.
+    /// Triangles that the last insertion created or changed, ascending.
     pub(super) fn take_touched(&mut self) -> Vec<u32> {
         self.touched.sort_unstable();
         self.touched.dedup();
         std::mem::take(&mut self.touched)
     }
 
-    /// A triangle that holds a point of the rectangle, found by a walk from another.
+    /// A triangle that contains a point of the rectangle, found by walking from triangle `start`.
     pub(super) fn locate(&self, point: Point, start: u32) -> u32 {
         let mut triangle = start;
-        // In a Delaunay triangulation no walk comes back to a triangle.
+        // In a Delaunay triangulation, no walk visits a triangle twice.
         for _ in 0..self.len() {
             let first = 3 * triangle;
             let crossed = (first..first + 3).find(|&edge| self.side(edge, point) < 0).map(|edge| self.twin(edge));
@@ -76,7 +76,7 @@ impl Delaunay {
         triangle
     }
 
-    /// Adds a point that lies in the triangle or on one of its edges, and is none of its corners.
+    /// Adds a point that lies inside the triangle or on one of its edges, but not on a corner.
     pub(super) fn insert(&mut self, point: Point, triangle: u32) {
         let vertex = self.points.len() as u32;
         self.points.push(point);
@@ -100,7 +100,8 @@ impl Delaunay {
         self.legalise();
     }
 
-    /// In every square of four neighbouring vertices both diagonals are Delaunay edges: takes that from north-west to south-east.
+    /// Flips diagonals of squares of four neighbouring vertices, where both diagonals are Delaunay edges, so that they run from north-west to
+    /// south-east.
     pub(super) fn turn_square_diagonals(&mut self) {
         for edge in 0..self.corners.len() as u32 {
             let twin = self.twin(edge);
@@ -116,7 +117,7 @@ impl Delaunay {
         }
     }
 
-    /// Triangles from a vertex to a ring of edges around it, counter-clockwise; the first take the numbers of old ones.
+    /// Connects a vertex to a ring of edges around it, counter-clockwise. The first triangles reuse the numbers of old ones.
     fn fan(&mut self, vertex: u32, ring: &[Link], reused: &[u32], closed: bool) {
         let count = ring.len();
         let mut numbers = Vec::with_capacity(count);
@@ -146,7 +147,7 @@ impl Delaunay {
         number
     }
 
-    /// Flips edges until no circle through the corners of a triangle holds another vertex.
+    /// Flips edges until no circumcircle of a triangle contains another vertex.
     fn legalise(&mut self) {
         while let Some(edge) = self.doubtful.pop() {
             let twin = self.twin(edge);
@@ -162,7 +163,7 @@ impl Delaunay {
         }
     }
 
-    /// Puts the other diagonal into the quadrangle around an edge: `a b p` and `b a d` become `a d p` and `b p d`.
+    /// Replaces an edge by the other diagonal of the quadrangle around it: `a b p` and `b a d` become `a d p` and `b p d`.
     fn flip(&mut self, edge: u32, twin: u32) {
         let [p, d] = [previous(edge), previous(twin)].map(|edge| self.corners[edge as usize]);
         let [beyond_b, beyond_a] = [next(edge), next(twin)].map(|edge| self.twin(edge));
@@ -192,7 +193,7 @@ impl Delaunay {
         self.points[self.corners[edge as usize] as usize]
     }
 
-    /// Above 0 for a point to the left of an edge, 0 on its line.
+    /// Positive for a point to the left of an edge, 0 on its line.
     fn side(&self, edge: u32, point: Point) -> i64 {
         doubled_area([self.origin(edge), self.origin(next(edge)), point])
     }
@@ -211,7 +212,7 @@ pub(super) const fn doubled_area([a, b, c]: [Point; 3]) -> i64 {
     (b[0] - a[0]) * (c[1] - a[1]) - (b[1] - a[1]) * (c[0] - a[0])
 }
 
-/// True when a point lies inside the circle through the corners of a triangle, counter-clockwise.
+/// True if a point lies inside the circumcircle of a triangle with counter-clockwise corners.
 fn in_circle(corners: [Point; 3], point: Point) -> bool {
     let [[ax, ay], [bx, by], [cx, cy]] =
         corners.map(|corner| [i128::from(corner[0] - point[0]), i128::from(corner[1] - point[1])]);

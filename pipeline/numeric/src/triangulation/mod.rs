@@ -1,27 +1,29 @@
-//! Fewer triangles for a grid of heights: greedy insertion into a Delaunay triangulation.
+//! Decimates a grid of heights to a triangle mesh: greedy insertion into a Delaunay triangulation.
 //!
 //! Source: Garland and Heckbert (1995), "Fast Polygonal Approximation of Terrains and Height Fields", CMU-CS-95-181, algorithm III
-//! (greedy insertion, data-independent triangulation, a priority queue, and only the triangles that changed looked at again).
-//! Two triangles cover the rectangle of the outer cell centres. The cell centre (post) that lies farthest from its triangle,
+//! (greedy insertion, data-independent triangulation, a priority queue, and re-evaluation of changed triangles only).
+//! Initially, two triangles cover the rectangle of the outer cell centres. The cell centre (post) `(x, y, z)` with the largest
+//! vertical distance from its triangle,
 //!
 //! ```text
 //! e = |z - (z_a + g_x (x - x_a) + g_y (y - y_a))|
 //! ```
 //!
-//! with `g` the slope of the plane through the triangle's corners, becomes a vertex, until no post is farther than the limit or
-//! there are as many triangles as allowed. Of equal errors the post nearest to the north-west goes first, row by row.
+//! with corner `a` of the triangle and the slope `g` of the plane through its corners, becomes a vertex. This is repeated until no post
+//! exceeds the error limit or the allowed number of triangles is reached. Of posts with equal errors in one triangle, the southernmost
+//! counts, and of those the westernmost; of equal errors in several triangles, the post that comes first row by row from the north-west.
 //!
-//! Where we depart from the paper:
+//! Departures from the paper:
 //!
-//! * *Holes.* The surface is that of all triangles between neighbouring posts with data, [`triangulate`] says which. All posts around cells
-//!   without data are vertices from the start. Sides of a square of neighbouring vertices are then Delaunay edges, so that no
-//!   triangle is partly in a hole, and the rim of every hole stays as it is.
-//! * *Exact.* The triangulation is Delaunay in columns and rows, whatever the shape of the cells, by integer arithmetic.
-//! * *The error is recomputed* over all posts when the triangulation is finished.
+//! * *Holes.* The approximated surface consists of the triangles between neighbouring posts with data; see [`triangulate`]. All posts around
+//!   cells without data are vertices from the start. The sides of a square of neighbouring vertices are then Delaunay edges, so that no
+//!   triangle lies partly in a hole, and the rim of every hole is preserved.
+//! * *Exactness.* The triangulation is Delaunay in columns and rows, whatever the shape of the cells, and uses integer arithmetic.
+//! * *Final errors.* The errors are recomputed over all posts when the triangulation is finished.
 //!
-//! Cost: about `n log n` for `n` posts on terrain, at worst `n` times the number of vertices; up to 400 bytes a post
-//! where none can be left out.
-//! Not for surfaces whose small-scale roughness matters, as it does to wheels: that is what it takes away.
+//! Cost: about `n log n` for `n` posts of typical terrain, at worst `n` times the number of vertices; up to 400 bytes per post
+//! if all posts become vertices.
+//! Do not use it where small-scale roughness matters, for example under wheels: decimation removes it.
 
 mod delaunay;
 
@@ -33,24 +35,24 @@ use delaunay::{Delaunay, Point, doubled_area};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Most cells of a grid that is triangulated.
+/// Maximum number of cells of a grid to triangulate.
 pub const MAX_CELLS: usize = 1 << 28;
 
-/// When a triangulation is fine enough: as soon as one of the limits is met.
+/// Limits of a triangulation, which stops as soon as one of them is met.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Limits {
     /// Largest vertical distance of a post from the triangles, in the unit of the heights; at least 0.
     pub error_max: f64,
-    /// Most triangles. The rims of holes, and two triangles without any, take what they need.
+    /// Maximum number of triangles. The rims of holes, and the two initial triangles if there are no holes, may exceed it.
     pub triangles_max: Option<usize>,
 }
 
-/// A grid as triangles between some of its posts.
+/// A grid approximated by triangles between some of its posts.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Triangulation {
     /// Cells whose centres are vertices, ascending.
     pub cells: Vec<usize>,
-    /// Positions in `cells` of the corners, counter-clockwise seen from above.
+    /// Corners of the triangles as indices into `cells`, counter-clockwise seen from above.
     pub triangles: Vec<[u32; 3]>,
     /// Largest vertical distance of a post from the triangles.
     pub error_max: f64,
@@ -58,10 +60,25 @@ pub struct Triangulation {
     pub error_rms: f64,
 }
 
-/// Approximates a grid by triangles. The surface that is approximated has two triangles between four neighbouring cell centres,
-/// whose common side runs from north-west to south-east, without those that have a corner without data.
+/// Approximates a grid by triangles. The approximated surface has two triangles between every four neighbouring cell centres, with their
+/// common side from north-west to south-east, except for triangles with a corner without data.
 ///
-/// `None` where that surface has no triangle, and above [`MAX_CELLS`].
+/// ```
+/// use sastrugi_numeric::triangulation::Limits;
+/// use sastrugi_numeric::{Geometry, Grid, triangulate};
+///
+/// let mut heights = Grid::filled(Geometry::square(9, 9, 1.0), 0.0);
+/// let limits = Limits { error_max: 0.1, triangles_max: None };
+/// let flat = triangulate(&heights, &limits).map(|found| found.triangles.len());
+/// assert_eq!(flat, Some(2));
+/// // A rock becomes a vertex.
+/// heights.values[2 * 9 + 6] = 1.0;
+/// let rocky = triangulate(&heights, &limits).ok_or("no surface")?;
+/// assert!(rocky.cells.contains(&(2 * 9 + 6)) && rocky.error_max <= 0.1);
+/// # Ok::<(), &str>(())
+/// ```
+///
+/// `None` if that surface has no triangles, or if the grid has more than [`MAX_CELLS`] cells.
 pub fn triangulate(grid: &Grid, limits: &Limits) -> Option<Triangulation> {
     let g = &grid.geometry;
     if g.rows < 2 || g.cols < 2 || g.len() > MAX_CELLS {
@@ -73,13 +90,13 @@ pub fn triangulate(grid: &Grid, limits: &Limits) -> Option<Triangulation> {
     greedy.finish()
 }
 
-/// The worst post of a triangle.
+/// The post of a triangle with the largest error.
 #[derive(Clone, Copy, Debug)]
 struct Candidate {
     error: f64,
     cell: usize,
     triangle: u32,
-    /// Number of the triangle's change that it belongs to.
+    /// Version of the triangle for which it was computed.
     version: u32,
 }
 
@@ -106,12 +123,12 @@ impl Eq for Candidate {}
 
 struct Greedy<'a> {
     grid: &'a Grid,
-    /// Every cell has data.
+    /// Whether every cell has data.
     complete: bool,
     mesh: Delaunay,
     /// For each cell, whether it is a vertex.
     used: Vec<bool>,
-    /// For each triangle, how often it has changed.
+    /// For each triangle, the number of its changes.
     versions: Vec<u32>,
     worst: BinaryHeap<Candidate>,
 }
@@ -133,7 +150,7 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// Makes all posts around cells without data vertices.
+    /// Inserts all posts around cells without data as vertices.
     fn add_rims(&mut self) {
         if self.complete {
             return;
@@ -151,7 +168,7 @@ impl<'a> Greedy<'a> {
         self.mesh.turn_square_diagonals();
     }
 
-    /// Cells with data in squares of four in which a cell has none, ascending.
+    /// Cells with data that share a square of four cells with one without data, ascending.
     fn rims(&self) -> Vec<usize> {
         let (cols, values) = (self.grid.cols(), &self.grid.values);
         let mut marked = vec![false; values.len()];
@@ -171,7 +188,7 @@ impl<'a> Greedy<'a> {
         self.versions = vec![0; self.mesh.len()];
         for triangle in 0..self.mesh.len() as u32 {
             kept += usize::from(self.is_kept(triangle));
-            self.judge(triangle);
+            self.queue_worst(triangle);
         }
         while let Some(worst) = self.worst.pop() {
             if worst.version != self.versions[worst.triangle as usize] {
@@ -189,13 +206,13 @@ impl<'a> Greedy<'a> {
             self.versions.resize(self.mesh.len(), 0);
             for triangle in self.mesh.take_touched() {
                 self.versions[triangle as usize] += 1;
-                self.judge(triangle);
+                self.queue_worst(triangle);
             }
         }
     }
 
-    /// Queues the worst post of a triangle.
-    fn judge(&mut self, triangle: u32) {
+    /// Queues the post of a triangle with the largest error.
+    fn queue_worst(&mut self, triangle: u32) {
         if !self.is_kept(triangle) {
             return;
         }
@@ -211,7 +228,7 @@ impl<'a> Greedy<'a> {
         }
     }
 
-    /// True for a triangle of the surface; false for one in a hole. It lies wholly in one of them once the rims are vertices.
+    /// True for a triangle of the surface, false for one in a hole. Once the rims are vertices, every triangle lies completely in one of them.
     fn is_kept(&self, triangle: u32) -> bool {
         if self.complete {
             return true;
@@ -221,7 +238,7 @@ impl<'a> Greedy<'a> {
         if !corners.iter().all(|&corner| has_data(corner)) {
             return false;
         }
-        // The square in which the middle of the triangle lies, and three times where in it.
+        // `[x, y]` is three times the centroid of the triangle, which lies in the square at `[west, south]`.
         let [x, y] = [0, 1].map(|axis| corners.iter().map(|corner| corner[axis]).sum::<i64>());
         let [west, south] = [x.div_euclid(3), y.div_euclid(3)];
         if !has_data([west, south + 1]) || !has_data([west + 1, south]) {
@@ -231,7 +248,7 @@ impl<'a> Greedy<'a> {
         has_data(if is_south_west { [west, south] } else { [west + 1, south + 1] })
     }
 
-    /// Every post in a triangle and on its edges, with its vertical distance from the triangle.
+    /// Visits every post inside a triangle or on its edges, with its vertical distance from the triangle.
     fn each_post(&self, triangle: u32, mut visit: impl FnMut(usize, f64)) {
         let corners = self.mesh.triangle(triangle);
         let [z, along_x, along_y] = self.plane(&corners);
@@ -266,7 +283,7 @@ impl<'a> Greedy<'a> {
         [col as i64, (self.grid.rows() - 1 - row) as i64]
     }
 
-    /// The triangles outside of holes, with their errors.
+    /// The triangles outside holes, with their errors.
     fn finish(mut self) -> Option<Triangulation> {
         self.mesh.turn_square_diagonals();
         let kept: Vec<u32> = (0..self.mesh.len() as u32).filter(|&triangle| self.is_kept(triangle)).collect();
@@ -286,7 +303,7 @@ impl<'a> Greedy<'a> {
         Some(Triangulation { cells, triangles, error_max, error_rms })
     }
 
-    /// Largest and root mean square distance of all posts of these triangles, each counted once.
+    /// Largest and root mean square vertical distance of all posts of these triangles, each counted once.
     fn errors(&self, triangles: &[u32]) -> (f64, f64) {
         let mut counted = vec![false; self.used.len()];
         let (mut largest, mut squares, mut count) = (0.0_f64, 0.0, 0_u64);
@@ -303,7 +320,7 @@ impl<'a> Greedy<'a> {
     }
 }
 
-/// First and last column of a triangle, counter-clockwise, in a row that it reaches; the last may come before the first.
+/// First and last column of a counter-clockwise triangle in a row that it crosses; the last may be less than the first.
 fn span(corners: &[Point; 3], y: i64) -> (i64, i64) {
     let (mut first, mut last) = (i64::MIN, i64::MAX);
     for (a, b) in [(0, 1), (1, 2), (2, 0)].map(|(from, to)| (corners[from], corners[to])) {

@@ -20,7 +20,7 @@ fn limits(error_max: f64) -> Limits {
     Limits { error_max, triangles_max: None }
 }
 
-/// The triangles of the surface between neighbouring cells, as sets of cells.
+/// The triangles of the complete surface between neighbouring cells, as sets of cells.
 fn whole(grid: &Grid) -> BTreeSet<BTreeSet<usize>> {
     let cols = grid.cols();
     let squares = (1..grid.rows()).flat_map(|row| (1..cols).map(move |col| row * cols + col));
@@ -35,7 +35,7 @@ fn corners(found: &Triangulation) -> Vec<[usize; 3]> {
     found.triangles.iter().map(|triangle| triangle.map(|corner| found.cells[corner as usize])).collect()
 }
 
-/// Largest and root mean square distance of all posts, each of which is looked for in every triangle, in metres.
+/// Largest and root mean square vertical distance of all posts, by searching every triangle for each of them, in metres.
 fn slow_errors(grid: &Grid, found: &Triangulation) -> (f64, f64, usize) {
     let g = &grid.geometry;
     let place = |cell: usize| [g.x(cell % g.cols), g.y(cell / g.cols), grid.values[cell]];
@@ -57,7 +57,7 @@ fn slow_errors(grid: &Grid, found: &Triangulation) -> (f64, f64, usize) {
     (largest, (squares / errors.len().max(1) as f64).sqrt(), errors.len())
 }
 
-/// Area of all triangles in half cells; every one of them looks up.
+/// Total area of the triangles in half cells; checks that each of them faces up.
 fn half_cells(grid: &Grid, found: &Triangulation) -> i64 {
     let point = |cell: usize| [(cell % grid.cols()) as i64, (grid.rows() - 1 - cell / grid.cols()) as i64];
     let areas = corners(found).into_iter().map(|cells| doubled_area(cells.map(point)));
@@ -72,7 +72,7 @@ fn val_a_plane_takes_two_triangles() {
     assert!(found.error_max < 1e-9 && found.error_rms <= found.error_max);
 }
 
-/// The error that is stated is that of a slow evaluation, below the limit, and a smaller limit takes more triangles.
+/// The reported errors equal those of a slow evaluation and stay below the limit, and a smaller limit needs more triangles.
 #[test]
 fn val_errors_are_those_of_every_post() {
     let ground = bumpy(41, 60);
@@ -90,7 +90,7 @@ fn val_errors_are_those_of_every_post() {
     assert!(before < 2 * 40 * 59);
 }
 
-/// As many triangles as allowed, or one less; with both limits, the first that is met decides.
+/// The number of triangles is the maximum or one less; with both limits, the one met first applies.
 #[test]
 fn val_a_number_of_triangles() {
     let ground = bumpy(33, 20);
@@ -102,15 +102,36 @@ fn val_a_number_of_triangles() {
     assert_eq!(both, triangulate(&ground, &limits(0.3)).unwrap());
 }
 
+/// Of equal spikes in different triangles, the northern one is inserted first; in one triangle, the southern one.
+#[test]
+fn val_equal_errors_have_a_fixed_order() {
+    let limits = Limits { error_max: 0.0, triangles_max: Some(4) };
+    for (spikes, first) in [([[2, 6], [6, 2]], 24), ([[2, 6], [3, 7]], 34)] {
+        let spiked = grid(9, 9, |row, col| if spikes.contains(&[row, col]) { 1.0 } else { 0.0 });
+        let found = triangulate(&spiked, &limits).unwrap();
+        assert_eq!((found.cells, found.triangles.len()), (vec![0, 8, first, 72, 80], 4));
+    }
+}
+
+/// One spike of 1 m among 25 posts, on the common edge of both triangles, counts once.
+#[test]
+fn val_errors_of_one_spike() {
+    let spiked = grid(5, 5, |row, col| if [row, col] == [2, 2] { 1.0 } else { 0.0 });
+    let found = triangulate(&spiked, &Limits { error_max: 0.0, triangles_max: Some(2) }).unwrap();
+    assert_eq!((found.triangles.len(), found.error_max), (2, 1.0));
+    assert!((found.error_rms - 0.2).abs() < 1e-15);
+}
+
 #[test]
 fn val_no_surface() {
     let found = |grid: Grid| triangulate(&grid, &limits(0.1));
+    assert_eq!(found(grid(2, 2, |_, _| 1.0)).map(|found| found.triangles.len()), Some(2));
     assert_eq!(found(grid(1, 5, |_, _| 1.0)), None);
     assert_eq!(found(grid(5, 1, |_, _| 1.0)), None);
     assert_eq!(found(grid(4, 4, |row, col| if (row + col) % 2 == 0 { 1.0 } else { f64::NAN })), None);
 }
 
-/// A pit in a plain: the hole and its rim stay, the plain around takes little.
+/// A hole in a flat surface: the hole and its rim are preserved, and the flat part needs few triangles.
 #[test]
 fn val_holes_stay_holes() {
     let pitted =
@@ -122,8 +143,8 @@ fn val_holes_stay_holes() {
 }
 
 proptest! {
-    /// Whatever the size, the heights and the holes: no limit gives the whole surface again, a limit holds, the triangles cover what
-    /// the whole surface covers, and the same call gives the same triangles.
+    /// For any size, heights and holes: an error limit of 0 reproduces the complete surface, other limits are met, the triangles cover the same
+    /// area as the complete surface, and the same call gives the same triangles.
     #[test]
     fn prop_limits_hold_around_any_holes(
         rows in 2_usize..12,

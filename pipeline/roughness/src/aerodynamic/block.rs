@@ -1,4 +1,4 @@
-//! Sums over blocks of the raster: everything that z0 is made of adds up, so that a block can be left out.
+//! Sums over blocks of the raster. All inputs of z0 are additive, so the jackknife can leave out a block.
 
 use super::crossings::{self, Profiled};
 use super::partition::SIDE;
@@ -47,7 +47,7 @@ impl Sums {
         }
     }
 
-    /// Sum of the blocks, of all but one where one is left out.
+    /// Sum of all blocks, or of all but `left_out`.
     pub fn without(blocks: &[Self], left_out: Option<usize>, directions: usize) -> Self {
         let mut total = Self::zero(directions);
         blocks.iter().enumerate().filter(|(k, _)| Some(*k) != left_out).for_each(|(_, block)| total.add(block));
@@ -62,11 +62,11 @@ impl Sums {
     pub fn sigma_m(&self) -> f64 {
         let mean = self.height / self.cells;
         let variance = self.square / self.cells - mean * mean;
-        // A rounding error may lie below zero.
+        // Rounding may give a value below zero.
         if variance < 0.0 { 0.0 } else { variance.sqrt() }
     }
 
-    /// Height of the obstacles, m.
+    /// Effective height of the obstacles, m.
     pub fn obstacle_height_m(&self, kind: ObstacleHeight) -> f64 {
         match kind {
             ObstacleHeight::TwoSigma => 2.0 * self.sigma_m(),

@@ -1,9 +1,9 @@
 //! Upcrossings of the mean level along the wind.
 //!
-//! Profiles are parallel lines one cell apart. A line steps from column to column, or from row to row where that is the finer
-//! step along the wind, and takes heights between two cells of a column by linear interpolation: the bilinear surface there.
-//! Lines are placed about the middle of the raster, so that a turned raster has the turned lines. Counts are whole numbers: the
-//! order of adding them changes nothing.
+//! Profiles are parallel lines one cell apart. A line steps from column to column, or from row to row if that is the finer
+//! step along the wind, and interpolates heights linearly between two cells of a column, where the bilinear surface is linear.
+//! Lines are placed about the middle of the raster, so that rotating the raster rotates the lines. Counts are integers, so the
+//! order of summation does not matter.
 
 use super::Wind;
 use super::partition::{SIDE, block_of};
@@ -11,12 +11,12 @@ use crate::band::transposed;
 use rayon::prelude::*;
 use sastrugi_numeric::Grid;
 
-/// Heights below this share of the standard deviation have no sign: rounding is not an obstacle.
+/// Heights below this share of the standard deviation have no sign, so that rounding errors do not count as obstacles.
 const SIGN_MIN: f64 = 1e-6;
-/// A place this close to a cell's centre, in cells, is the centre.
+/// A point this close to a cell's centre, in cells, counts as the centre.
 const CENTRE_TOLERANCE: f64 = 1e-9;
 
-/// What profiles through one block, or several, meet.
+/// Crossings and steps of the profiles through one block, or several.
 #[derive(Clone, Copy, Debug, Default)]
 pub(super) struct Profiled {
     /// Upcrossings and downcrossings.
@@ -40,7 +40,7 @@ impl Profiled {
 
 type Blocks = [Profiled; SIDE * SIDE];
 
-/// What profiles along each wind meet, block by block.
+/// Crossings and steps of the profiles along each wind, block by block.
 pub(super) fn along(surface: &Grid, winds: &[Wind], sigma_m: f64) -> Vec<Blocks> {
     let (rows, cols) = (surface.rows(), surface.cols());
     let threshold_m = SIGN_MIN * sigma_m;
@@ -49,7 +49,7 @@ pub(super) fn along(surface: &Grid, winds: &[Wind], sigma_m: f64) -> Vec<Blocks>
     let by_col = Lines { values: &turned, rows: cols, cols: rows, threshold_m };
     let [east_m, north_m] = surface.geometry.cell;
     let of_wind = |wind: &Wind| {
-        // Columns and rows (southwards) that a metre towards the wind's origin crosses.
+        // Columns and rows (southwards) crossed per metre towards the wind's origin.
         let [cols_per_m, rows_per_m] = [wind.sin / east_m, -wind.cos / north_m];
         if cols_per_m.abs() >= rows_per_m.abs() {
             by_row.blocks(rows_per_m / cols_per_m, 1.0 / cols_per_m.abs())
@@ -70,7 +70,7 @@ struct Lines<'a> {
 }
 
 impl Lines<'_> {
-    /// What the lines meet that advance by `slope` rows (at most 1 either way) and `step_m` metres a column.
+    /// Counts along lines that advance by `slope` rows (at most 1 either way) and `step_m` metres per column.
     fn blocks(&self, slope: f64, step_m: f64) -> Blocks {
         let middle = 0.5 * (self.cols as f64 - 1.0);
         let beyond = (slope.abs() * middle).ceil() as i64;
@@ -85,7 +85,7 @@ impl Lines<'_> {
         counts.map(|[crossings, steps]| Profiled { crossings, steps, step_m })
     }
 
-    /// Adds crossings and steps of one line, given as the row by the column, to the blocks.
+    /// Adds crossings and steps of one line, given as row over column, to the blocks.
     fn follow(&self, row_at: impl Fn(usize) -> f64, counts: &mut [[u64; 2]; SIDE * SIDE]) {
         let mut above: Option<bool> = None;
         let mut before = false;
@@ -105,7 +105,7 @@ impl Lines<'_> {
         }
     }
 
-    /// Height at a place between two cells of a column; none in a hole and beyond the raster.
+    /// Height at a point between two cells of a column; `None` in a hole or beyond the raster.
     fn height(&self, row: f64, col: usize) -> Option<f64> {
         let nearest = row.round();
         let on_centre = (row - nearest).abs() < CENTRE_TOLERANCE;

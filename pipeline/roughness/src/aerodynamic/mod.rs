@@ -1,29 +1,29 @@
-//! Aerodynamic roughness length z0 by wind direction, from the shape of the surface alone.
+//! Aerodynamic roughness length z0 by wind direction, from surface geometry alone.
 //!
 //! # What
 //! z0 is the height at which the logarithmic wind profile `u = (u* / kappa) ln((z - d) / z0)` reaches zero. It is estimated
-//! here from obstacle height, frontal area and obstacle spacing of a detrended heightfield, for wind from any azimuth, by
+//! here from obstacle height, frontal area and obstacle spacing of a detrended surface, for wind from any azimuth, by
 //! three published formulas: [`lettau_z0_m`], [`munro_z0_m`] and [`macdonald_z0_m`].
 //!
 //! # Formulas
-//! z' is the height above the least-squares plane, less its centred moving average over the outer scale where one is given,
-//! less its mean. At borders and holes, where a window is incomplete, the local plane stands for its mean
-//! ([`crate::background`]): the mean of such a window lies off its centre, and on the flanks of a hill or hollow slope times offset
-//! would count as roughness. The wind blows from azimuth theta, in degrees clockwise from grid north (+y); the unit vector
-//! towards its origin is `w = (sin theta, cos theta)`.
+//! z' is the height above the least-squares plane, minus its centred moving average over the outer scale if one is given,
+//! minus its mean. At borders and holes, where a window is incomplete, the local plane replaces the mean
+//! ([`crate::background`]): the centroid of such a window is off its centre, and on the flanks of a hill or hollow slope times
+//! offset would count as roughness. The wind blows from azimuth theta, in degrees clockwise from grid north (+y); the unit
+//! vector towards its origin is `w = (sin theta, cos theta)`.
 //!
 //! | symbol | meaning |
 //! |---|---|
-//! | lambda_f | frontal-area index: windward faces projected on the plane normal to the wind, per ground area (1): `mean of max(0, -(g_x sin theta + g_y cos theta))` |
+//! | lambda_f | frontal-area index: windward faces projected onto the plane normal to the wind, per ground area (1): `mean of max(0, -(g_x sin theta + g_y cos theta))` |
 //! | g | gradient of the bilinear surface at the centre of the patch between four cell centres, m/m: `g_x = (z_ne + z_se - z_nw - z_sw) / (2 dx)`, `g_y = (z_nw + z_ne - z_sw - z_se) / (2 dy)` |
 //! | sigma_d | standard deviation of z', m |
 //! | h* | effective obstacle height, m: [`ObstacleHeight`] |
 //! | f / X | upcrossings of the mean level per metre of profile along the wind, 1/m |
 //! | lambda_p | plan-area index of Macdonald et al. (1) |
 //!
-//! A patch with a hole counts neither as face nor as ground; a profile ends at a hole and starts anew behind it.
+//! A patch with a hole counts neither as face nor as ground; a profile ends at a hole and restarts after it.
 //!
-//! * Lettau: `z0 = 0.5 h* s / S = 0.5 h* lambda_f`, s the silhouette area of an obstacle, S its ground area.
+//! * Lettau: `z0 = 0.5 h* s / S = 0.5 h* lambda_f`, with s the silhouette area of an obstacle and S its ground area.
 //! * Munro: obstacles of height `h* = 2 sigma_d` and width `X / (2 f)`, each on ground `(X / f)^2`; so `s = h* X / (2 f)` and
 //!   `z0 = 0.5 h* s / S = f h*^2 / (4 X) = f sigma_d^2 / X`.
 //! * Macdonald et al.: `z_d / h = 1 + A^-lambda_p (lambda_p - 1)` and
@@ -37,30 +37,30 @@
 //!   doi:10.1016/S1352-2310(97)00403-2, Eq. 23 (z_d) and 26 (z0).
 //!
 //! # Where we depart
-//! * Faces of the whole surface are counted, as in raster versions of Lettau's formula (after Smith et al. 2016, J. Geophys.
-//!   Res. Earth Surf. 121, 748-766), below the mean level too, and whether sheltered or not.
+//! * Faces of the entire surface are counted, as in raster versions of Lettau's formula (after Smith et al. 2016, J. Geophys.
+//!   Res. Earth Surf. 121, 748-766), including those below the mean level and sheltered ones.
 //! * sigma_d and the zero level are those of the surface, not of each profile, so that short pieces of profile between holes
-//!   weigh by their length. Upcrossings and downcrossings are averaged: opposite winds get the same f.
-//! * Profiles run along the wind, so that a row describes what the wind meets. Profiles in the field are often laid across the
-//!   wind: their value stands in the row 90 degrees on.
+//!   are weighted by their length. Upcrossings and downcrossings are averaged: opposite winds get the same f.
+//! * Profiles run along the wind, so that a row describes what the wind meets. Field profiles are often laid across the wind:
+//!   their value is in the row 90 degrees on.
 //! * A continuous surface has no plan area of obstacles. lambda_p is set to lambda_f, as it is for cubes, and h to h*; drag
 //!   models of ice use one density for both (after van Tiggelen et al. 2021, The Cryosphere 15, 2601,
 //!   doi:10.5194/tc-15-2601-2021). The share of ground above the mean level, about one half whatever the slope, would put z_d
 //!   at 0.76 h and lower z0 by a factor of 15 at lambda_f = 0.1. C_D is that of cubes; rounded forms have less drag.
 //!
 //! # Uncertainty
-//! Standard errors are by the delete-one jackknife over 4 x 4 blocks of the raster. They hold sampling of the plot alone, and
-//! only where a block is wider than the surface's correlation length; the spread between formulas is usually larger.
+//! Standard errors come from the delete-one jackknife over 4 x 4 blocks of the raster. They cover only sampling of the plot, and
+//! are valid only if a block is wider than the surface's correlation length; the spread between formulas is usually larger.
 //!
 //! # Limits
-//! * Roughness finer than a cell is not seen, and lambda_f and f rise as cells shrink: compare z0 at equal cells only.
-//! * h* rises with the outer scale, or with the plot where none is given.
+//! * Roughness finer than a cell is not resolved, and lambda_f and f rise as cells shrink: compare z0 only at equal cells.
+//! * h* rises with the outer scale, or with the plot size if none is given.
 //! * Above lambda_f of about 0.2 to 0.3 obstacles shelter one another: Lettau's formula, which has no sheltering, is too high.
-//! * Noise of the heights counts as roughness.
-//! * lambda_f of opposite winds differs by the mean slope between the two: none on a whole plot. Where it does differ, holes
-//!   hide one side of the obstacles (a scanner's shadows), or a wave longer than the plot is left.
+//! * Height noise counts as roughness.
+//! * lambda_f of opposite winds differs by the mean slope between them, which is zero on a complete plot. Where it does differ,
+//!   holes hide one side of the obstacles (scanner shadows), or a wave longer than the plot remains.
 //!
-//! Cost: one pass over the cells for lambda_f, one for f, times the number of directions; two copies of the grid.
+//! Cost: one pass over the cells for lambda_f and one for f, times the number of directions; two copies of the grid.
 
 mod block;
 mod crossings;
@@ -84,8 +84,8 @@ const SHELTERING_INDEX: f64 = 0.25;
 /// Fewest cells across the window of the moving average.
 const OUTER_CELLS_MIN: usize = 3;
 
-/// What stands for the height of the obstacles on a continuous surface, in the formulas of Lettau and Macdonald et al. (Munro's
-/// is always of [`ObstacleHeight::TwoSigma`]).
+/// Effective obstacle height of a continuous surface in the formulas of Lettau and Macdonald et al. (Munro's always uses
+/// [`ObstacleHeight::TwoSigma`]).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "snake_case")]
 pub enum ObstacleHeight {
@@ -96,14 +96,14 @@ pub enum ObstacleHeight {
     MeanAbove,
 }
 
-/// For which wind, and by which detrending.
+/// Wind directions, detrending and obstacle height.
 #[derive(Clone, Debug, PartialEq)]
 pub struct WindSettings {
     /// Azimuths that the wind blows from, degrees clockwise from grid north.
     pub azimuths_deg: Vec<f64>,
-    /// Width of the moving average that is taken off after the plane, m; the plane alone when not given.
+    /// Width of the moving average subtracted after the plane, m; `None` subtracts only the plane.
     pub outer_scale_m: Option<f64>,
-    /// Height of the obstacles.
+    /// Definition of the obstacle height.
     pub obstacle_height: ObstacleHeight,
 }
 
@@ -116,38 +116,38 @@ impl WindSettings {
     }
 }
 
-/// Why there is no aerodynamic roughness.
+/// Invalid settings for aerodynamic roughness.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum WindError {
-    /// No azimuth is given.
-    #[error("at least one wind direction is needed")]
+    /// No azimuth was given.
+    #[error("at least one wind direction is required")]
     NoDirection,
     /// An azimuth is not finite.
-    #[error("a wind direction must be a finite number of degrees, got {azimuth_deg}")]
+    #[error("wind direction must be a finite number of degrees, got {azimuth_deg}")]
     Azimuth {
-        /// What was given, degrees.
+        /// Offending value, degrees.
         azimuth_deg: f64,
     },
     /// The outer scale is not a positive, finite length.
-    #[error("the outer scale must be a positive length, got {outer_scale_m} m")]
+    #[error("outer scale must be a positive length, got {outer_scale_m} m")]
     OuterScale {
-        /// What was given, m.
+        /// Offending value, m.
         outer_scale_m: f64,
     },
     /// The outer scale does not span enough cells.
-    #[error("an outer scale of {outer_scale_m} m is too narrow: it must span at least 3 cells, {needed_m} m")]
+    #[error("an outer scale of {outer_scale_m} m is too narrow: it must span at least 3 cells ({needed_m} m)")]
     Narrow {
-        /// What was given, m.
+        /// Offending value, m.
         outer_scale_m: f64,
-        /// Three cells, m.
+        /// Width of three cells, m.
         needed_m: f64,
     },
-    /// The moving average is defined nowhere.
+    /// The moving average is undefined everywhere.
     #[error(
-        "an outer scale of {outer_scale_m} m is too wide: no window of that width on this surface of {x_m} x {y_m} m is more than half full"
+        "an outer scale of {outer_scale_m} m is too wide for a surface of {x_m} x {y_m} m: no window is more than half full"
     )]
     Wide {
-        /// What was given, m.
+        /// Offending value, m.
         outer_scale_m: f64,
         /// Extent east-west, m.
         x_m: f64,
@@ -156,7 +156,7 @@ pub enum WindError {
     },
 }
 
-/// Measures of one wind direction, or their means over several. NaN where the surface defines none.
+/// Measures for one wind direction, or their means over several. NaN where undefined.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WindMeasures {
     /// Frontal-area index lambda_f.
@@ -188,16 +188,16 @@ pub struct WindEstimate {
     /// The measures.
     #[serde(flatten)]
     pub measures: WindMeasures,
-    /// Their standard errors; NaN with fewer than two blocks of data.
+    /// Standard errors; NaN with fewer than two blocks of data.
     pub standard_errors: WindMeasures,
 }
 
-/// Measures of one wind direction.
+/// Measures for one wind direction.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
 pub struct WindDirection {
-    /// Where the wind blows from, degrees clockwise from grid north, from 0 to below 360.
+    /// Azimuth that the wind blows from, degrees clockwise from grid north, in [0, 360).
     pub azimuth_deg: f64,
-    /// What it meets.
+    /// Measures for this direction, with standard errors.
     #[serde(flatten)]
     pub estimate: WindEstimate,
 }
@@ -205,31 +205,47 @@ pub struct WindDirection {
 /// Aerodynamic roughness of a surface.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct AerodynamicRoughness {
-    /// Cell, east-west and north-south, m.
+    /// Cell size, east-west and north-south, m.
     pub cell_m: [f64; 2],
-    /// True width of the moving average, east-west and north-south, m; none where the plane alone is taken off.
+    /// Actual width of the moving average, east-west and north-south, m; `None` if only the plane was subtracted.
     pub outer_scale_m: Option<[f64; 2]>,
     /// Standard deviation of the detrended heights, m.
     pub sigma_m: f64,
-    /// What stands for the height of the obstacles.
+    /// Definition of the obstacle height.
     pub obstacle_height: ObstacleHeight,
-    /// That height h*, m.
+    /// Obstacle height h*, m.
     pub obstacle_height_m: f64,
-    /// Blocks of the raster with data, for the standard errors.
+    /// Number of raster blocks with data, over which standard errors are computed.
     pub blocks: usize,
-    /// One entry for each direction, as given.
+    /// One entry for each direction, in the order given.
     pub directions: Vec<WindDirection>,
     /// Arithmetic means over these directions.
     pub mean: WindEstimate,
-    /// What to bear in mind.
+    /// Caveats.
     pub notes: Vec<String>,
 }
 
 /// Aerodynamic roughness of a DEM by wind direction.
 ///
 /// # Errors
-/// No direction, a direction that is not finite, an outer scale that is not positive and finite, of less than 3 cells, or too
-/// wide for the surface.
+/// No direction; a direction that is not finite; an outer scale that is not positive and finite, spans fewer than 3 cells, or
+/// is too wide for the surface.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::{WindSettings, aerodynamic_roughness};
+///
+/// // Ridges 2 m apart that run from north to south, 2 cm high: wind from the east meets faces of 2 cm every 2 m, wind from the north none.
+/// let zigzag = |k: usize| if k % 40 < 20 { k % 40 } else { 40 - k % 40 };
+/// let dem = Grid::new(Geometry::square(41, 81, 0.05), (0..41 * 81).map(|k| 0.001 * zigzag(k % 81) as f64).collect());
+/// let settings = WindSettings { azimuths_deg: vec![90.0, 0.0], ..WindSettings::sectors(1) };
+/// let found = aerodynamic_roughness(&dem, &settings)?;
+/// let [east, north] = [0, 1].map(|k| found.directions[k].estimate.measures);
+/// assert!((east.frontal_area_index - 0.01).abs() < 1e-9 && north.frontal_area_index < 1e-9);
+/// assert!((east.z0_lettau_m - 0.5 * found.obstacle_height_m * 0.01).abs() < 1e-9);
+/// # Ok::<(), sastrugi_roughness::WindError>(())
+/// ```
 pub fn aerodynamic_roughness(dem: &Grid, settings: &WindSettings) -> Result<AerodynamicRoughness, WindError> {
     let winds = winds(&settings.azimuths_deg)?;
     let (surface, outer_scale_m) = detrended(dem, settings.outer_scale_m)?;
@@ -266,7 +282,7 @@ pub fn aerodynamic_roughness(dem: &Grid, settings: &WindSettings) -> Result<Aero
     Ok(roughness)
 }
 
-/// A direction of wind.
+/// A wind direction.
 #[derive(Clone, Copy, Debug)]
 struct Wind {
     azimuth_deg: f64,
@@ -282,7 +298,7 @@ fn winds(azimuths_deg: &[f64]) -> Result<Vec<Wind>, WindError> {
         if !given.is_finite() {
             return Err(WindError::Azimuth { azimuth_deg: given });
         }
-        // A negative rounding error becomes 360, which is north.
+        // `rem_euclid` turns a tiny negative azimuth into 360, which is north.
         let azimuth_deg = Some(given.rem_euclid(360.0)).filter(|&a| a < 360.0).unwrap_or(0.0);
         let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
         Ok(Wind { azimuth_deg, sin, cos })
@@ -290,7 +306,7 @@ fn winds(azimuths_deg: &[f64]) -> Result<Vec<Wind>, WindError> {
     azimuths_deg.iter().map(wind).collect()
 }
 
-/// Heights above the plane, and above the moving average where one is asked for, with mean 0; and the true width of that average.
+/// Heights above the plane, and above the moving average if one is given, with mean 0; and the actual width of that average.
 fn detrended(dem: &Grid, outer_scale_m: Option<f64>) -> Result<(Grid, Option<[f64; 2]>), WindError> {
     let levelled = level(dem);
     let Some(outer_scale_m) = outer_scale_m else { return Ok((centred(&levelled), None)) };
@@ -317,7 +333,7 @@ fn centred(surface: &Grid) -> Grid {
     surface.map(|z| z - mean)
 }
 
-/// The measures of each direction, then their means.
+/// Measures for each direction, followed by their means.
 fn measures(sums: &Sums, obstacle_height: ObstacleHeight) -> Vec<WindMeasures> {
     let (height_m, two_sigma_m) = (sums.obstacle_height_m(obstacle_height), 2.0 * sums.sigma_m());
     let of_direction = |k: usize| {
@@ -335,7 +351,7 @@ fn measures(sums: &Sums, obstacle_height: ObstacleHeight) -> Vec<WindMeasures> {
     rows
 }
 
-/// A statistic of each measure.
+/// Applies a statistic to each measure.
 fn each(rows: &[WindMeasures], statistic: impl Fn(&[f64]) -> f64) -> WindMeasures {
     let column = |k: usize| rows.iter().map(|row| row.to_array()[k]).collect::<Vec<f64>>();
     WindMeasures::from_array(std::array::from_fn(|k| statistic(&column(k))))
@@ -349,26 +365,26 @@ fn jackknife(others: &[WindMeasures]) -> WindMeasures {
 
 fn notes(roughness: &AerodynamicRoughness) -> Vec<String> {
     let [x_m, y_m] = roughness.cell_m;
-    let widest = match roughness.outer_scale_m {
+    let reference = match roughness.outer_scale_m {
         Some([x_m, y_m]) => format!("a moving average over {x_m:.4} x {y_m:.4} m"),
         None => "the least-squares plane alone".to_owned(),
     };
     let mut notes = vec![format!(
-        "z0 holds for cells of {x_m:.4} x {y_m:.4} m and heights above {widest}: finer cells raise lambda_f, a wider outer scale raises h*"
+        "z0 holds for cells of {x_m:.4} x {y_m:.4} m and heights above {reference}: finer cells raise lambda_f, a wider outer scale raises h*"
     )];
     let indices = roughness.directions.iter().map(|direction| direction.estimate.measures.frontal_area_index);
     let largest = indices.fold(f64::NAN, f64::max);
     if largest > SHELTERING_INDEX {
         notes.push(format!(
-            "lambda_f reaches {largest:.2}: above about {SHELTERING_INDEX} obstacles shelter one another, and Lettau's z0 is too high"
+            "lambda_f reaches {largest:.2}: above about {SHELTERING_INDEX}, obstacles shelter one another and Lettau's z0 is too high"
         ));
     }
     if roughness.sigma_m.is_nan() {
-        notes.push("no cell is left for z0".to_owned());
+        notes.push("z0 is undefined: no cells with data are left after detrending".to_owned());
     } else if largest.is_nan() {
-        notes.push("lambda_f takes four neighbouring cells with data, and there are none".to_owned());
+        notes.push("lambda_f is undefined: it requires a 2 x 2 group of cells with data".to_owned());
     } else if roughness.blocks < 2 {
-        notes.push("data in a single block of the raster: no standard errors".to_owned());
+        notes.push("no standard errors: only one block of the raster has data".to_owned());
     }
     notes
 }

@@ -1,9 +1,9 @@
 //! Partition of a raster into blocks.
 
-/// Blocks along either side.
+/// Blocks along each side.
 pub(super) const SIDE: usize = 4;
 
-/// Block of a cell, row by row.
+/// Row-major index of the block that holds a cell.
 pub(super) fn block_of(row: usize, col: usize, rows: usize, cols: usize) -> usize {
     (row * SIDE / rows) * SIDE + col * SIDE / cols
 }

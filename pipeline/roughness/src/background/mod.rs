@@ -1,23 +1,24 @@
-//! Background of a raster with holes: moving average where a window is complete, local plane where it is not.
+//! Background of a raster with holes: moving average where the window is complete, local plane where it is not.
 //!
-//! `background(i) = sum of w(j) z(j)` over the cells j with data in the centred box window of cell i. Cells beyond the border have
-//! no data.
+//! `background(i) = sum of w(j) z(j)` over the cells j with data in the centred box window of cell i. Cells beyond the border
+//! count as no data.
 //!
 //! * Complete windows: `w = 1 / n`, the box mean.
-//! * Partial windows (border, holes), [`AtPartial::Plane`]: the least-squares plane through the window's cells, at its centre,
-//!   `w(j) = (1, 0, 0) M^-1 (1, dx, dy)`, `M = sum of (1, dx, dy)' (1, dx, dy)`, dx and dy the offset of j from i (local linear
-//!   regression: Fan and Gijbels, 1996, section 2.3). The mean of a partial window lies off its centre, so that on a slope it
-//!   is off by slope times offset; planes pass through this background exactly, and where a window is complete the two agree.
+//! * Partial windows (border, holes), [`AtPartial::Plane`]: height at the centre of the least-squares plane through the window's
+//!   cells, `w(j) = (1, 0, 0) M^-1 (1, dx, dy)`, `M = sum of (1, dx, dy)' (1, dx, dy)`, with dx and dy the offset of j from i
+//!   (local linear regression: Fan and Gijbels, 1996, section 2.3). The mean of a partial window belongs to the centroid of
+//!   its cells, not to its centre, and on a slope is off by slope times offset. The plane reproduces slopes exactly; in a complete
+//!   window the two agree.
 //! * [`AtPartial::Mean`]: the plain mean of the window's cells, as published (Vecherin et al., 2022).
 //!
 //! The variance of the regression is `sum of w^2` times that of white heights: `1 / n` for a complete window, `4 / n` for one
-//! cut by a straight border through its centre, `7 / n` in a corner. Beyond [`LEVERAGE_MAX`]` / n`, where the data lies to one side and
-//! the plane is extrapolated, there is no background.
+//! cut by a straight border through its centre, `7 / n` in a corner. Beyond [`LEVERAGE_MAX`]` / n`, where the data lies to one
+//! side and the plane is extrapolated, the background is undefined.
 //!
-//! The box is an odd number of cells wide each way, so that it has a centre. Cost: two running sums for each cell with a
-//! complete window, nine for the others, whatever the window (down the columns, then along the rows, started afresh on every
-//! band of rows so that neither rounding nor the number of threads shows). Memory: 12 bytes per cell of result and seven rows
-//! per band.
+//! The box is an odd number of cells wide each way, so that it has a centre cell. Cost: two running sums for each cell with a
+//! complete window, nine for the others, whatever the window size. Sums run down the columns, then along the rows, and restart
+//! on every band of rows, so that rounding errors do not accumulate and the result does not depend on the number of threads.
+//! Memory: 12 bytes per cell of result, and seven rows per band.
 
 mod moments;
 mod running;
@@ -29,21 +30,21 @@ use rayon::prelude::*;
 use sastrugi_numeric::Grid;
 use std::borrow::Cow;
 
-/// Bands are at least this many rows, and four times the window.
+/// A band has at least this many rows, and at least four times the window's.
 const BAND_ROWS: usize = 64;
-/// Largest variance of a background that is used, as a multiple of that of the mean of as many cells: corners have 7.
+/// Largest accepted variance of a background, as a multiple of that of the mean of the same number of cells; corners have 7.
 pub const LEVERAGE_MAX: f64 = 8.0;
 
-/// What the background of a partial window is.
+/// Background of a partial window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum AtPartial {
-    /// The mean of its cells with data.
+    /// Mean of the cells with data.
     Mean,
-    /// The least-squares plane through them, at the centre.
+    /// Least-squares plane through the cells with data, evaluated at the centre.
     Plane,
 }
 
-/// A centred box of an odd number of cells each way.
+/// A centred box, an odd number of cells wide each way.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct BoxWindow {
     /// Cells on each side of the centre, north-south and east-west.
@@ -75,8 +76,14 @@ impl BoxWindow {
     }
 }
 
-/// Odd number of cells nearest to `size_m / cell_m`, at least 1; beyond the whole numbers that a float can count, that
-/// many.
+/// Odd number of cells nearest to `size_m / cell_m`, at least 1 and at most 2e9 + 1.
+///
+/// # Examples
+/// ```
+/// use sastrugi_roughness::odd_cells;
+///
+/// assert_eq!([odd_cells(2.0, 0.06), odd_cells(2.0, 0.1), odd_cells(0.0, 0.1)], [33, 21, 1]);
+/// ```
 pub fn odd_cells(size_m: f64, cell_m: f64) -> usize {
     let half = ((size_m / cell_m - 1.0) / 2.0).round().clamp(0.0, 1e9);
     2 * half as usize + 1
@@ -85,13 +92,27 @@ pub fn odd_cells(size_m: f64, cell_m: f64) -> usize {
 /// Background of a raster.
 #[derive(Clone, Debug)]
 pub struct Background {
-    /// Height of the background, m; NaN where the window has no data, or too little around its centre. Row-major.
+    /// Height of the background, m, row-major; NaN where the window has no data, or too little around its centre.
     pub height_m: Vec<f64>,
-    /// Number of the window's cells with data.
+    /// Number of cells with data in the window.
     pub count: Vec<u32>,
 }
 
-/// Background of row-major `values` in rows of `cols`; NaN is no data.
+/// Background of row-major `values` in rows of `cols`; NaN means no data.
+///
+/// # Examples
+/// ```
+/// use sastrugi_roughness::background::{AtPartial, BoxWindow, background};
+///
+/// // One row that rises by 1 per cell, and a window of three cells: at the ends, where two are left, their mean is off by half a cell's
+/// // rise, and the line through them is not.
+/// let row = [0.0, 1.0, 2.0, 3.0];
+/// let window = BoxWindow { half: [0, 1] };
+/// assert_eq!(background(&row, 4, window, AtPartial::Mean).height_m, [0.5, 1.0, 2.0, 2.5]);
+/// let plane = background(&row, 4, window, AtPartial::Plane);
+/// assert_eq!(plane.count, [2, 3, 3, 2]);
+/// assert!(plane.height_m.iter().zip(row).all(|(found, z)| (found - z).abs() < 1e-12));
+/// ```
 pub fn background(values: &[f64], cols: usize, window: BoxWindow, at_partial: AtPartial) -> Background {
     let mut height_m = vec![0.0; values.len()];
     let mut count = vec![0; values.len()];
@@ -104,8 +125,8 @@ pub fn background(values: &[f64], cols: usize, window: BoxWindow, at_partial: At
     Background { height_m, count }
 }
 
-/// Background of the cells with data whose window is more than `filled_share_min` full; NaN elsewhere. Infinite values are
-/// no data.
+/// Background of the cells with data whose window is more than `filled_share_min` full; NaN elsewhere. Infinite values count
+/// as no data.
 pub(crate) fn background_of(dem: &Grid, window: BoxWindow, at_partial: AtPartial, filled_share_min: f64) -> Grid {
     let finite = dem.map(|z| if z.is_finite() { z } else { f64::NAN });
     let Background { mut height_m, count } = background(&finite.values, dem.cols(), window, at_partial);
@@ -118,8 +139,8 @@ pub(crate) fn background_of(dem: &Grid, window: BoxWindow, at_partial: AtPartial
     Grid { geometry: dem.geometry, values: height_m }
 }
 
-/// Absolute differences of row-major `values` in rows of `cols` from the background of those not marked in `left_out`; NaN
-/// where there is no data, or no background.
+/// Absolute differences between row-major `values` in rows of `cols` and the background of the cells not marked in `left_out`;
+/// NaN where there is no data or no background.
 pub fn deviations(values: &[f64], left_out: &[bool], cols: usize, window: BoxWindow) -> Vec<f64> {
     let averaged = match left_out.contains(&true) {
         true => Cow::from_iter(values.iter().zip(left_out).map(|(&v, &out)| if out { f64::NAN } else { v })),
@@ -138,7 +159,7 @@ pub fn deviations(values: &[f64], left_out: &[bool], cols: usize, window: BoxWin
     deviations
 }
 
-/// Rows after which sums are started afresh.
+/// Rows after which running sums restart.
 pub fn band_rows(window: BoxWindow) -> usize {
     BAND_ROWS.max(4 * window.cells()[0])
 }

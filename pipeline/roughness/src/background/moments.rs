@@ -1,15 +1,15 @@
-//! Moments of the places of a window's cells, and the weights of the least-squares plane through them.
+//! Moments of the cell offsets in a window, and the weights of the least-squares plane through the cells.
 
 use super::LEVERAGE_MAX;
 
-/// Share of `sxx syy` below which the cells of a window lie on one line.
+/// Determinant as a share of `sxx syy` below which the cells of a window count as collinear.
 const ON_A_LINE: f64 = 1e-9;
 
-/// Sums over the cells with data of a window, of powers of their offsets dx and dy from its centre, in cells east and south.
-/// Exact: they stay below 2^53.
+/// Sums, over the cells with data in a window, of powers of their offsets dx and dy from its centre, in cells east and south.
+/// Exact, because they stay below 2^53.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Moments {
-    /// Number of the cells.
+    /// Number of cells.
     pub n: f64,
     /// Sum of dx.
     pub x: f64,
@@ -23,7 +23,7 @@ pub struct Moments {
     pub yy: f64,
 }
 
-/// Weights `constant - east dx - south dy` of a window's cells with data.
+/// Weights `constant - east dx - south dy` of the cells with data in a window.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Weights {
     constant: f64,
@@ -32,7 +32,7 @@ pub struct Weights {
 }
 
 impl Moments {
-    /// Adds so many cells at an offset `[south, east]`.
+    /// Adds `count` cells at an offset `[south, east]`.
     pub fn add(&mut self, [south, east]: [isize; 2], count: f64) {
         let [x, y] = [east as f64, south as f64];
         self.n += count;
@@ -43,15 +43,16 @@ impl Moments {
         self.yy += count * y * y;
     }
 
-    /// Weights of the value at the centre of the least-squares plane; `None` where there is no one plane, or it is extrapolated
-    /// too far.
+    /// Weights that give the height of the least-squares plane at the centre; `None` if the plane is not unique or extrapolated too
+    /// far.
     pub fn weights(&self) -> Option<Weights> {
         let (weights, leverage) = self.plane();
         (leverage <= LEVERAGE_MAX).then_some(weights)
     }
 
-    /// Weights of the value at the centre of the least-squares plane, and the number of cells times the sum of their squares;
-    /// infinite where the cells lie on one line beside the centre. The mean where they balance about the centre.
+    /// Weights that give the height of the least-squares plane at the centre, and the number of cells times the sum of squared
+    /// weights; infinite if the cells lie on a line that misses the centre. The weights are those of the mean if the cells balance
+    /// about the centre.
     pub fn plane(&self) -> (Weights, f64) {
         let Self { n, x, y, .. } = *self;
         let [cx, cy] = [x / n, y / n];
@@ -62,7 +63,7 @@ impl Moments {
         } else if determinant > ON_A_LINE * sxx * syy {
             Some([(syy * cx - sxy * cy) / determinant, (sxx * cy - sxy * cx) / determinant])
         } else if self.yy == 0.0 && sxx > 0.0 {
-            // Transects have no slope across.
+            // A transect has no slope across its line.
             Some([cx / sxx, 0.0])
         } else if self.xx == 0.0 && syy > 0.0 {
             Some([0.0, cy / syy])
@@ -81,7 +82,7 @@ impl Weights {
         self.constant - self.east * dx as f64 - self.south * dy as f64
     }
 
-    /// Sum of weights times heights, from the sums of `z`, `dx z` and `dy z`.
+    /// Weighted sum of the heights, from the sums of `z`, `dx z` and `dy z`.
     pub fn sum(&self, z: f64, xz: f64, yz: f64) -> f64 {
         self.constant * z - self.east * xz - self.south * yz
     }

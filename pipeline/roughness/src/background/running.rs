@@ -1,35 +1,35 @@
-//! Background row by row.
+//! Background computed row by row with running sums.
 
 use super::moments::Moments;
 use super::{AtPartial, BoxWindow};
 use std::ops::Range;
 
-/// Background row by row, from the north to the south.
+/// Background row by row, from north to south.
 pub struct RunningBackground<'a> {
     values: &'a [f64],
     window: BoxWindow,
     at_partial: AtPartial,
     columns: ColumnSums,
-    /// First moments down the columns; the rows they are of are followed only where windows are partial.
+    /// First moments down the columns; updated only where windows are partial.
     slopes: ColumnSlopes,
-    /// The row that comes next.
+    /// Next row.
     row: usize,
 }
 
 impl<'a> RunningBackground<'a> {
-    /// The background of row-major `values` in rows of `cols`, from row `first` on.
+    /// Starts the background of row-major `values` in rows of `cols` at row `first`.
     pub fn from(values: &'a [f64], cols: usize, window: BoxWindow, at_partial: AtPartial, first: usize) -> Self {
         let half = window.half[0];
         let mut columns = ColumnSums { sum: vec![0.0; cols], count: vec![0; cols] };
         let rows = values.len() / cols;
-        // What the step to the first row takes off enters as well.
+        // Includes the row that the step to the first row removes.
         for r in first.saturating_sub(half + 1)..(first + half).min(rows) {
             columns.enter(&values[r * cols..(r + 1) * cols]);
         }
         Self { values, window, at_partial, columns, slopes: ColumnSlopes::new(cols), row: first }
     }
 
-    /// Background and count of data in the windows of the next row.
+    /// Writes the background, and the number of cells with data in the window, of the next row.
     pub fn next_row(&mut self, height_m: &mut [f64], count: &mut [u32]) {
         let (cols, half) = (self.columns.sum.len(), self.window.half[0]);
         let line = |row: usize| self.values.get(row * cols..(row + 1) * cols);
@@ -40,7 +40,7 @@ impl<'a> RunningBackground<'a> {
             self.columns.leave(leaving);
         }
         let half = self.window.half[1];
-        // The difference does not wait for the sum.
+        // Grouped so that the difference does not depend on the previous sum.
         along_row(&self.columns.sum, half, height_m, |sum, entering, leaving| sum + (entering - leaving));
         along_row(&self.columns.count, half, count, |sum, entering, leaving| sum + entering - leaving);
         for (z, &n) in height_m.iter_mut().zip(count.iter()) {
@@ -52,11 +52,11 @@ impl<'a> RunningBackground<'a> {
         self.row += 1;
     }
 
-    /// Puts planes in the place of the means of partial windows.
+    /// Replaces the means of partial windows by planes.
     fn planes(&mut self, height_m: &mut [f64], count: &[u32]) {
         let area = self.window.area();
         let full = self.window.cells()[0] as u32;
-        // Where whole columns are missing only (the western and eastern border), moments down the columns vanish or do not count.
+        // If only complete columns are missing (western and eastern border), moments down the columns vanish or are not needed.
         if self.columns.count.iter().any(|&n| n < full) {
             self.slopes.follow(self.values, self.window.half[0], self.row);
         } else {
@@ -65,7 +65,7 @@ impl<'a> RunningBackground<'a> {
         let mut next = 0;
         while let Some(start) = (next..count.len()).find(|&c| (count[c] as usize) < area) {
             let end = (start..count.len()).find(|&c| count[c] as usize == area).unwrap_or(count.len());
-            // Sums along the row are started afresh after a window.
+            // Sums along the row restart after each window width.
             let width = self.window.cells()[1];
             (start..end).step_by(width).for_each(|c| self.planes_of(c..(c + width).min(end), height_m));
             next = end;
@@ -95,7 +95,7 @@ impl<'a> RunningBackground<'a> {
         }
     }
 
-    /// Adds a column at an offset of `dx` to the sums of a window, or takes it off (sign -1).
+    /// Adds a column at an offset of `dx` to the sums of a window, or subtracts it (sign -1).
     fn add(&self, sums: &mut WindowSums, column: usize, dx: f64, sign: f64) {
         let (n, z) = (sign * f64::from(self.columns.count[column]), sign * self.columns.sum[column]);
         let (y, yy, yz) = self.slopes.centred(column, self.columns.count[column], self.columns.sum[column], self.row);
@@ -112,7 +112,7 @@ impl<'a> RunningBackground<'a> {
     }
 }
 
-/// Sums of a window about its centre: places of its cells, heights, and heights times offset.
+/// Sums of a window about its centre: cell offsets, heights, and heights times offset.
 #[derive(Default)]
 struct WindowSums {
     moments: Moments,
@@ -122,7 +122,7 @@ struct WindowSums {
 }
 
 impl WindowSums {
-    /// The same cells about a centre one column to the east.
+    /// Moves the centre one column to the east, for the same cells.
     fn step_east(&mut self) {
         let m = &mut self.moments;
         m.xx += m.n - 2.0 * m.x;
@@ -156,16 +156,16 @@ impl ColumnSums {
     }
 }
 
-/// Sums down each column over the rows r of the window of r, r^2 and r z, r counted from a row nearby.
+/// Sums of r, r^2 and r z down each column, over the rows r of the window, counted from a nearby row.
 struct ColumnSlopes {
     y: Vec<f64>,
     yy: Vec<f64>,
     yz: Vec<f64>,
-    /// The row from which r counts.
+    /// Row from which r is counted.
     origin: usize,
-    /// The row whose window the sums are of; `None` where they are not followed.
+    /// Row whose window the sums cover; `None` while they are not updated.
     row: Option<usize>,
-    /// Sum of r^2 about the centre of a complete column, in the place of the others.
+    /// Sum of r^2 about the centre of a complete column; replaces the other sums while it is set.
     balanced: Option<f64>,
 }
 
@@ -175,14 +175,14 @@ impl ColumnSlopes {
         Self { y: zeros(), yy: zeros(), yz: zeros(), origin: 0, row: None, balanced: None }
     }
 
-    /// Columns that are all complete: their cells balance about the centre, and no plane tilts north-south.
+    /// For rows whose columns are all complete: cells balance about the centre, and no plane tilts north-south.
     fn balance(&mut self, half: usize) {
         let half = half as f64;
         self.balanced = Some(half * (half + 1.0) * (2.0 * half + 1.0) / 3.0);
         self.row = None;
     }
 
-    /// Brings the sums to the window of a row.
+    /// Updates the sums to the window of a row.
     fn follow(&mut self, values: &[f64], half: usize, row: usize) {
         let cols = self.y.len();
         let line = |row: usize| values.get(row * cols..(row + 1) * cols);
@@ -212,7 +212,7 @@ impl ColumnSlopes {
         }
     }
 
-    /// The sums of a column, whose cells number `n` and sum up to `z`, about a row.
+    /// The sums of a column of `n` cells with total height `z`, about a row.
     fn centred(&self, column: usize, n: u32, z: f64, row: usize) -> (f64, f64, f64) {
         if let Some(yy) = self.balanced {
             return (0.0, yy, 0.0);
@@ -223,7 +223,7 @@ impl ColumnSlopes {
     }
 }
 
-/// Sums of `values` over as many as `half` to both sides of each; `moved(sum, entering, leaving)` is the next sum.
+/// Sums of `values` over up to `half` neighbours on both sides of each; `moved(sum, entering, leaving)` returns the next sum.
 fn along_row<T: Copy + Default>(values: &[T], half: usize, sums: &mut [T], moved: impl Fn(T, T, T) -> T) {
     let (cols, zero) = (values.len(), T::default());
     let mut sum = values[..half.min(cols)].iter().fold(zero, |sum, &v| moved(sum, v, zero));

@@ -1,7 +1,7 @@
 use super::*;
 use sastrugi_numeric::Streams;
 
-/// Cells with data of the window of a cell: `[south, east]` of it, and height.
+/// Cells with data in the window of a cell: offset `[south, east]`, and height.
 fn window_cells(values: &[f64], cols: usize, window: BoxWindow, cell: usize) -> Vec<([f64; 2], f64)> {
     let (rows, [r, c]) = (values.len() / cols, [cell / cols, cell % cols]);
     let [hr, hc] = window.half;
@@ -29,7 +29,7 @@ fn solve<const N: usize>(mut a: [[f64; N]; N], mut b: [f64; N]) -> Option<[f64; 
     Some(std::array::from_fn(|k| b[k] / a[k][k]))
 }
 
-/// The definition: the least-squares plane of each partial window by its normal equations, and its variance.
+/// Reference: the least-squares plane of each partial window from its normal equations, and its variance.
 fn by_definition(cells: &[([f64; 2], f64)], window: BoxWindow) -> f64 {
     let n = cells.len();
     let mean = cells.iter().map(|(_, z)| z).sum::<f64>() / n as f64;
@@ -48,7 +48,7 @@ fn by_definition(cells: &[([f64; 2], f64)], window: BoxWindow) -> f64 {
     if normal[0][1] == 0.0 && normal[0][2] == 0.0 {
         return mean;
     }
-    // A window of one row or column has a slope along it only.
+    // A window of a single row or column only has a slope along itself.
     for k in [1, 2] {
         if normal[k][k] == 0.0 {
             normal[k][k] = 1.0;
@@ -56,7 +56,7 @@ fn by_definition(cells: &[([f64; 2], f64)], window: BoxWindow) -> f64 {
     }
     let weights = solve(normal, [1.0, 0.0, 0.0]);
     let variance = weights.map_or(f64::INFINITY, |w| w[0]);
-    // Close to the bound either is right.
+    // Close to the bound either result is acceptable.
     if n == 0 || n as f64 * variance > LEVERAGE_MAX {
         return f64::NAN;
     }
@@ -83,8 +83,8 @@ fn field(rows: usize, cols: usize, share_missing: f64) -> Vec<f64> {
 const SHAPES: [(usize, usize, [usize; 2]); 6] =
     [(1, 1, [0, 0]), (7, 9, [1, 2]), (200, 150, [8, 5]), (300, 40, [3, 30]), (90, 70, [100, 1]), (5, 400, [0, 9])];
 
-/// Absolute tolerance 1e-12 on values of unit variance (planes: 1e-11, their sums are larger by the window); counts exact; no
-/// data agrees.
+/// Absolute tolerance 1e-12 on values of unit variance (1e-11 for planes, whose sums are larger by the window size); counts and
+/// no-data cells agree exactly.
 #[test]
 fn val_the_background_equals_the_definition() {
     for (rows, cols, half) in SHAPES {
@@ -103,7 +103,7 @@ fn val_the_background_equals_the_definition() {
     }
 }
 
-/// Deviations from the background of what is not left out, by the definition.
+/// Deviations from the background of the cells that are not left out, by the definition.
 #[test]
 fn val_deviations_equal_the_definition() {
     let (rows, cols, window) = (150, 90, BoxWindow { half: [8, 5] });
@@ -118,8 +118,8 @@ fn val_deviations_equal_the_definition() {
     }
 }
 
-/// A plane of 100 % in any direction, 3000 m above sea, is its own background to 1e-9 m: borders, corners, scattered and blocky
-/// holes. The mean of partial windows is off by metres.
+/// A plane of 100 % slope in any direction, 3000 m above sea level, is its own background to 1e-9 m at borders, corners, and
+/// scattered and blocky holes. The mean of partial windows is off by more than 0.3 m.
 #[test]
 fn val_planes_are_their_own_background() {
     let (rows, cols, window) = (200, 260, BoxWindow { half: [16, 16] });
@@ -142,8 +142,8 @@ fn val_planes_are_their_own_background() {
     }
 }
 
-/// Variances of the plane at the centre times the number of cells, in closed form: 1 for a complete window, 4 at a straight border,
-/// 7 in a corner, to the size of a cell.
+/// Variance of the plane at the centre times the number of cells, in closed form: 1 for a complete window, and `3 m / (m + 2)` more for
+/// each axis of which the window has only the half from the centre to m cells: about 4 at a straight border, 7 in a corner.
 #[test]
 fn val_leverages() {
     let leverage = |rows: std::ops::RangeInclusive<isize>, cols: std::ops::RangeInclusive<isize>| {
@@ -156,11 +156,12 @@ fn val_leverages() {
         Some(squares * offsets.len() as f64)
     };
     assert!((leverage(-100..=100, -100..=100).unwrap() - 1.0).abs() < 1e-12);
-    assert!((leverage(-100..=100, 0..=100).unwrap() - 4.0).abs() < 0.1);
-    assert!((leverage(0..=100, -100..=0).unwrap() - 7.0).abs() < 0.2);
+    let half = 300.0 / 102.0;
+    assert!((leverage(-100..=100, 0..=100).unwrap() - 1.0 - half).abs() < 1e-9);
+    assert!((leverage(0..=100, -100..=0).unwrap() - 1.0 - 2.0 * half).abs() < 1e-9);
     assert_eq!(leverage(20..=100, 0..=100), None);
     assert_eq!(leverage(3..=3, 0..=4), None);
-    assert!((leverage(0..=0, 0..=100).unwrap() - 4.0).abs() < 0.1);
+    assert!((leverage(0..=0, 0..=100).unwrap() - 1.0 - half).abs() < 1e-9);
 }
 
 /// A window is the odd number of cells nearest to its length: 2 m is 33 cells of 6 cm and 21 cells of 10 cm.
@@ -172,9 +173,9 @@ fn val_windows_are_odd() {
     assert_eq!(BoxWindow::nearest(0.0, [1.0; 2]).cells(), [1, 1]);
 }
 
-/// One thread or many: the same bits.
+/// One thread or many: bit-identical results.
 #[test]
-fn prop_threads_change_no_bit() {
+fn prop_results_do_not_depend_on_the_number_of_threads() {
     let values = field(400, 30, 0.1);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
@@ -192,15 +193,15 @@ fn val_odd_windows() {
 
 /// Cells without data, and those whose window is at most half full, have no background.
 #[test]
-fn val_backgrounds_of_sparse_windows_are_left_out() {
+fn val_sparse_windows_have_no_background() {
     let window = BoxWindow { half: [2, 1] };
     let values = field(20, 30, 0.4);
     let dem = Grid::new(sastrugi_numeric::Geometry::square(20, 30, 1.0), values.clone());
-    let whole = brute_force(&values, 30, window, AtPartial::Mean);
+    let full = brute_force(&values, 30, window, AtPartial::Mean);
     let found = background_of(&dem, window, AtPartial::Mean, 0.5);
     for (k, m) in found.values.iter().enumerate() {
-        let defined = !values[k].is_nan() && 2 * whole.count[k] > 15;
+        let defined = !values[k].is_nan() && 2 * full.count[k] > 15;
         assert_eq!(m.is_nan(), !defined, "{k}");
-        assert!(!defined || (m - whole.height_m[k]).abs() < 1e-12, "{k}");
+        assert!(!defined || (m - full.height_m[k]).abs() < 1e-12, "{k}");
     }
 }

@@ -42,10 +42,10 @@ fn rms(dem: &Grid) -> f64 {
     Detrended::of(dem, &band(), Detrender::Band).rms_m()
 }
 
-/// A plane, or a sine of 1 m whose length is four times the longest of the band, whatever its phase, changes the RMS of a
+/// A plane, or a sine of 1 m amplitude and four times the longest wavelength of the band, at any phase, changes the RMS of a
 /// rough surface by less than 1 %.
 #[test]
-fn val_long_waves_do_not_count() {
+fn val_long_waves_are_rejected() {
     let rough = rough();
     let own = rms(&rough);
     assert!((0.01..0.1).contains(&own), "{own}");
@@ -58,7 +58,7 @@ fn val_long_waves_do_not_count() {
     }
 }
 
-/// A sine within the band has its amplitude over sqrt 2, one below the tyre radius nothing.
+/// A sine within the band has an RMS of its amplitude over sqrt 2; one shorter than the tyre radius has almost none.
 #[test]
 fn val_sines_within_and_below_the_band() {
     for length in [0.45, 1.0, 2.7, 4.5] {
@@ -73,8 +73,8 @@ fn val_sines_within_and_below_the_band() {
     assert!(along_x[0] < 0.02 * 0.02 / 2f64.sqrt() && along_x[1].is_nan(), "{along_x:?}");
 }
 
-/// The transfer function of each detrender at sines: what the moving average leaves is `1 - sinc` of the window, what the
-/// exponential mean leaves `(2 pi L / lambda)^2 / (1 + (2 pi L / lambda)^2)`.
+/// Transfer functions for sines: `1 - sinc` of the window for the moving average, and
+/// `(2 pi L / lambda)^2 / (1 + (2 pi L / lambda)^2)` for the exponential mean.
 #[test]
 fn val_transfer_functions() {
     for length in [2.0, 5.0, 12.0] {
@@ -88,9 +88,23 @@ fn val_transfer_functions() {
     }
 }
 
-/// Of a walk (density `f^-2`) a moving average leaves `pi^2 / 6` times the variance of the wavelengths below its window. n = 400
-/// profiles of 1000 cells, about 27 windows each: standard error of the ratio 1 %, so 6 % has a false alarm rate below 1e-6; it
-/// catches a wrong window of 4 %, and the detrenders exchanged.
+/// The exponential mean by its definition, at the ends as well.
+#[test]
+fn val_the_exponential_mean_equals_its_definition() {
+    let mut s = stream("exponential");
+    let profile: Vec<f64> = (0..40).map(|_| s.normal()).collect();
+    let ratio = 0.8;
+    for (k, found) in above_exponential_mean(&profile, ratio).iter().enumerate() {
+        let weights: Vec<f64> = (0..40usize).map(|j| libm::pow(ratio, j.abs_diff(k) as f64)).collect();
+        let weighted: f64 = weights.iter().zip(&profile).map(|(w, z)| w * z).sum();
+        let expected = profile[k] - weighted / weights.iter().sum::<f64>();
+        assert!((found - expected).abs() < 1e-12, "{k}: {found} {expected}");
+    }
+}
+
+/// For a random walk (density `f^-2`), the residual of a moving average has `pi^2 / 6` times the variance of the wavelengths
+/// below its window. n = 400 profiles of 1000 cells, about 27 windows each: the standard error of the ratio is 1 %, so a
+/// threshold of 6 % has a false-alarm rate below 1e-6. It catches a window that is 4 % off, and swapped detrenders.
 #[test]
 fn stat_a_moving_average_leaves_more_than_the_band() {
     let (n, cell) = (1000, 0.1);
@@ -103,7 +117,7 @@ fn stat_a_moving_average_leaves_more_than_the_band() {
             z
         };
         let profile = Grid::new(Geometry::square(1, n, cell), (0..n).map(|_| step()).collect());
-        // One row has no neighbours to average with: the window of its mean is one cell high.
+        // A single row has no neighbours to average with: the window is one cell high.
         let window = BoxWindow { half: [0, odd_cells(3.7, cell) / 2] };
         let average = background_of(&profile, window, AtPartial::Mean, 0.9);
         let left = sastrugi_numeric::ops::combine(&profile, &average, |z, m| (z - m) * (z - m));
@@ -115,20 +129,20 @@ fn stat_a_moving_average_leaves_more_than_the_band() {
     assert!((ratio / (PI * PI / 6.0) - 1.0).abs() < 0.06, "{ratio}");
 }
 
-/// Gaps part the profiles: the two halves of a profile with a gap have its figures.
+/// Gaps split profiles: the two halves of a profile with a gap have the RMS of the complete profile.
 #[test]
-fn val_gaps_part_profiles() {
+fn val_gaps_split_profiles() {
     let wave = |k: usize| 0.02 * libm::sin(TAU * 0.1 * k as f64 / 1.5);
     let mut dem = Grid::new(Geometry::square(1, 1000, 0.1), (0..1000).map(wave).collect());
     let band = WaveBand::new(0.3, 3.0).unwrap();
     let whole = Detrended::of(&dem, &band, Detrender::Band);
     dem.values[480] = f64::NAN;
-    let parted = Detrended::of(&dem, &band, Detrender::Band);
-    assert!((parted.rms_m() / whole.rms_m() - 1.0).abs() < 0.01);
-    assert_eq!(sums::finite(&whole.squares[0].values).len() - sums::finite(&parted.squares[0].values).len(), 61);
+    let split = Detrended::of(&dem, &band, Detrender::Band);
+    assert!((split.rms_m() / whole.rms_m() - 1.0).abs() < 0.01);
+    assert_eq!(sums::finite(&whole.squares[0].values).len() - sums::finite(&split.squares[0].values).len(), 61);
 }
 
-/// A map of a surface whose roughness doubles half-way does so too; means of windows, and no value at the trimmed border.
+/// On a surface whose roughness doubles half-way, the RMS map doubles too; the trimmed border has no value.
 #[test]
 fn val_maps_follow_the_roughness() {
     let dem = surface(|x, y| if x < 50.0 { 0.01 } else { 0.02 } * libm::sin(TAU * (x + y) / 2.0));
@@ -143,7 +157,7 @@ fn val_maps_follow_the_roughness() {
 }
 
 #[test]
-fn val_bands_that_are_none() {
+fn val_invalid_bands_are_refused() {
     let order = |a, b| matches!(WaveBand::new(a, b), Err(BandError::Order { .. }));
     for (a, b) in [(0.0, 1.0), (-1.0, 1.0), (2.0, 1.0), (1.0, 1.0), (f64::NAN, 1.0), (1.0, f64::INFINITY)] {
         assert!(order(a, b), "{a} {b}");
@@ -158,9 +172,9 @@ fn val_bands_that_are_none() {
     assert!(matches!(band().fits_length(21.0), Err(BandError::Short { .. })));
 }
 
-/// Nothing panics on small, empty or hollow surfaces.
+/// Small, empty or flat surfaces do not panic, and have an RMS of NaN or zero.
 #[test]
-fn prop_degenerate_surfaces_have_no_figures() {
+fn prop_degenerate_surfaces_have_no_roughness() {
     for (rows, cols) in [(1, 1), (1, 7), (3, 3), (40, 2)] {
         for value in [f64::NAN, 0.0, 1.0] {
             let dem = Grid::filled(Geometry::square(rows, cols, 1.0), value);

@@ -1,4 +1,4 @@
-// Requests to the server. A refusal becomes a Problem whose message is the server's own sentence.
+// Requests to the server. A refusal becomes a Problem with the message that the server sent.
 
 export class Problem extends Error {
   constructor(status, detail) { super(detail); this.status = status; }
@@ -12,7 +12,7 @@ function read() {
   try { return sessionStorage.getItem(KEY); } catch { return null; }
 }
 
-/** Asks for the token once, however many requests were refused at the same time. */
+/** Asks for the token once, even if several requests were refused at the same time. */
 function ask() {
   asking ??= new Promise((resolve) => {
     const dialog = document.getElementById('token');
@@ -56,7 +56,7 @@ async function problem(response) {
   try {
     const body = await response.json();
     detail = body.detail || body.title || detail;
-  } catch { /* no sentence came with it */ }
+  } catch { /* no problem details in the body */ }
   const told = new Problem(response.status, detail);
   told.retry = Number(response.headers.get('Retry-After')) || 1;
   return told;

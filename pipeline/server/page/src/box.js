@@ -1,4 +1,4 @@
-// A box of ground to take away: as heights, as an image, or as a terrain of a study.
+// Downloads a box of ground as heights, as an image, or as a terrain section of a study.
 
 import Draw, { createBox } from 'ol/interaction/Draw.js';
 import Feature from 'ol/Feature.js';
@@ -11,7 +11,7 @@ import { h, bytes, save, plain, length } from './dom.js';
 import { fieldName, formatName } from './names.js';
 import { line as ink, RUST } from './ink.js';
 
-/** Bytes of a sample; of packed formats at most. */
+/** Bytes per sample; for compressed formats an upper bound. */
 const BYTES = { tif: 4, npy: 8, raw: 4, png: 2 };
 const PACKED = ['tif', 'png'];
 

@@ -1,4 +1,4 @@
-// A height profile as inline SVG: axes of round numbers and a hover that names the place.
+// A height profile as inline SVG, with rounded axis labels and a cursor that reports the position.
 
 import { s, h, fixed, plain } from './dom.js';
 
@@ -13,7 +13,7 @@ function ticks(low, high, count) {
   return { list, places: Math.max(0, -Math.floor(Math.log10(step) + 1e-9)) };
 }
 
-/** `hover(index)` is called with the sample under the pointer, or null. */
+/** Calls `hover(index)` with the sample under the pointer, or with null. */
 export function chart({ along, heights, label = 'distance (m)', hover = () => {} }) {
   const known = heights.filter((z) => z !== null && Number.isFinite(z));
   if (known.length < 2 || !(along.at(-1) > along[0])) return h('p', { class: 'hint' }, 'No data along this line.');

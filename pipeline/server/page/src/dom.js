@@ -1,4 +1,4 @@
-// Elements, icons and numbers as text.
+// Elements, icons and number formatting.
 
 export function h(tag, attributes = {}, ...children) {
   const element = document.createElement(tag);
@@ -37,7 +37,7 @@ export function icon(name) {
     s('path', { d: ICONS[name] }));
 }
 
-/** Decimals worth showing of a value known to `step`. */
+/** Decimals to show for a value with resolution `step`. */
 export const decimals = (step) => Math.max(0, Math.min(3, Math.ceil(-Math.log10(step) - 1e-9)));
 
 export function length(metres, digits = 3) {

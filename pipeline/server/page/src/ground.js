@@ -1,4 +1,4 @@
-// The map: a plane in metres, the collection's own tile grid, and the layers of the ground.
+// The map: a plane in metres, the collection's tile grid, and its layers.
 
 import OlMap from 'ol/Map.js';
 import View from 'ol/View.js';
@@ -13,7 +13,7 @@ import { state, on } from './state.js';
 import { base as address } from './api.js';
 import { debounce } from './dom.js';
 
-/** Smallest ground length of a screen pixel (m): the scale bar then reads 1 cm. */
+/** Finest resolution of the map, metres per screen pixel: the scale bar then reads 1 cm. */
 const FINEST_PIXEL_M = 1e-4;
 const calm = matchMedia('(prefers-reduced-motion: reduce)');
 
@@ -33,7 +33,7 @@ map.addLayer(new VectorLayer({ source: drawn, updateWhileInteracting: true, upda
 let projection;
 let shown = null;
 
-/** Shows a collection: its plane, its grid, and the place or its home. */
+/** Shows a collection at a position, or at its home view. */
 export function open(collection, place) {
   shown = collection;
   const [west, south, east, north] = collection.bounds_m;
@@ -57,7 +57,7 @@ export function moveTo({ center, resolution }) {
   view.setCenter(center);
 }
 
-/** Distances of what nothing covers from the edges of the map (px): above, right, below, left. */
+/** Insets of the part of the map that no control covers (px): top, right, bottom, left. */
 function free() {
   const panel = document.getElementById('panel').getBoundingClientRect();
   const padding = [24, 24, 24, 24];
@@ -104,7 +104,7 @@ on(['azimuth', 'elevation', 'exaggeration', 'phenomena'], debounce(() => {
 map.on('movestart', tidy);
 map.on('moveend', tidy);
 
-/** Gives up tiles two levels away from the view or outside it, while a person zooms from orbit to a pebble. */
+/** Aborts tiles two levels away from the view or outside it, for example during a long zoom. */
 function tidy() {
   const source = base.getSource();
   if (!source || !map.getSize()) return;

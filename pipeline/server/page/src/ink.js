@@ -1,4 +1,4 @@
-// How drawn lines, boxes, tracks and marks look on the map.
+// Styles of lines, boxes, tracks and markers on the map.
 
 import Style from 'ol/style/Style.js';
 import Stroke from 'ol/style/Stroke.js';
@@ -16,7 +16,7 @@ export const line = (color, width = 2) => [
 export const BLUE = '#1c5f8a';
 export const RUST = '#a8452c';
 
-/** A mark that is moved, not redrawn. With a heading (degrees counterclockwise from east, as in the tables) it is an arrow. */
+/** A marker that is moved, not redrawn. With a heading (degrees counterclockwise from east, as in the tables) it is an arrow. */
 export function marker(color) {
   const feature = new Feature(new Point([0, 0]));
   feature.setStyle([]);

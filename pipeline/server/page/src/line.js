@@ -1,4 +1,4 @@
-// A line over the ground: its length in the plane and along the surface, and its height profile.
+// A line on the ground: its horizontal and surface length, and its height profile.
 
 import Draw from 'ol/interaction/Draw.js';
 import Feature from 'ol/Feature.js';

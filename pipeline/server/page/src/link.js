@@ -1,4 +1,4 @@
-// The permalink: collection, place and looks in the hash of the address.
+// The permalink: collection, position and display settings in the hash of the URL.
 
 import { map } from './ground.js';
 import { state, DEFAULTS, events } from './state.js';
@@ -41,7 +41,7 @@ export function read(hash = location.hash) {
   };
 }
 
-/** A small pan replaces the entry of the history; a new place, scale or world makes one. */
+/** A small pan replaces the history entry; a new position, scale or collection adds one. */
 export function keep(apply) {
   let last = null;
   const update = debounce(() => {

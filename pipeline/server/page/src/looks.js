@@ -1,4 +1,4 @@
-// How the ground is shown and which processes shape it.
+// Display settings of the ground, and the processes that shape it.
 
 import { state, set, on } from './state.js';
 import { h, slider } from './dom.js';

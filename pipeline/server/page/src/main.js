@@ -1,4 +1,4 @@
-// The page: puts the parts together and opens what the address asks for.
+// Entry point: assembles the page and opens what the URL specifies.
 
 import './page.css';
 import { map, open, home, moveTo, zoomBy } from './ground.js';
@@ -66,7 +66,7 @@ function furnish() {
   });
 }
 
-/** A thin bar while tiles are outstanding. */
+/** A thin progress bar while tiles are loading. */
 function progress() {
   let asked = 0, came = 0;
   const bar = $('progress');

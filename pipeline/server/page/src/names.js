@@ -1,4 +1,4 @@
-// The words for people of what the server calls by short names. Names that a newer server may send are shown with their underscores as spaces.
+// Display names of the server's identifiers. An unknown identifier, for example from a newer server, is shown with spaces for underscores.
 
 const LAYERS = { relief: 'Shaded relief', hillshade: 'Hillshade', albedo: 'Albedo' };
 const FIELDS = { elevation: 'Elevation (m)', albedo: 'Albedo', class: 'Rock cover (0 to 1)', rock_potential: 'Potential rock cover (0 to 1)', image: 'Nadir image (I/F)' };

@@ -1,4 +1,4 @@
-// Browsers that alter canvas pixels against fingerprinting corrupt decoded heights. A PNG of two known pixels shows it.
+// Browsers that alter canvas pixels to prevent fingerprinting corrupt decoded heights. A PNG of two known pixels detects this.
 
 const KNOWN = 'data:image/png;base64,iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAIAAAB7QOjdAAAAD0lEQVR4nGMQMglbffY9AAdZAwSh3xl9AAAAAElFTkSuQmCC';
 const PIXELS = [18, 52, 86, 255, 171, 205, 239, 255];

@@ -1,4 +1,4 @@
-// Where the cursor is and what lies there. Old questions are dropped, not answered late.
+// Coordinates and elevation under the cursor. Requests that are out of date are aborted.
 
 import { map } from './ground.js';
 import { json, query, base } from './api.js';
@@ -40,7 +40,7 @@ export function readout(element) {
   };
   map.on('pointermove', (event) => { if (!event.dragging) at(event.coordinate); });
   map.on('click', (event) => at(event.coordinate));
-  // Without a pointer the centre is read: after a move by keys, and on touch.
+  // Without a pointer, read the centre: after a move by keyboard, and on touch screens.
   map.on('moveend', () => {
     const touch = matchMedia('(hover: none)').matches;
     if (touch || map.getTargetElement().contains(document.activeElement) && document.activeElement.matches(':focus-visible')) at(map.getView().getCenter());

@@ -1,4 +1,4 @@
-// What is shown. Modules read `state`, change it through `set` and listen for `change`.
+// State of the page. Modules read `state`, change it through `set`, and listen for `change`.
 
 export const DEFAULTS = { layer: 'relief', classOpacity: 0, azimuth: 315, elevation: 45, exaggeration: 1, phenomena: null, track: null };
 export const state = { collection: null, collections: [], ...DEFAULTS };
@@ -13,7 +13,7 @@ export function on(names, run) {
   events.addEventListener('change', ({ detail }) => { if (names.some((name) => detail.includes(name))) run(); });
 }
 
-/** Query of the phenomena that act; nothing when all of them do. */
+/** Query parameters for the active processes; none if all are active. */
 export const phenomena = () => ({ phenomena: state.phenomena?.join(',') });
-/** Query of the light and of what it falls on. */
+/** Query parameters for the light and the vertical exaggeration. */
 export const light = () => ({ sun_azimuth_deg: state.azimuth, sun_elevation_deg: state.elevation, exaggeration: state.exaggeration === 1 ? null : state.exaggeration });

@@ -1,4 +1,4 @@
-// The small bar at the foot of the map: one sentence at a time.
+// The message bar at the bottom of the map; it shows one message at a time.
 
 let timer;
 export function tell(message, stay = false) {

@@ -1,10 +1,10 @@
-// The 3-D view: the window's heights about their own mean, lit by the sun of the map with shadows of the ground itself.
+// The 3-D view: heights of the window relative to their mean, lit by the map's sun, with shadows cast by the ground.
 
 import { WebGLRenderer, Scene, PerspectiveCamera, BufferGeometry, BufferAttribute, Mesh, MeshBasicMaterial, Line, LineBasicMaterial, Color, DoubleSide, ArrowHelper, Vector3 } from 'three';
 import { OrbitControls } from 'three/addons/controls/OrbitControls.js';
 
 const TINTS = [[92, 83, 77], [171, 154, 135], [226, 218, 206]], GREY = [190, 190, 190];
-/** Albedo of ground that is shown as it is tinted, as on the map. */
+/** Albedo at which the ground has exactly its tint, as on the map. */
 const PLAIN_ALBEDO = 0.25;
 
 function el(tag, attributes = {}, ...children) {
@@ -15,7 +15,7 @@ function el(tag, attributes = {}, ...children) {
 }
 const say = (metres) => (metres >= 1000 ? `${+(metres / 1000).toPrecision(3)} km` : metres >= 1 ? `${+metres.toPrecision(3)} m` : metres >= 0.01 ? `${+(metres * 100).toPrecision(3)} cm` : `${+(metres * 1000).toPrecision(3)} mm`);
 
-/** Heights about their mean in units of half the window, so that floats keep millimetres of a high plateau. */
+/** Heights relative to their mean, in units of half the window, so that single precision resolves millimetres on a high plateau. */
 function surface({ heights, columns, rows, cell }) {
   let sum = 0, count = 0, low = Infinity, high = -Infinity;
   for (const z of heights) if (Number.isFinite(z)) { sum += z; count++; low = Math.min(low, z); high = Math.max(high, z); }
@@ -46,7 +46,7 @@ function geometry({ relative, step }, columns, rows) {
   return shape;
 }
 
-/** Share of the sun that each sample sees: a march towards it over the grid, soft over about one degree. */
+/** Share of the sun visible from each sample, by marching towards it over the grid; the penumbra is about one degree wide. */
 function shadows({ relative, step }, columns, rows, sun, stretch) {
   const seen = new Float32Array(relative.length).fill(1);
   const flat = Math.hypot(sun[0], sun[1]);
@@ -75,7 +75,7 @@ function shadows({ relative, step }, columns, rows, sun, stretch) {
 
 const linear = (value) => (value / 255) ** 2.2;
 
-/** Colours of the ground under full light, as the map's base layer has them: tints run over the heights of the window. */
+/** Colours of the ground in full light, as in the map's base layer, but with tints that span the heights of the window. */
 function groundColours({ relative }, { layer, albedo }) {
   const colours = new Float32Array(3 * relative.length);
   const tints = TINTS.map((rgb) => rgb.map(linear)), grey = GREY.map(linear);
@@ -115,7 +115,7 @@ const direction = (azimuth, elevation) => {
   return [Math.sin(a) * Math.cos(e), Math.cos(a) * Math.cos(e), Math.sin(e)];
 };
 
-/** Lines of tracks inside the window, in pieces where they leave it; its corner is the place of a sample. */
+/** Lines of the tracks inside the window, split where they leave it; the window's corner is the position of a sample. */
 function paths(tracks, { mean, unit }, { corner, columns, rows, cell }) {
   const half = [(columns - 1) * cell / 2, (rows - 1) * cell / 2];
   const middle = [corner[0] + half[0], corner[1] + half[1]];

@@ -1,4 +1,4 @@
-// Tiles of one layer of one collection: fetched, retried when the server is busy, given up when the view has moved on.
+// Tiles of one layer of one collection: fetched, retried while the server is busy, aborted when the view has moved on.
 
 import TileImage from 'ol/source/TileImage.js';
 import TileGrid from 'ol/tilegrid/TileGrid.js';
@@ -7,7 +7,7 @@ import { get, query, base } from './api.js';
 import { failed } from './tell.js';
 import { light, phenomena } from './state.js';
 
-/** Pixels of a tile along a pixel of the page: dense screens get the next finer level at half its size. */
+/** Tile pixels per page pixel: dense screens get the next finer level at half its size. */
 const DENSITY = devicePixelRatio > 1.2 ? 2 : 1;
 const loading = new Map();
 const BUSY = [429, 503];
@@ -30,7 +30,7 @@ export class Tiles extends TileImage {
     this.redraw();
   }
 
-  /** Tiles finer than the finest level are the samples themselves: squares, not a blur. */
+  /** Beyond the finest level, samples are drawn as squares, without smoothing. */
   getInterpolate() {
     return !this.view || this.view.getResolution() > 0.75 * this.finest * devicePixelRatio;
   }
@@ -74,7 +74,7 @@ async function patiently(path, signal, attempt = 1) {
   }
 }
 
-/** Stops requests that the view no longer wants, so that the server can stop too. */
+/** Aborts requests that the view no longer needs, so that the server can stop too. */
 export function forget(wanted) {
   for (const [tile, { stop, path }] of loading) if (!wanted(tile.getTileCoord(), path)) stop.abort();
 }

@@ -1,4 +1,4 @@
-// Missions and rovers on their terrain: a list, the lines, and a playback of one.
+// Missions and rovers on their terrain: a list, their lines, and playback of one.
 
 import Feature from 'ol/Feature.js';
 import LineString from 'ol/geom/LineString.js';
@@ -11,7 +11,7 @@ import { h, slider, length, plain } from './dom.js';
 import { outcomeName, vehicleName } from './names.js';
 import { line as ink, marker, BLUE, RUST } from './ink.js';
 
-/** Lines that are drawn at once; the others of a long list are drawn when they are chosen. */
+/** Number of lines drawn at once; the others in a longer list are drawn when selected. */
 const DRAWN_MAX = 24;
 const known = new Map();
 

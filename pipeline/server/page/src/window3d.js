@@ -1,4 +1,4 @@
-// Fetches the window as heights and hands it to the 3-D view, whose code is loaded the first time.
+// Fetches the heights of the window for the 3-D view, whose code is loaded on first use.
 
 import { map, windowOf } from './ground.js';
 import { get, query, base } from './api.js';
@@ -9,13 +9,13 @@ import { getIntersection } from 'ol/extent.js';
 
 const ACROSS_MAX = 384;
 
-/** Spacing of the grid that puts at most 384 samples across: a level of the tile grid, or the finest spacing. */
+/** Sample spacing, from the tile grid or the finest of the collection, with at most 384 samples across. */
 function spacing(span, { tile_grid: grid, spacing_m: finest }) {
   const steps = [...grid.resolutions_m, finest].sort((a, b) => a - b);
   return steps.find((step) => span / step <= ACROSS_MAX) ?? steps.at(-1);
 }
 
-/** Whether the ground has an albedo: a world loses it with the process that makes it. */
+/** Whether the ground has albedo; a world has none while the process that produces it is off. */
 function hasAlbedo() {
   const { fields, phenomena: processes } = state.collection;
   const own = processes.find(({ kind }) => kind === 'albedo');

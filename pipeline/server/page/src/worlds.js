@@ -1,4 +1,4 @@
-// The list of collections: worlds, and releases with their terrains.
+// The list of collections: worlds, and the terrains of releases.
 
 import { state, on } from './state.js';
 import { h, length } from './dom.js';

@@ -1,4 +1,4 @@
-// Makes the pictures of docs/server.md: node test/pictures.mjs URL FOLDER, of a server of fixtures/worlds/planet.toml alone.
+// Makes the pictures of docs/server.md: node test/pictures.mjs URL FOLDER, with a server that serves only fixtures/worlds/planet.toml.
 // server.png (the page), server-zooms.png (one place at four scales), server-phone.png; PNG with a palette.
 // Needs node >= 20.15 and Chromium.
 
@@ -25,7 +25,7 @@ async function view(size, hash) {
   return page.screenshot({ encoding: 'base64' });
 }
 
-/** Pictures beside each other as indices into a palette: the most frequent colours, the nearest of them for every pixel. */
+/** Pictures side by side as indices into a palette of the most frequent colours; each pixel gets the nearest of them. */
 const reduced = (pictures, gap, colours) => page.evaluate(async (all, space, most) => {
   const images = await Promise.all(all.map(async (text) => { const image = new Image(); image.src = `data:image/png;base64,${text}`; await image.decode(); return image; }));
   const width = images.reduce((sum, image) => sum + image.width + space, -space), height = images[0].height;
@@ -45,7 +45,7 @@ const reduced = (pictures, gap, colours) => page.evaluate(async (all, space, mos
   const rgb = (k) => sums.get(k).map((v) => Math.round(v / count.get(k)));
   const apart = (a, b) => a.reduce((sum, v, c) => sum + (v - b[c]) ** 2, 0);
   const palette = [];
-  // A colour near one that is taken waits, so that rare but distant ones find room.
+  // Skip colours close to one already chosen at first, so that rare but distinct colours find room.
   for (let near = 500; near >= 0 && palette.length < most; near = near > 20 ? near / 2 : near - 20) {
     for (const [k] of [...count].sort((a, b) => b[1] - a[1] || a[0] - b[0])) {
       if (palette.length < most && palette.every((one) => apart(one, rgb(k)) > near)) palette.push(rgb(k));

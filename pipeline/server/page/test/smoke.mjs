@@ -1,7 +1,7 @@
-// Smoke test of the page: node test/smoke.mjs URL FOLDER. Needs Chromium (CHROMIUM names it when it is not on the path).
-// SMOKE_ONLY, a regular expression, picks checks by their names; SMOKE_SECONDS is the patience with each; SMOKE_SIZE is the size of the
-// window, at least 960x640.
-// Each check prints one line; the screenshots go into FOLDER; the exit code is 1 when a check failed.
+// Smoke test of the page: node test/smoke.mjs URL FOLDER. Needs Chromium; set CHROMIUM if it is not on the path.
+// SMOKE_ONLY, a regular expression, selects checks by name; SMOKE_SECONDS is the time limit of each; SMOKE_SIZE is the size of the window, at least
+// 960x640.
+// Each check prints one line; screenshots go into FOLDER; the exit code is 1 if a check failed.
 
 import puppeteer from 'puppeteer-core';
 import { mkdirSync, existsSync } from 'node:fs';
@@ -14,7 +14,7 @@ const ONLY = process.env.SMOKE_ONLY && new RegExp(process.env.SMOKE_ONLY);
 const [width, height] = (process.env.SMOKE_SIZE ?? '1280x900').split('x').map(Number);
 const PATIENCE = Number(process.env.SMOKE_SECONDS ?? 60) * 1000;
 if (!CHROMIUM) {
-  console.error('Chromium was not found: install it or name it in the variable CHROMIUM.');
+  console.error('Chromium not found; install it, or set the variable CHROMIUM to its path.');
   process.exit(2);
 }
 mkdirSync(folder, { recursive: true });
@@ -44,7 +44,7 @@ async function check(name, run) {
 }
 function must(truth, sentence) { if (!truth) throw new Error(sentence); }
 const wait = (milliseconds) => new Promise((resolve) => setTimeout(resolve, milliseconds));
-/** Waits until something is true in the page; says so when it never is. */
+/** Waits until `test` is true in the page; fails with `sentence` if it never is. */
 async function until(sentence, test, ...values) {
   await page.waitForFunction(test, { polling: 50 }, ...values).catch((error) => { throw error.name === 'TimeoutError' ? new Error(sentence) : error; });
 }
@@ -69,7 +69,7 @@ async function visit(hash = '') {
   await page.evaluate(() => window.sastrugi.ready);
   await settled();
 }
-/** Mean colour of the base canvas over a box around a place, by the map's own pixels. */
+/** Mean colour of the base canvas in a box around a position, in pixels of the map. */
 const colour = (x, y, half) => page.evaluate((cx, cy, size) => {
   const { map } = window.sastrugi;
   const ratio = devicePixelRatio;
@@ -82,16 +82,16 @@ const colour = (x, y, half) => page.evaluate((cx, cy, size) => {
   return mean;
 }, x, y, half);
 
-/** Colours of one pixel of the base canvas in 97. */
+/** Colours of every 97th pixel of the base canvas. */
 const thinned = () => page.evaluate(() => {
   const canvas = window.sastrugi.map.getViewport().querySelector('canvas');
   const { data } = canvas.getContext('2d').getImageData(0, 0, canvas.width, canvas.height);
   return Array.from({ length: Math.floor(data.length / 388) }, (_, k) => [...data.subarray(388 * k, 388 * k + 3)]);
 });
-/** Mean difference of two lists of colours. */
+/** Mean difference between two lists of colours. */
 const difference = (ours, theirs) => ours.reduce((sum, colour, k) => sum + colour.reduce((all, value, c) => all + Math.abs(value - theirs[k][c]), 0), 0) / (3 * ours.length);
 
-/** Mean differences of neighbouring columns of pixels around a place: the largest in the middle, and the largest elsewhere. */
+/** Mean differences between adjacent columns of pixels around a position: the largest in the middle, and the largest elsewhere. */
 const steps = (x, y) => page.evaluate((cx, cy) => {
   const { map } = window.sastrugi;
   const [px, py] = map.getPixelFromCoordinate([cx, cy]).map((at) => Math.round(at * devicePixelRatio));
@@ -109,10 +109,10 @@ const steps = (x, y) => page.evaluate((cx, cy) => {
 await page.setViewport({ width, height });
 await visit();
 const collection = await page.evaluate(() => window.sastrugi.state.collection);
-await check('the page loads and tiles come', async () => {
+await check('the page and its tiles load', async () => {
   await shot('home');
   const tiles = await page.evaluate(() => performance.getEntriesByType('resource').filter((entry) => entry.name.includes('/map/tiles/')).length);
-  must(tiles > 0, 'no tile was asked for');
+  must(tiles > 0, 'no tile was requested');
   return `${collection.id}, ${tiles} tiles`;
 });
 
@@ -122,7 +122,7 @@ const resolutions = collection.tile_grid.resolutions_m;
 const finest = resolutions.at(-1);
 const at = (resolution, more = '', place = middle) => `#c=${encodeURIComponent(collection.id)}&x=${place[0]}&y=${place[1]}&r=${resolution}${more}`;
 
-// A small window, since each scale needs its own tiles made.
+// A small window, because each scale has to generate its own tiles.
 await page.setViewport({ width: width >> 1, height: height / 3 | 0 });
 await check('four scales', async () => {
   const pictures = [], levels = [];
@@ -131,8 +131,8 @@ await check('four scales', async () => {
     await visit(at(resolution));
     const fitting = resolutions.indexOf(nearest(resolutions, resolution));
     const asked = await levelsAsked();
-    // The next coarser level is loaded ahead, to fill gaps.
-    must(Math.max(...asked) === fitting && Math.min(...asked) >= fitting - 1, `at ${resolution} m a pixel levels ${asked.join(', ')} were asked for; ${fitting} fits`);
+    // The next coarser level is preloaded to fill gaps.
+    must(Math.max(...asked) === fitting && Math.min(...asked) >= fitting - 1, `at ${resolution} m per pixel, levels ${asked.join(', ')} were requested; expected ${fitting}`);
     levels.push(fitting);
     pictures.push(await thinned());
     await shot(`scale-${k + 1}`);
@@ -141,8 +141,8 @@ await check('four scales', async () => {
   }
   must(resolutions.length < 5 || new Set(levels).size === 4, `the four scales show levels ${levels.join(', ')}`);
   const least = Math.min(...pictures.flatMap((one, k) => pictures.slice(k + 1).map((other) => difference(one, other))));
-  must(least > 5, `two of the scales look the same, to ${least.toFixed(1)} of 255`);
-  return `levels ${levels.join(', ')}; pictures differ by ${least.toFixed(1)} of 255 and more`;
+  must(least > 5, `two of the scales differ by only ${least.toFixed(1)} of 255`);
+  return `levels ${levels.join(', ')}; pictures differ by at least ${least.toFixed(1)} of 255`;
 });
 
 await check('levels agree across a tile seam', async () => {
@@ -158,10 +158,10 @@ await check('levels agree across a tile seam', async () => {
   }
   await visit(at(step, '', seam));
   const [across, elsewhere] = await steps(seam[0], seam[1]);
-  must(across <= 1.5 * elsewhere + 1, `colours differ by ${across.toFixed(1)} across the seam, by ${elsewhere.toFixed(1)} at most beside it`);
+  must(across <= 1.5 * elsewhere + 1, `colours differ by ${across.toFixed(1)} across the seam and by at most ${elsewhere.toFixed(1)} elsewhere`);
   const jump = Math.max(...means.slice(1).flatMap((mean, k) => mean.map((value, c) => Math.abs(value - means[k][c]))));
   must(jump < 12, `the mean colour jumps by ${jump.toFixed(1)} of 255`);
-  return `mean colours within ${jump.toFixed(1)} of 255; ${across.toFixed(1)} across the seam, ${elsewhere.toFixed(1)} beside it`;
+  return `mean colours within ${jump.toFixed(1)} of 255; ${across.toFixed(1)} across the seam, ${elsewhere.toFixed(1)} elsewhere`;
 });
 
 await page.setViewport({ width, height });
@@ -175,20 +175,20 @@ await check('the elevation readout equals /point and the patch around it', async
     return { place: window.sastrugi.map.getCoordinateFromPixel([701, 421]), shown: box.querySelector('b').textContent, exact: Number(box.dataset.elevation) };
   });
   const point = await (await fetch(`${url}/v1/collections/${encodeURIComponent(collection.id)}/point?x=${place[0]}&y=${place[1]}`)).json();
-  must(point.elevation_m === exact, `the page has ${exact} m, the server ${point.elevation_m} m`);
-  // Between the four samples of a patch around it.
+  must(point.elevation_m === exact, `the page has ${exact} m, the server has ${point.elevation_m} m`);
+  // Interpolate between the four samples of a patch around the point.
   const spacing = collection.spacing_m;
   const [column, row] = place.map((value) => Math.floor(value / spacing));
   const corner = await fetch(`${url}/v1/collections/${encodeURIComponent(collection.id)}/patch?origin=${column * spacing},${row * spacing}&size=2,2&resolution_m=${spacing}&format=raw`);
   const [northWest, northEast, southWest, southEast] = new Float32Array(await corner.arrayBuffer());
   const [u, v] = [place[0] / spacing - column, place[1] / spacing - row];
   const between = (southWest * (1 - u) + southEast * u) * (1 - v) + (northWest * (1 - u) + northEast * u) * v;
-  must(Math.abs(between - exact) < 1e-4, `the page has ${exact} m, the patch around ${between} m`);
-  must(Math.abs(Number(shown.replace('\u2212', '-').replace(' m', '')) - exact) <= 0.0051 + finest, `the page shows ${shown}, the server ${exact} m`);
+  must(Math.abs(between - exact) < 1e-4, `the page has ${exact} m, the patch around it gives ${between} m`);
+  must(Math.abs(Number(shown.replace('\u2212', '-').replace(' m', '')) - exact) <= 0.0051 + finest, `the page shows ${shown}, the server has ${exact} m`);
   return shown;
 });
 
-await check('a permalink comes back', async () => {
+await check('a permalink round-trips', async () => {
   const more = '&layer=hillshade&class=0.5&sun=120,20&exaggeration=2';
   await visit(at(finest * 4, more));
   await wait(700);
@@ -197,7 +197,7 @@ await check('a permalink comes back', async () => {
   await wait(700);
   const second = await page.evaluate(() => location.hash);
   must(first === second, `${first} became ${second}`);
-  must(second.includes('sun=120,20') && second.includes('layer=hillshade') && second.includes('class=0.5'), `looks were lost: ${second}`);
+  must(second.includes('sun=120,20') && second.includes('layer=hillshade') && second.includes('class=0.5'), `display settings were lost: ${second}`);
   await shot('permalink');
   return second;
 });
@@ -211,12 +211,12 @@ await check('back and forward', async () => {
   await page.keyboard.press('+');
   await page.keyboard.press('+');
   await until('the key + does not zoom', (coarse) => window.sastrugi.map.getView().getResolution() < 0.6 * coarse && !window.sastrugi.map.getView().getAnimating(), before);
-  await until('the address does not follow', (hash) => location.hash !== hash, first);
+  await until('the URL is not updated', (hash) => location.hash !== hash, first);
   await page.evaluate(() => history.back());
-  await until(`back does not lead back to ${before} m a pixel`, (coarse) => Math.abs(window.sastrugi.map.getView().getResolution() / coarse - 1) < 1e-3, before);
+  await until(`going back does not restore ${before} m per pixel`, (coarse) => Math.abs(window.sastrugi.map.getView().getResolution() / coarse - 1) < 1e-3, before);
 });
 
-await check('a profile gives numbers', async () => {
+await check('a profile shows its metrics', async () => {
   await visit(at(finest * 4));
   await page.click('[data-panel=line]');
   await page.mouse.click(520, 400);
@@ -229,11 +229,11 @@ await check('a profile gives numbers', async () => {
   const box = await (await page.$('.chart')).boundingBox();
   await page.mouse.move(box.x + box.width / 2, box.y + box.height / 2);
   await shot('profile');
-  must(samples > 100, `${samples} samples have a height`);
+  must(samples > 100, `only ${samples} samples have a height`);
   return (await page.$eval('.result dl', (element) => element.innerText)).replace(/\s+/g, ' ');
 });
 
-await check('a download says its size beforehand', async () => {
+await check('the stated size of a download is right', async () => {
   await visit(at(finest * 4));
   await page.click('[data-panel=box]');
   await page.mouse.click(520, 400);
@@ -256,13 +256,13 @@ await check('a download says its size beforehand', async () => {
       URL.createObjectURL = (blob) => { window.saved = blob.size; URL.createObjectURL = make; return make.call(URL, blob); };
       document.querySelector('#panel form').requestSubmit();
     });
-    await until(`no ${format} came`, () => window.saved !== undefined);
+    await until(`no ${format} was downloaded`, () => window.saved !== undefined);
     const length = await page.evaluate(() => window.saved);
     const [, number, unit] = /([\d.,]+) (B|kB|MB)$/.exec(hint.replace(/\u202f|\u00a0/g, ' '));
     const said = Number(number.replace(',', '')) * { B: 1, kB: 1e3, MB: 1e6 }[unit];
     const most = hint.includes('at most') ? 0 : 0.9;
-    must(length <= 1.1 * said + 2000 && length >= most * said, `${format}: ${hint}, and ${length} bytes came`);
-    told.push(`${format} ${said} B said, ${length} came`);
+    must(length <= 1.1 * said + 2000 && length >= most * said, `${format}: the page states "${hint}", but ${length} bytes were downloaded`);
+    told.push(`${format}: ${said} B stated, ${length} B downloaded`);
   }
   return told.join('; ');
 });
@@ -273,11 +273,11 @@ await check('the 3-D view opens', async () => {
   await page.waitForSelector('#space canvas');
   let picture = await shot('space');
   for (const end = Date.now() + PATIENCE; picture.length <= 80000 && Date.now() < end;) picture = await shot('space');
-  must(!complaints.some((text) => text.includes('THREE')), 'three.js complains of a shader');
+  must(!complaints.some((text) => text.includes('THREE')), 'three.js reports a shader error');
   must(picture.length > 80000, `the picture is empty: ${picture.length} bytes`);
   const words = await page.$eval('.space-bar p', (element) => element.innerText);
   await page.click('.space-bar .main');
-  must(await page.$eval('#space', (element) => element.hidden), 'the button back does not lead back');
+  must(await page.$eval('#space', (element) => element.hidden), 'the back button does not close the view');
   return words.replace(/\s+/g, ' ');
 });
 
@@ -287,24 +287,24 @@ await check('one sun for the map and the 3-D view', async () => {
   await page.waitForSelector('#space canvas');
   await slide('Sun azimuth', 100);
   await page.click('.space-bar .main');
-  await until('the map keeps another sun', () => location.hash.includes('sun=100,45'));
+  await until('the map does not take over the sun', () => location.hash.includes('sun=100,45'));
   await settled();
-  must((await page.$eval('#panel input[aria-label="Sun azimuth"]', (input) => input.value)) === '100', 'the slider of the map shows another sun');
-  must((await tilesAsked()).some((name) => name.includes('sun_azimuth_deg=100')), 'no tile under that sun was asked for');
+  must((await page.$eval('#panel input[aria-label="Sun azimuth"]', (input) => input.value)) === '100', 'the slider of the map shows a different sun');
+  must((await tilesAsked()).some((name) => name.includes('sun_azimuth_deg=100')), 'no tile with that sun was requested');
 });
 
-if (collection.phenomena.length) await check('processes can be switched off, all of them', async () => {
+if (collection.phenomena.length) await check('all processes can be switched off', async () => {
   await visit(at(finest * 8));
   const relief = () => page.evaluate(() => document.querySelectorAll('#panel .check input:checked').length);
   for (let left = await relief(); left > 0; left--) await page.click('#panel .check input:checked');
   must(await relief() === 0, 'a process cannot be switched off');
-  await until('no tile of the base ground was asked for', () => performance.getEntriesByType('resource').some(({ name }) => /\/tiles\/.*[?&]phenomena=(&|$)/.test(name)));
+  await until('no tile of the base ground was requested', () => performance.getEntriesByType('resource').some(({ name }) => /\/tiles\/.*[?&]phenomena=(&|$)/.test(name)));
   await settled();
   must(await page.$eval('#message', (element) => element.hidden), await page.$eval('#message', (element) => element.innerText));
   await shot('base-ground');
 });
 
-await check('a refusal is told in the words of the server', async () => {
+await check('a refusal shows the server message', async () => {
   await visit(at(finest * 4));
   await page.click('[data-panel=line]');
   provoked = true;
@@ -316,7 +316,7 @@ await check('a refusal is told in the words of the server', async () => {
   const { detail } = await (await fetch(`${url}/v1/collections/${encodeURIComponent(collection.id)}/profile?line=0,0;${encodeURIComponent(far)},0&samples=512`)).json();
   await shot('refused');
   provoked = false;
-  must(shown === detail, `the page says "${shown}", the server "${detail}"`);
+  must(shown === detail, `the page shows "${shown}", the server sent "${detail}"`);
   return shown;
 });
 
@@ -333,7 +333,7 @@ async function driven() {
 const rides = await driven();
 /** Colours of the chosen track on the map, and of tracks in the 3-D view. */
 const CHOSEN = [0xa8, 0x45, 0x2c], IN_SPACE = [0xd2, 0x55, 0x2f];
-/** A drawn track: its coordinates, and the share of places along it whose pixels have its colour. */
+/** A drawn track: its coordinates, and the share of positions along it whose pixels have its colour. */
 const drawnTrack = (id, colour) => page.evaluate((name, wanted) => {
   const { map } = window.sastrugi;
   const lines = map.getLayers().getArray().at(-1);
@@ -349,7 +349,7 @@ const drawnTrack = (id, colour) => page.evaluate((name, wanted) => {
   return { coordinates: line.getCoordinates(), coloured: places.filter(isColoured).length / places.length };
 }, id, colour);
 
-/** A picture of the 3-D view of a collection without its controls, once it stands still. */
+/** A screenshot of the 3-D view of a collection without its controls, once it has stopped changing. */
 async function relief(ground, tracks) {
   await visit(`#c=${encodeURIComponent(ground.id)}`);
   if (tracks) await until('no track is drawn', () => window.sastrugi.map.getLayers().getArray().at(-1).getSource().getFeatures().some((feature) => feature.get('track')));
@@ -359,14 +359,14 @@ async function relief(ground, tracks) {
   let before, now;
   const end = Date.now() + PATIENCE;
   do {
-    must(Date.now() < end, 'the 3-D view does not stand still');
+    must(Date.now() < end, 'the 3-D view keeps changing');
     before = now;
     await wait(500);
     now = await page.screenshot({ encoding: 'base64' });
   } while (now !== before);
   return now;
 }
-/** The same, as if nothing had been driven on it. */
+/** The same, as if the collection had no tracks. */
 async function reliefWithoutTracks(ground) {
   const answer = (request) => (request.url().endsWith('/tracks') ? request.respond({ contentType: 'application/json', body: '{"tracks":[]}' }) : request.continue());
   await page.setRequestInterception(true);
@@ -378,7 +378,7 @@ async function reliefWithoutTracks(ground) {
     await page.setRequestInterception(false);
   }
 }
-/** Number of pixels that differ between two pictures, and of those that are nearer to a colour in the first. */
+/** Number of pixels that differ between two pictures, and how many of them are closer to a colour in the first. */
 const changed = (one, other, colour) => page.evaluate(async (pictures, wanted) => {
   const read = async (text) => {
     const image = await createImageBitmap(new Blob([Uint8Array.from(atob(text), (letter) => letter.charCodeAt(0))]));
@@ -423,8 +423,8 @@ for (const [kind, { collection: ground, track }] of rides) await check(`a ${kind
   await shot(`tracks-${kind}`);
   const frames = await seen;
   const clock = await page.$eval('#panel .slider output', (element) => parseFloat(element.textContent));
-  must(clock > 0, 'the clock of the playback stands still');
-  // Directions over moves that are long beside the rounding of a place and beside a turn on the spot.
+  must(clock > 0, 'the playback clock does not advance');
+  // Directions of moves that are long compared with the rounding of a position and with a turn on the spot.
   let from = 0, moves = 0, along = 0;
   for (let to = 1; to < frames.length; to++) {
     const [dx, dy] = [0, 1].map((k) => frames[to][k] - frames[from][k]);
@@ -434,8 +434,8 @@ for (const [kind, { collection: ground, track }] of rides) await check(`a ${kind
     if (Math.sin(rotation) * dx + Math.cos(rotation) * dy > Math.SQRT1_2 * Math.hypot(dx, dy)) along++;
     from = to;
   }
-  must(moves >= 5, `the marker moved ${moves} times only`);
-  must(along >= 0.9 * moves, `the arrow points along the motion in ${along} of ${moves} moves only`);
+  must(moves >= 5, `the marker moved only ${moves} times`);
+  must(along >= 0.9 * moves, `the arrow points along the motion in only ${along} of ${moves} moves`);
   return `${ground.id}, ${track.id}: the arrow points along the motion in ${along} of ${moves} moves`;
 });
 for (const [kind, { collection: ground, track }] of rides) await check(`the track of a ${kind} is on the map`, async () => {
@@ -446,16 +446,16 @@ for (const [kind, { collection: ground, track }] of rides) await check(`the trac
   const { x_m: x, y_m: y } = await (await fetch(`${url}/v1/collections/${encodeURIComponent(ground.id)}/tracks/${encodeURIComponent(track.id)}`)).json();
   const { coordinates, coloured } = await drawnTrack(track.id, CHOSEN);
   await shot(`track-${kind}`);
-  must(coordinates.length === x.length && coordinates.every((place, k) => place[0] === x[k] && place[1] === y[k]), `the line of ${track.id} is not that of the server`);
-  must(coloured >= 0.9, `${(100 * coloured).toFixed()} % of the track have its colour`);
-  return `${x.length} places, ${(100 * coloured).toFixed()} % of the line in its colour`;
+  must(coordinates.length === x.length && coordinates.every((place, k) => place[0] === x[k] && place[1] === y[k]), `the line of ${track.id} differs from the server's`);
+  must(coloured >= 0.9, `only ${(100 * coloured).toFixed()} % of the track has its colour`);
+  return `${x.length} points, ${(100 * coloured).toFixed()} % of the line in its colour`;
 });
 for (const [kind, { collection: ground }] of rides) await check(`the track of a ${kind} is in the 3-D view`, async () => {
   const shown = await relief(ground, true);
   await shot(`space-tracks-${kind}`);
   const { pixels, nearer } = await changed(shown, await reliefWithoutTracks(ground), IN_SPACE);
-  must(pixels > 100, `${pixels} pixels show tracks`);
-  must(nearer > 0.9 * pixels, `${nearer} of ${pixels} pixels have the colour of tracks`);
+  must(pixels > 100, `only ${pixels} pixels show tracks`);
+  must(nearer > 0.9 * pixels, `only ${nearer} of ${pixels} pixels have the colour of tracks`);
   return `${pixels} pixels`;
 });
 
@@ -465,10 +465,10 @@ await check('a dense screen gets the next finer level', async () => {
   const levels = await levelsAsked();
   await shot('dense');
   await page.setViewport({ width, height });
-  must(Math.max(...levels) === resolutions.length - 1, `levels ${levels.join(', ')} of ${resolutions.length} were asked for`);
+  must(Math.max(...levels) === resolutions.length - 1, `levels ${levels.join(', ')} of ${resolutions.length} were requested; expected the finest`);
 });
 
-await check('every control is reached by keys', async () => {
+await check('every control can be reached by keyboard', async () => {
   await visit(at(finest * 8));
   const names = new Set();
   for (let k = 0; k < 60; k++) {
@@ -482,7 +482,7 @@ await check('every control is reached by keys', async () => {
   must(await page.$eval('#panel', (element) => element.hidden), 'Escape does not close the panel');
 });
 
-await check('a phone has no horizontal scroll', async () => {
+await check('no horizontal scroll on a phone', async () => {
   await page.setViewport({ width: 390, height: 844, isMobile: true, hasTouch: true, deviceScaleFactor: 1 });
   await visit(at(finest * 16));
   await shot('phone');
@@ -505,10 +505,10 @@ async function fits(panel) {
   const wide = await page.evaluate(() => Math.max(document.documentElement.scrollWidth, document.body.scrollWidth));
   must(wide <= 390, `${panel}: the page is ${wide} px wide`);
   const outside = await page.evaluate(() => [...document.querySelectorAll('button, input, select')].filter((one) => { const box = one.getBoundingClientRect(); return box.width && box.height && (box.right > 391 || box.left < -1); }).length);
-  must(outside === 0, `${panel}: ${outside} controls stick out`);
+  must(outside === 0, `${panel}: ${outside} controls lie outside the page`);
 }
 
-await check('dark', async () => {
+await check('dark colour scheme', async () => {
   await page.setViewport({ width, height });
   await page.emulateMediaFeatures([{ name: 'prefers-color-scheme', value: 'dark' }]);
   await visit(at(finest * 8));

@@ -1,4 +1,4 @@
-//! What is served: worlds, of which any patch can be made, and the rasters of releases.
+//! The collections that are served: worlds, whose patches are generated on demand, and the rasters of releases.
 
 pub mod raster;
 pub mod tracks;
@@ -18,31 +18,31 @@ use std::collections::BTreeMap;
 use std::path::PathBuf;
 use std::sync::Arc;
 
-/// One thing that is served.
+/// A world or raster that is served.
 pub struct Collection {
-    /// Its id in addresses.
+    /// Its id in URLs.
     pub id: String,
-    /// File or release that it comes from, as it was given. Clients learn its name, not where it lies.
+    /// Study, world file or release that it comes from, as given on the command line. Clients see its name, not its path.
     pub source: PathBuf,
-    /// Its ground.
+    /// Source of its samples.
     pub ground: Ground,
-    /// What was driven in the release that it stands in.
+    /// Missions and rovers of the release that it belongs to.
     pub drives: Option<Arc<Drives>>,
 }
 
-/// Where samples come from.
+/// Source of samples.
 pub enum Ground {
-    /// Made on demand.
+    /// Generated on demand.
     World(Arc<World>),
     /// Read from a release.
     Raster(Arc<Raster>),
 }
 
-/// Everything that is served, by id.
+/// All collections by id.
 pub type Collections = BTreeMap<String, Arc<Collection>>;
 
 impl Collection {
-    /// Hash of all that its samples depend on.
+    /// Hash of everything its samples depend on.
     pub fn digest(&self) -> &str {
         match &self.ground {
             Ground::World(world) => &world.digest,
@@ -58,7 +58,7 @@ impl Collection {
         }
     }
 
-    /// Its fields.
+    /// Its available fields.
     pub fn fields(&self) -> Vec<&'static str> {
         let [albedo, class, potential] = match &self.ground {
             Ground::World(w) => {
@@ -72,7 +72,7 @@ impl Collection {
         fields.into_iter().filter(|(_, there)| *there).map(|(name, _)| name).collect()
     }
 
-    /// Distance of samples unasked, and the finest there is, m.
+    /// Default and finest sample spacing, m.
     pub fn spacings_m(&self) -> [f64; 2] {
         match &self.ground {
             Ground::World(world) => [world.cell_m(), world.spacing_m()],
@@ -80,7 +80,7 @@ impl Collection {
         }
     }
 
-    /// What clients are told of it.
+    /// Description for clients.
     pub fn describe(&self) -> Value {
         let [cell_m, spacing_m] = self.spacings_m();
         let mut all = json!({
@@ -113,7 +113,7 @@ impl Collection {
         all
     }
 
-    /// A name for people.
+    /// Display name.
     pub fn title(&self) -> &str {
         match &self.ground {
             Ground::World(_) => &self.id,
@@ -121,29 +121,29 @@ impl Collection {
         }
     }
 
-    /// The layers of its map tiles.
+    /// Available layers of map tiles.
     pub fn layers(&self) -> Vec<&'static str> {
         let fields = self.fields();
         let has = |layer: &&Layer| layer.field().is_none_or(|field| fields.contains(&field));
         crate::layers::ALL.iter().filter(has).map(|l| l.name()).collect()
     }
 
-    /// The layer of a name.
+    /// The layer with this name.
     ///
     /// # Errors
-    /// One that it does not have.
+    /// A layer that the collection does not have.
     pub fn layer(&self, name: &str) -> Result<Layer, Problem> {
         let known = self.layers();
-        Layer::of_name(name).filter(|layer| known.contains(&layer.name())).ok_or_else(|| {
-            Problem::not_found(format!("\"{}\" has no such layer; it has {}", self.id, known.join(", ")))
-        })
+        Layer::of_name(name)
+            .filter(|layer| known.contains(&layer.name()))
+            .ok_or_else(|| Problem::not_found(format!("no such layer; \"{}\" has {}", self.id, known.join(", "))))
     }
 }
 
-/// Reads everything that was named on the command line.
+/// Opens everything named on the command line.
 ///
 /// # Errors
-/// A file that has nothing to serve, or two things of one id.
+/// A file with nothing to serve, or two collections with the same id.
 pub fn open(paths: &[PathBuf], raster_bytes: u64) -> Result<Collections, Error> {
     let (mut all, memory) = (Collections::new(), raster::Memory::new(raster_bytes));
     for path in paths {
@@ -166,7 +166,7 @@ pub fn open(paths: &[PathBuf], raster_bytes: u64) -> Result<Collections, Error> 
         for (id, ground, drives) in found {
             if let Some(other) = all.get(&id) {
                 return Err(Error::Usage(format!(
-                    "{}: \"{id}\" is served from {} already; rename one of them, or name the file once",
+                    "{}: \"{id}\" is already served from {}; rename one of them, or name the file only once",
                     path.display(),
                     other.source.display()
                 )));
@@ -177,7 +177,7 @@ pub fn open(paths: &[PathBuf], raster_bytes: u64) -> Result<Collections, Error> 
     Ok(all)
 }
 
-/// A short name for a text that says all that samples depend on.
+/// Hash of a text that names everything samples depend on.
 fn digest(what: &str) -> String {
     blake3::hash(what.as_bytes()).to_hex()[..32].to_owned()
 }

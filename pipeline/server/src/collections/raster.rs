@@ -1,7 +1,8 @@
-//! The heights of a release, with the maps of the same cells. Files are read and checked against their sums when they are first asked for, and
-//! kept in memory as long as there is room.
+//! The heights of a release, with the maps on the same cells. Files are read and checked against their checksums on first use, and kept in memory
+//! while there is room.
 //!
-//! Points and patches lie between the cells of the file at any distance of samples; map tiles of coarse levels are drawn from means of cells.
+//! Points and patches are interpolated between the cells of the file, at any sample spacing; map tiles of coarse levels are drawn from means of
+//! cells.
 
 use crate::grid::{TILE, TileGrid, TileIndex};
 use crate::http::Problem;
@@ -15,25 +16,25 @@ use sastrugi_store::dem::{self, Crs, ReadOptions};
 use sastrugi_store::digest;
 use std::sync::Arc;
 
-/// Maps that are fields of a collection, and what they are called there.
+/// Maps of a release that become fields of the collection, by their names in the release.
 const MAPS: [&str; 3] = ["albedo", "class", "rock-potential"];
 
-/// The heights of a release.
+/// A raster of heights of a release.
 pub struct Raster {
     /// Its files.
     pub files: ServedRaster,
-    /// Shape and place.
+    /// Shape and position.
     pub geometry: Geometry,
-    /// Its tiles.
+    /// Its tile grid.
     pub grid: TileGrid,
     /// Coordinate reference system.
     pub crs: Crs,
-    /// Hash of its files, and of what is done with them.
+    /// Hash of its files and of the program's revision.
     pub digest: String,
     memory: Arc<Memory>,
 }
 
-/// Rasters that were read.
+/// Cache of rasters.
 pub struct Memory(Cache<String, Arc<Pyramid>, Bytes>);
 
 #[derive(Clone)]
@@ -46,26 +47,26 @@ impl Weighter<String, Arc<Pyramid>> for Bytes {
 }
 
 impl Memory {
-    /// Room for that many bytes.
+    /// A cache of that many bytes.
     pub fn new(bytes: u64) -> Arc<Self> {
         Arc::new(Self(undivided(64, bytes, Bytes)))
     }
 }
 
-/// The levels of a raster, from the file's own to one of few samples.
+/// The levels of a raster, from that of the file to one of at most 2 x 2 samples.
 pub type Pyramid = Vec<Level>;
 
-/// The samples of one level: those of the file, or means of 2 x 2 of the level below.
+/// The samples of one level: those of the file, or means of 2 x 2 samples of the next finer level.
 pub struct Level {
     geometry: Geometry,
     samples: Samples,
 }
 
 impl Raster {
-    /// A raster whose header can be read.
+    /// Opens a raster by reading its header.
     ///
     /// # Errors
-    /// A sentence on what is wrong with the file.
+    /// What is wrong with the file.
     pub fn open(files: ServedRaster, memory: &Arc<Memory>) -> Result<Self, String> {
         let reader = dem::open(&files.heights.path, &ReadOptions::default()).map_err(|e| e.to_string())?;
         let (geometry, crs) = (reader.geometry(), reader.info().crs.clone());
@@ -80,12 +81,12 @@ impl Raster {
         Ok(Self { files, geometry, grid, crs, digest, memory: Arc::clone(memory) })
     }
 
-    /// True where it has that map.
+    /// Whether it has this map.
     pub fn has(&self, map: &str) -> bool {
         self.files.maps.contains_key(map)
     }
 
-    /// Its levels: from memory, or those that `read` gives. One request reads however many wait.
+    /// Its levels, from memory or from `read`. Concurrent requests share one read.
     ///
     /// # Errors
     /// Those of `read`.
@@ -99,7 +100,7 @@ impl Raster {
     /// Reads its levels from its files.
     ///
     /// # Errors
-    /// Files that cannot be read, or are not those that were sealed.
+    /// Files that are unreadable, or changed since the release was sealed.
     pub fn read(&self) -> Result<Arc<Pyramid>, Problem> {
         self.pyramid().map(Arc::new).map_err(Problem::internal)
     }
@@ -133,12 +134,12 @@ impl Raster {
         Ok(levels)
     }
 
-    /// Samples at the places `(x0 + col step, y0 - row step)`, bilinear between the cells of the file, its first level.
+    /// Samples at the positions `(x0 + col step, y0 - row step)`, bilinear between the cells of the file, which is the first level.
     pub fn samples(&self, levels: &Pyramid, [x0, y0]: [f64; 2], step_m: f64, shape: [usize; 2]) -> Samples {
         levels[0].at(&self.geometry, [x0, y0], step_m, shape)
     }
 
-    /// The samples of a tile and one cell more on every side, from means of cells about as wide.
+    /// Samples of a tile with a margin of one on every side, from means of cells about as wide as a pixel.
     pub fn tile(&self, levels: &Pyramid, tile: TileIndex) -> Samples {
         let step_m = self.grid.resolution_m(tile.level);
         let [west, north] = self.grid.corner_m(tile);
@@ -148,11 +149,11 @@ impl Raster {
     }
 }
 
-/// The values of a file that is as its release sealed it. Clients learn its name, the log where it lies.
+/// Values of a file after checking that it has not changed since its release was sealed. Clients see its name; the log has its path.
 fn sealed(file: &SealedFile) -> Result<Grid, String> {
     let name = file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let refused = |error: &dyn std::fmt::Display| {
-        tracing::warn!(path = %file.path.display(), %error, "a file of a release cannot be served");
+        tracing::warn!(path = %file.path.display(), %error, "cannot serve a file of a release");
         format!("{name}: the file cannot be read")
     };
     let (_, sha256) = digest::of_file(&file.path).map_err(|e| refused(&e))?;
@@ -167,7 +168,7 @@ fn single(grid: &Grid) -> Vec<f32> {
 }
 
 impl Level {
-    /// Means of 2 x 2 samples, of those with data.
+    /// Means of the samples with data in blocks of 2 x 2.
     fn halved(&self) -> Option<Self> {
         let s = &self.samples;
         if s.rows.max(s.cols) <= 2 {
@@ -199,19 +200,19 @@ impl Level {
             rock_potential: s.rock_potential.as_deref().map(&of),
         };
         let cell = self.geometry.cell.map(|c| 2.0 * c);
-        // From the north-west corner, where tiles begin.
+        // Aligned with the north-west corner, where tiles begin.
         let north = self.geometry.origin[1] + self.geometry.size()[1];
         let origin = [self.geometry.origin[0], north - rows as f64 * cell[1]];
         Some(Self { geometry: Geometry { rows, cols, cell, origin }, samples })
     }
 
-    /// Bilinear samples; within half a cell of the edge those of the edge, beyond the cells of the file, `whole`, none.
+    /// Bilinear samples. Within half a cell of the edge they take the value of the edge; outside the file's cells, `whole`, there is no data.
     fn at(&self, whole: &Geometry, [x0, y0]: [f64; 2], step_m: f64, [rows, cols]: [usize; 2]) -> Samples {
         let (x, y) = (|c: usize| x0 + c as f64 * step_m, |r: usize| y0 - r as f64 * step_m);
         let g = &self.geometry;
         let down = |r: usize| (g.origin[1] + g.size()[1] - y(r)) / g.cell[1] - 0.5;
         let right = |c: usize| (x(c) - g.origin[0]) / g.cell[0] - 0.5;
-        // A place within rounding of a sample is that sample.
+        // A position within rounding of a sample is that sample.
         let settle = |at: f64| if (at - at.round()).abs() < 1e-6 { at.round() } else { at };
         let clamp = |at: f64, count: usize| settle(at.clamp(0.0, (count - 1) as f64));
         let down: Vec<f64> = (0..rows).map(|r| clamp(down(r), g.rows)).collect();
@@ -227,5 +228,47 @@ impl Level {
             return made;
         }
         made.without(|k| !(rows_in[k / cols] && cols_in[k % cols]))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn level([rows, cols]: [usize; 2], heights: Vec<f32>) -> Level {
+        let geometry = Geometry { rows, cols, cell: [1.0, 2.0], origin: [10.0, 20.0] };
+        Level { geometry, samples: Samples { heights, ..Samples::empty(rows, cols) } }
+    }
+
+    /// Blocks count from the north-west; those at the edges have fewer samples, and holes do not count.
+    #[test]
+    fn val_halved_levels_are_means_of_what_there_is() {
+        let halved = level([3, 3], (0..9).map(|k| k as f32).collect()).halved().unwrap();
+        assert_eq!(halved.samples.heights, [2.0, 3.5, 6.5, 8.0]);
+        // Cells of 2 m x 4 m; the north edge, at 26 m, stays.
+        assert_eq!(halved.geometry, Geometry { rows: 2, cols: 2, cell: [2.0, 4.0], origin: [10.0, 18.0] });
+        let mut heights: Vec<f32> = (0..9).map(|k| k as f32).collect();
+        (heights[0], heights[8]) = (f32::NAN, f32::NAN);
+        let halved = level([3, 3], heights).halved().unwrap().samples.heights;
+        assert!((halved[0] - 8.0 / 3.0).abs() < 1e-6 && halved[3].is_nan(), "{halved:?}");
+        assert!(level([2, 2], vec![0.0; 4]).halved().is_none());
+        assert!(level([1, 3], vec![0.0; 3]).halved().is_some());
+    }
+
+    /// Heights that are eastings: bilinear between centres of cells, level within half a cell of the edge, and none outside.
+    #[test]
+    fn val_samples_between_cells_are_bilinear() {
+        let of_x = level([2, 4], [10.5, 11.5, 12.5, 13.5].repeat(2));
+        let whole = of_x.geometry;
+        let at = |x: f64, y: f64| of_x.at(&whole, [x, y], 0.25, [1, 1]).heights[0];
+        assert_eq!([at(10.5, 22.0), at(11.0, 22.0), at(12.75, 21.3)], [10.5, 11.0, 12.75]);
+        assert_eq!([at(10.0, 22.0), at(10.2, 20.0), at(14.0, 24.0)], [10.5, 10.5, 13.5]);
+        for (x, y) in [(9.9, 22.0), (14.1, 22.0), (12.0, 19.9), (12.0, 24.1)] {
+            assert!(at(x, y).is_nan(), "{x} {y}");
+        }
+        // Southward by rows, eastward by columns.
+        let of_y = level([2, 2], vec![23.0, 23.0, 21.0, 21.0]);
+        let made = of_y.at(&of_y.geometry, [10.5, 23.0], 1.0, [3, 2]);
+        assert_eq!(made.heights, [23.0, 23.0, 22.0, 22.0, 21.0, 21.0]);
     }
 }

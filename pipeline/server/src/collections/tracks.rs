@@ -1,4 +1,4 @@
-//! Missions and rovers of a release, on the terrain that they were driven over.
+//! Missions and rovers of a release, by the terrain that they were driven on.
 
 use super::Collection;
 use crate::collections::Ground;
@@ -10,12 +10,12 @@ use serde_json::{Value, json};
 use std::collections::BTreeMap;
 use std::sync::OnceLock;
 
-/// Most points of a track that are sent.
+/// Largest number of points sent per track.
 const POINTS_MAX: usize = 5000;
-/// Most missions and rovers that are listed.
+/// Largest number of missions and rovers listed.
 pub const LISTED_MAX: usize = 10_000;
 
-/// Where a track leads.
+/// Poses along a track.
 #[derive(Default)]
 struct Track {
     time_s: Vec<f64>,
@@ -50,17 +50,17 @@ impl Track {
 pub struct Drives {
     /// The release.
     pub release: Release,
-    /// How many drives there are on each terrain.
+    /// Number of missions and rovers on each terrain.
     counts: OnceLock<BTreeMap<String, usize>>,
 }
 
 impl Drives {
-    /// Those of a release.
+    /// Missions and rovers of a release.
     pub fn new(release: Release) -> Self {
         Self { release, counts: OnceLock::new() }
     }
 
-    /// Calls `f` with every drive.
+    /// Calls `f` with every mission and rover.
     fn each(&self, mut f: impl FnMut(Drive)) -> Result<(), Problem> {
         rows(&self.release, |row: MissionRow| {
             f(Drive {
@@ -86,7 +86,7 @@ impl Drives {
         })
     }
 
-    /// How many there are on a terrain; 0 as long as the tables cannot be read.
+    /// Number of missions and rovers on a terrain; 0 while the tables cannot be read.
     fn count(&self, terrain: &str) -> usize {
         let count = |counts: &BTreeMap<String, usize>| counts.get(terrain).copied().unwrap_or(0);
         if let Some(counts) = self.counts.get() {
@@ -128,15 +128,15 @@ impl Collection {
         }
     }
 
-    /// How many missions and rovers there are. Reads tables at first: not for the threads of the runtime.
+    /// Number of missions and rovers. The first call reads tables: do not call it on the runtime's threads.
     pub fn tracks(&self) -> usize {
         self.driven_on().map_or(0, |(drives, terrain)| drives.count(terrain))
     }
 
-    /// The first missions and rovers, at most [`LISTED_MAX`]. Reads tables: not for the threads of the runtime.
+    /// The first missions and rovers, at most [`LISTED_MAX`]. Reads tables: do not call it on the runtime's threads.
     ///
     /// # Errors
-    /// A table that cannot be read.
+    /// A table cannot be read.
     pub fn track_list(&self) -> Result<Vec<Value>, Problem> {
         let Some((drives, terrain)) = self.driven_on() else { return Ok(Vec::new()) };
         let mut tracks = Vec::new();
@@ -148,10 +148,10 @@ impl Collection {
         Ok(tracks)
     }
 
-    /// One track. Reads tables: not for the threads of the runtime.
+    /// One track. Reads tables: do not call it on the runtime's threads.
     ///
     /// # Errors
-    /// A table that cannot be read, or no track of that id.
+    /// A table cannot be read, or there is no track with this id.
     pub fn track(&self, id: &str) -> Result<Value, Problem> {
         let mut track = Track::default();
         if let Some((Drives { release, .. }, terrain)) = self.driven_on() {
@@ -168,7 +168,7 @@ impl Collection {
             })?;
         }
         if track.time_s.is_empty() {
-            return Err(Problem::not_found(format!("\"{id}\": no such track on this terrain; `tracks` lists them")));
+            return Err(Problem::not_found(format!("no such track on this terrain: \"{id}\"; `tracks` lists them")));
         }
         let t = track.thinned();
         Ok(json!({
@@ -179,4 +179,32 @@ impl Collection {
 
 fn rows<R: Record>(release: &Release, f: impl FnMut(R)) -> Result<(), Problem> {
     release.for_each_row(f).map_err(|e: ReleaseError| Problem::internal(e.to_string()))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A track is thinned to at most 5000 points and its last one.
+    #[test]
+    fn val_thinned_tracks_keep_their_ends() {
+        let thinned = |count: usize| {
+            let mut track = Track::default();
+            for time_s in (0..count).map(|k| k as f64) {
+                track.push(time_s, [1.0, 2.0, 3.0].map(|more| time_s + more), time_s + 4.0);
+            }
+            track.thinned()
+        };
+        for (count, expected) in [(0, 0), (1, 1), (5000, 5000), (5001, 2501), (5002, 2502), (12_000, 4001)] {
+            let track = thinned(count);
+            assert_eq!(track.time_s.len(), expected, "{count}");
+            assert_eq!(track.time_s.first().copied(), (count > 0).then_some(0.0));
+            assert_eq!(track.time_s.last().copied(), count.checked_sub(1).map(|last| last as f64));
+            // Each column keeps to its own.
+            for (k, time_s) in track.time_s.iter().enumerate() {
+                let others = [track.x_m[k], track.y_m[k], track.z_m[k], track.heading_deg[k]];
+                assert_eq!(others, [1.0, 2.0, 3.0, 4.0].map(|more| time_s + more));
+            }
+        }
+    }
 }

@@ -1,8 +1,8 @@
-//! A world whose patches are made on demand, in tiles of 256 x 256 samples that the library keeps.
+//! A world, whose patches are generated on demand in tiles of 256 x 256 samples that the library keeps.
 //!
-//! Patches stand on lattice points, map tiles in the middle between them. In a map tile of samples `s` apart craters and rocks narrower than `2 s`
-//! are left out: they could not be told from noise, a crater's mean over its ground is 0, and the time of a tile is then the same at every
-//! zoom. What the rocks that are left out cover counts in the share of rock.
+//! Samples of patches lie on lattice points, those of map tiles half-way between them. A map tile with sample spacing `s` leaves out craters and
+//! rocks narrower than `2 s`: they would be indistinguishable from noise, the heights of a crater average to 0 over its area, and the cost of a tile
+//! becomes independent of the zoom. Rocks that are left out still count in the share of rock.
 
 use crate::grid::{TILE, TileGrid, TileIndex};
 use crate::http::Problem;
@@ -20,59 +20,59 @@ use std::collections::HashSet;
 use std::sync::Arc;
 use tokio::task::JoinSet;
 
-/// Levels of the map: 256 pixels over the whole square to the finest.
+/// Levels of the map, from 256 pixels over the complete square to the finest.
 const LEVELS: u32 = 17;
-/// The finest pixels are this many basic spacings wide, so that their middles are lattice points.
+/// Finest pixel size in basic spacings; 2, so that pixel centres are lattice points.
 const FINEST_SPACINGS: f64 = 2.0;
-/// In a map tile features narrower than this many pixels are left out.
+/// Map tiles leave out features narrower than this many pixels.
 pub const FEATURE_PIXELS: f64 = 2.0;
-/// Lattice points are counted up to here.
+/// Largest lattice index.
 const LATTICE_MAX: f64 = (1u64 << 52) as f64;
-/// Coarsest samples that are made, in doublings of the basic spacing.
+/// Coarsest spacing, in doublings of the basic spacing.
 const ZOOM_MAX: u32 = 40;
-/// Most sets of processes whose grounds are kept.
+/// Number of subsets of processes whose grounds are cached.
 const GROUNDS: usize = 32;
-/// Most samples of a window that is always made by itself.
+/// A window of at most this many samples is always generated on its own.
 const FEW: usize = 16;
-/// Tiles of one request that are asked of the library at once.
+/// Tiles of one request that are fetched from the library at once.
 const AT_ONCE: usize = 16;
-/// Windows up to this size are made by themselves at first; larger ones are made in tiles, side by side.
+/// Windows up to this size may be generated on their own; larger ones are generated in tiles, concurrently.
 const ALONE_MAX: usize = TILE + 2;
-/// A window is made by itself where its tiles take so many times as long.
+/// A window is generated on its own if its tiles are expected to take this many times as long.
 const ALONE_GAIN: f64 = 2.0;
-/// Samples along the side of a look at the whole map, for its range of heights.
+/// Samples along each side when sampling the complete map for its range of heights.
 const LOOK: usize = 64;
-/// A world whose range, which nine tenths of its heights lie in, is no larger a share of what `elevation` spans is shown whole.
+/// `elevation` is centred on the range of a world (5 to 95 % of its heights) if that range is at most this share of the span of `elevation`.
 const RANGE_SHARE: f64 = 0.75;
-/// A distance of samples is that of a lattice when it differs by no more than this part of it.
+/// Relative tolerance within which a sample spacing equals that of a lattice.
 const SAME: f64 = 1e-9;
-/// A place this near to a lattice point, in spacings, is that point.
+/// Tolerance within which a position is a lattice point, in spacings.
 const WHOLE: f64 = 1e-6;
-/// Most processor time that a tile may be expected to take, s; the craters and rocks of such a tile hold up to 3 GB.
+/// Largest expected processor time of a tile, s; the craters and rocks of such a tile take up to 3 GB.
 const TILE_SECONDS: f64 = 10.0;
 
-/// Which part of a world is asked for.
+/// Processes and features that a request selects.
 #[derive(Clone, Debug, PartialEq, Default)]
 pub struct Selection {
-    /// The processes that act, as places in the list from 0, rising; all when absent.
+    /// Processes to apply, as ascending indices from 0; all if absent.
     pub phenomena: Option<Vec<usize>>,
-    /// Craters and rocks that are not wider are left out, m.
+    /// Craters and rocks up to this width are left out, m.
     pub feature_min_m: f64,
 }
 
-/// How the samples of a window are made.
+/// How the samples of a window are generated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Piece {
-    /// In tiles that the library keeps, for what lies around it too.
+    /// In tiles that the library keeps, which serve the surroundings too.
     Tiles,
-    /// By itself where that is cheaper and nobody has asked for its tiles before, else in tiles.
+    /// On its own if that is cheaper and no request has used its tiles before, else in tiles.
     Either,
-    /// By itself: right for a few samples.
+    /// On its own; suitable for a few samples.
     Alone,
 }
 
 impl Piece {
-    /// Few samples by themselves; others as is cheaper.
+    /// On its own for a few samples; else whichever is cheaper.
     pub fn of([rows, cols]: [usize; 2]) -> Self {
         if rows * cols <= FEW { Self::Alone } else { Self::Either }
     }
@@ -81,34 +81,34 @@ impl Piece {
 /// A world.
 pub struct World {
     served: ServedWorld,
-    /// Its tiles.
+    /// Its tile grid.
     pub grid: TileGrid,
-    /// Hash of all that samples depend on: parameters, streams, sources of the generator.
+    /// Hash of everything samples depend on: parameters, streams, and the revision of the generator.
     pub digest: String,
     range_m: [f64; 2],
     middle_m: f64,
-    /// Where lattice point 0 lies, m.
+    /// Position of lattice point 0, m.
     offset_m: [f64; 2],
-    /// Most doublings of the basic spacing.
+    /// Largest number of doublings of the basic spacing.
     zoom_max: u32,
-    /// The ground that all processes make.
-    whole: Arc<dyn Windows>,
-    /// Grounds that some of the processes make, by their places in the list.
+    /// The ground with all processes applied.
+    complete: Arc<dyn Windows>,
+    /// Grounds with a subset of the processes applied, by indices of the processes.
     parts: Cache<Vec<usize>, Arc<dyn Windows>>,
 }
 
 impl World {
-    /// A world, after a look at all of it.
+    /// Opens a world, and samples it for its range of heights.
     ///
     /// # Errors
-    /// An input that is missing.
+    /// A missing input.
     pub fn open(served: ServedWorld) -> Result<Self, Error> {
         let (spacing_m, offset_m) = (served.spacing_m(), served.offset_m());
         let (grid, zoom_max) = match served.dem() {
             None => (square(spacing_m), ZOOM_MAX),
             Some(dem) => bounded(spacing_m, offset_m, &dem.geometry),
         };
-        // Where it starts does not matter to what it is.
+        // The window of the file does not affect the ground.
         let mut parameters = served.parameters.clone();
         if let Value::Object(map) = &mut parameters {
             for key in ["size_m", "size_px", "origin_m", "cell_m"] {
@@ -118,15 +118,15 @@ impl World {
         let inputs: Vec<String> = served.inputs.iter().map(content).collect();
         let what = format!("{} {} {parameters} {offset_m:?} {inputs:?}", crate::revision(), served.streams.label());
         let digest = super::digest(&what);
-        let (whole, range_m) = (served.ground(|_| true)?, [0.0; 2]);
+        let (complete, range_m) = (served.ground(|_| true)?, [0.0; 2]);
         let parts = Cache::new(GROUNDS);
-        let mut world = Self { served, grid, digest, range_m, middle_m: 0.0, offset_m, zoom_max, whole, parts };
+        let mut world = Self { served, grid, digest, range_m, middle_m: 0.0, offset_m, zoom_max, complete, parts };
         world.range_m = world.look();
         world.middle_m = world.middle();
         Ok(world)
     }
 
-    /// Heights that nine tenths of the map lie between, by the posts of its DEM, or some of its samples.
+    /// The 5 % and 95 % quantiles of the map's heights, from the posts of its DEM or from samples.
     fn look(&self) -> [f64; 2] {
         let mut heights = self.served.dem().map_or_else(|| self.sampled(), |dem| dem.values.clone());
         heights.retain(|z| z.is_finite());
@@ -137,7 +137,7 @@ impl World {
         [part(0.05), part(0.95)]
     }
 
-    /// Height that `elevation` is centred on: the middle of the range of a world that fits; else that in the middle of the window of its file, where
+    /// Height that `elevation` is centred on: the middle of the range of heights if that fits; else the height at the centre of the file's window, if
     /// there is ground.
     fn middle(&self) -> f64 {
         let [low, high] = self.range_m;
@@ -150,11 +150,11 @@ impl World {
         let [west, south] = at.map(|m| (m / self.step_m(zoom)).round() as i64);
         let window = Window { zoom, west, south, cols: 1, rows: 1, centred: false };
         let request = Request { window, feature_min_m: 0.0, cancel: None };
-        let height = self.whole.patch_for(&request).map_or(f64::NAN, |patch| patch.heights[0]);
+        let height = self.complete.patch_for(&request).map_or(f64::NAN, |patch| patch.heights[0]);
         if height.is_finite() { height } else { 0.5 * (low + high) }
     }
 
-    /// Some heights of a world without end.
+    /// Samples of the heights of an unbounded world.
     fn sampled(&self) -> Vec<f64> {
         let [west, south, east, north] = self.grid.bounds_m();
         let zoom = self.zoom_below((east - west).max(north - south) / LOOK as f64);
@@ -162,27 +162,27 @@ impl World {
         let [west, south] = self.to_lattice([west, south]).map(|m| (m / step).round() as i64);
         let window = Window { zoom, west, south, cols: LOOK, rows: LOOK, centred: false };
         let request = Request { window, feature_min_m: FEATURE_PIXELS * step, cancel: None };
-        self.whole.patch_for(&request).map_or_else(Vec::new, |patch| patch.heights)
+        self.complete.patch_for(&request).map_or_else(Vec::new, |patch| patch.heights)
     }
 
-    /// The ground that some of its processes make. It shares what is large with the ground of all.
+    /// The ground with a subset of the processes applied; it shares its large data with the ground of all.
     fn ground(&self, phenomena: &Option<Vec<usize>>) -> Result<Arc<dyn Windows>, Problem> {
-        let Some(places) = phenomena else { return Ok(Arc::clone(&self.whole)) };
+        let Some(places) = phenomena else { return Ok(Arc::clone(&self.complete)) };
         let make = || self.served.ground(|place| places.contains(&place));
         self.parts.get_or_insert_with(places, make).map_err(|e| Problem::internal(e.to_string()))
     }
 
-    /// A place as distances from lattice point 0, m.
+    /// A position relative to lattice point 0, m.
     pub fn to_lattice(&self, place_m: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| place_m[axis] - self.offset_m[axis])
     }
 
-    /// Id in addresses.
+    /// Id in URLs.
     pub fn id(&self) -> &str {
         &self.served.id
     }
 
-    /// Licence of the study that it stands in.
+    /// Licence of the study that it belongs to.
     pub fn license(&self) -> Option<&str> {
         self.served.license.as_deref()
     }
@@ -192,24 +192,24 @@ impl World {
         self.served.spacing_m()
     }
 
-    /// Distance of samples that its file asks for, m.
+    /// Sample spacing that its file specifies, m.
     pub fn cell_m(&self) -> f64 {
         self.served.window().1
     }
 
-    /// The window of its file: west, south, east and north, m.
+    /// Window of its file: west, south, east and north, m.
     pub fn home_m(&self) -> [f64; 4] {
         let ([west, south], cell_m, size_px) = self.served.window();
         let [cols, rows] = size_px.unwrap_or([512; 2]);
         [west, south, west + f64::from(cols) * cell_m, south + f64::from(rows) * cell_m]
     }
 
-    /// Heights that nine tenths of its map lie between, m.
+    /// The 5 % and 95 % quantiles of the map's heights, m.
     pub fn height_range_m(&self) -> [f64; 2] {
         self.range_m
     }
 
-    /// Height that map tiles of fine heights are centred on, m.
+    /// Height that tiles of the layer `elevation` are centred on, m.
     pub fn middle_height_m(&self) -> f64 {
         self.middle_m
     }
@@ -218,9 +218,9 @@ impl World {
         self.served.processes().iter().map(planetary::RawProcess::kind)
     }
 
-    /// Whether it has an albedo, and rocks.
+    /// Whether it has albedo, and whether it has rocks.
     pub fn has(&self) -> [bool; 2] {
-        [self.whole.has_albedo(), self.whole.has_rocks()]
+        [self.complete.has_albedo(), self.complete.has_rocks()]
     }
 
     /// Its processes.
@@ -229,19 +229,22 @@ impl World {
         self.served.processes().iter().enumerate().map(process).collect()
     }
 
-    /// The processes of some numbers, counted from 1.
+    /// Indices of the processes with these numbers, which count from 1; `None` if these are all.
     ///
     /// # Errors
-    /// A number that the list does not have.
+    /// A number that is not in the list.
     pub fn choose(&self, numbers: Option<Vec<usize>>) -> Result<Option<Vec<usize>>, Problem> {
         let Some(mut numbers) = numbers else { return Ok(None) };
         let count = self.served.processes().len();
         if let Some(n) = numbers.iter().find(|n| !(1..=count).contains(*n)) {
             return Err(Problem::bad_request(format!(
-                "`phenomena`: there is no process {n}; {}",
+                "`phenomena`: no process {n}; {}",
                 match count {
-                    0 => "this world has none: leave the parameter out, or empty".to_owned(),
-                    _ => format!("this world has 1 to {count}: {}", self.kinds().collect::<Vec<_>>().join(", ")),
+                    0 => "this world has none, so omit the parameter or leave it empty".to_owned(),
+                    _ => format!(
+                        "this world has processes 1 to {count}: {}",
+                        self.kinds().collect::<Vec<_>>().join(", ")
+                    ),
                 }
             )));
         }
@@ -251,10 +254,10 @@ impl World {
         Ok((places.len() < count).then_some(places))
     }
 
-    /// A section of a study that makes the same patch.
+    /// A study section that reproduces the patch.
     ///
     /// # Errors
-    /// A window that `planetary` does not have: samples between those of the lattices.
+    /// A window that `planetary` cannot generate, with samples between lattice points.
     pub fn snippet(&self, origin_m: [f64; 2], size_px: [usize; 2], cell_m: f64) -> Result<String, Problem> {
         let failed = |e: Error| Problem::internal(e.to_string());
         let mut parameters = self.served.parameters.clone();
@@ -278,22 +281,22 @@ impl World {
         sastrugi_stages::verbs::served::section(&head, seed, kind, &parameters).map_err(failed)
     }
 
-    /// Distance of samples after some doublings, m.
+    /// Sample spacing after `zoom` doublings, m.
     pub fn step_m(&self, zoom: u32) -> f64 {
         self.spacing_m() * (1u64 << zoom) as f64
     }
 
-    /// Distance of its coarsest samples, m.
+    /// Coarsest sample spacing, m.
     pub fn coarsest_m(&self) -> f64 {
         self.step_m(self.zoom_max)
     }
 
-    /// The doublings after which samples are no farther apart than that.
+    /// Largest number of doublings with a spacing of at most `step_m`.
     fn zoom_below(&self, step_m: f64) -> u32 {
         (0..=self.zoom_max).take_while(|k| self.step_m(*k) <= step_m * (1.0 + SAME)).last().unwrap_or(0)
     }
 
-    /// How many doublings make that distance of samples, if some do.
+    /// Number of doublings with exactly this spacing, if there is one.
     pub fn zoom_of(&self, step_m: f64) -> Option<u32> {
         (0..=self.zoom_max).find(|zoom| (self.step_m(*zoom) / step_m - 1.0).abs() <= SAME)
     }
@@ -301,40 +304,40 @@ impl World {
     /// Refuses columns or rows of a lattice beyond the end of the world.
     ///
     /// # Errors
-    /// Those.
+    /// The index is beyond the end of the world.
     pub fn check_reach(&self, zoom: u32, index: f64) -> Result<(), Problem> {
         if (index.abs() + TILE as f64) * (1u64 << zoom) as f64 <= LATTICE_MAX {
             return Ok(());
         }
         let end_m = LATTICE_MAX * self.spacing_m();
         Err(Problem::unprocessable(format!(
-            "the world ends {end_m:.3e} m from its origin; choose a place within that distance"
+            "the world ends {end_m:.3e} m from its origin; choose a position within that distance"
         )))
     }
 
-    /// Column or row of a lattice window for a place, `None` where it does not stand on one.
+    /// Column or row of the lattice at a position; `None` if the position is not on the lattice.
     fn on_lattice(at_m: f64, step_m: f64) -> Option<i64> {
         let quotient = at_m / step_m;
-        let whole = (quotient - quotient.round()).abs() <= WHOLE + 4.0 * f64::EPSILON * quotient.abs();
-        whole.then(|| quotient.round() as i64)
+        let is_on = (quotient - quotient.round()).abs() <= WHOLE + 4.0 * f64::EPSILON * quotient.abs();
+        is_on.then(|| quotient.round() as i64)
     }
 }
 
-/// A tile of the lattice, by its column and row of tiles.
+/// Window of a lattice tile, from the tile's column and row.
 fn tile_window(zoom: u32, [col, row]: [i64; 2]) -> Window {
     let (west, south) = (TILE as i64 * col, TILE as i64 * row);
     Window { zoom, west, south, cols: TILE, rows: TILE, centred: false }
 }
 
-/// The square about the origin that the map of a world without end shows.
+/// The square around the origin that the map of an unbounded world covers.
 fn square(spacing_m: f64) -> TileGrid {
     let finest_m = FINEST_SPACINGS * spacing_m;
     let side = finest_m * TILE as f64 * f64::from(1u32 << (LEVELS - 1));
     TileGrid { origin_m: [-0.5 * side, 0.5 * side], size_m: [side; 2], finest_m, levels: LEVELS }
 }
 
-/// The map of a ground between the outer posts of a DEM, in pixels of two basic spacings to half the distance of the posts, and the most doublings of
-/// the spacing.
+/// Tile grid of a ground within the outer posts of a DEM, with pixels from two basic spacings to half the post spacing, and the largest number of
+/// doublings of the basic spacing.
 fn bounded(spacing_m: f64, offset_m: [f64; 2], posts: &Geometry) -> (TileGrid, u32) {
     let coarsest_m = 0.5 * posts.cell[0].min(posts.cell[1]);
     let zoom_max = (1..ZOOM_MAX).take_while(|k| spacing_m * (1u64 << k) as f64 <= coarsest_m).last().unwrap_or(1);
@@ -347,7 +350,7 @@ fn bounded(spacing_m: f64, offset_m: [f64; 2], posts: &Geometry) -> (TileGrid, u
     (TileGrid { origin_m: [west, north], size_m, finest_m: FINEST_SPACINGS * spacing_m, levels: zoom_max }, zoom_max)
 }
 
-/// A short name for what an input holds.
+/// Hash of the content of an input.
 fn content(input: &Input) -> String {
     let mut hash = blake3::Hasher::new();
     let mut add = |value: &f64| {
@@ -363,7 +366,7 @@ fn content(input: &Input) -> String {
     hash.finalize().to_hex()[..32].to_owned()
 }
 
-/// A comment on how to come to the same draws, and the seed that the section states.
+/// A comment on how to reproduce the random draws, and the seed that the section states.
 fn seed_lines(label: &str, id: &str) -> (String, Option<u64>) {
     let words: Vec<&str> = label.split('/').collect();
     match words.as_slice() {
@@ -376,22 +379,22 @@ fn seed_lines(label: &str, id: &str) -> (String, Option<u64>) {
     }
 }
 
-/// What a window of samples asks of the library.
+/// How a window of samples is generated.
 #[derive(Clone)]
 pub struct Maker {
-    /// Where tiles are kept.
+    /// Cache of tiles.
     pub library: Arc<Library>,
-    /// Whether somebody waits.
+    /// Whether a client is waiting.
     pub priority: Priority,
-    /// Most processor time that all tiles of one request may be expected to take, s.
+    /// Largest expected processor time of all tiles of one request, s.
     pub seconds_max: f64,
 }
 
 impl World {
-    /// A tile of the map with one sample more on every side.
+    /// Samples of a map tile with a margin of one on every side.
     ///
     /// # Errors
-    /// A library that has no room for the request.
+    /// The library is busy.
     pub async fn map_tile(
         &self,
         maker: &Maker,
@@ -420,7 +423,7 @@ impl World {
         ))
     }
 
-    /// The samples of one window, as the library keeps them.
+    /// Samples of one window, cached by the library.
     async fn window(&self, maker: &Maker, window: Window, selection: &Selection) -> Result<Arc<Samples>, Problem> {
         let key = self.key(&window, selection);
         let ground = self.ground(&selection.phenomena)?;
@@ -431,15 +434,15 @@ impl World {
             Some(from_south(&*ground, &ground.patch_for(&request)?, feature_min_m))
         };
         maker.library.tile(key, maker.priority, make).await.map_err(|e| match e {
-            Unavailable::Busy => Problem::unavailable("the queue of tiles is full; try again in 2 s"),
+            Unavailable::Busy => Problem::unavailable("the tile queue is full; try again in 2 s"),
             Unavailable::Failed(_) => Problem::internal(e.to_string()),
         })
     }
 
-    /// Refuses tiles of the lattice that are expected to take too long: all of them together, or one.
+    /// Refuses lattice tiles whose expected processor time is too long, either together or for one of them.
     ///
     /// # Errors
-    /// A sentence with a `feature_min_m` that would do.
+    /// The message names a `feature_min_m` that would be accepted.
     pub fn check_work(&self, zoom: u32, tiles: u64, selection: &Selection, seconds_max: f64) -> Result<(), Problem> {
         let ground = self.ground(&selection.phenomena)?;
         let window = tile_window(zoom, [0, 0]);
@@ -447,7 +450,7 @@ impl World {
         self.check_seconds(&*ground, &window, selection.feature_min_m, [tiles as f64, seconds_max])
     }
 
-    /// Refuses a number of tiles like a window that are expected to take longer than a limit on one core.
+    /// Refuses `tiles` windows like this one if their expected processor time on one core exceeds the limit.
     fn check_seconds(
         &self,
         ground: &dyn Windows,
@@ -467,7 +470,7 @@ impl World {
         let advice = advice.map(|m| format!("`feature_min_m={m}` to leave out craters and rocks up to that width"));
         let detail = if tiles > 1.0 {
             format!(
-                "this takes about {wanted_s:.0} s of processor time; the limit is {limit_s:.0} s. Request a smaller area{}",
+                "this request takes about {wanted_s:.0} s of processor time; the limit is {limit_s:.0} s. Request a smaller area{}",
                 advice.map_or_else(String::new, |advice| format!(", or set {advice}"))
             )
         } else {
@@ -480,7 +483,7 @@ impl World {
         Err(Problem::too_large(detail, "processor_seconds_max", limit_s as u64))
     }
 
-    /// Refuses samples at some places that are expected to take too long together, each made by itself or from the tile that it lies in.
+    /// Refuses samples at some positions whose expected total processor time is too long, each generated on its own or from its tile.
     ///
     /// # Errors
     /// As [`Self::check_work`].
@@ -504,17 +507,17 @@ impl World {
         self.check_work(zoom, tiles.len() as u64, selection, seconds_max)
     }
 
-    /// The tiles that a window of the lattice lies in, as `(column, row)` of tiles.
+    /// The lattice tiles that a window overlaps, as `(column, row)`.
     pub fn tiles_of(first: [i64; 2], [rows, cols]: [usize; 2]) -> Vec<[i64; 2]> {
         let side = TILE as i64;
         let span = |first: i64, count: usize| first.div_euclid(side)..=(first + count as i64 - 1).div_euclid(side);
         span(first[1], rows).flat_map(|row| span(first[0], cols).map(move |col| [col, row])).collect()
     }
 
-    /// The samples of one tile of the lattice.
+    /// Samples of one lattice tile.
     ///
     /// # Errors
-    /// A library that has no room for the request.
+    /// The library is busy.
     pub async fn lattice_tile(
         &self,
         maker: &Maker,
@@ -525,8 +528,8 @@ impl World {
         self.window(maker, tile_window(zoom, [col, row]), selection).await
     }
 
-    /// The keys of the tiles of a window that is better made by itself: that is cheaper, and no other window has asked for one of them before.
-    /// Clients that ask here and there get their samples soon; those that go on to what lies beside them find tiles.
+    /// The keys of a window's tiles if the window is better generated on its own: that is cheaper, and no other request has used one of these tiles.
+    /// Clients that sample scattered places then get their samples soon, and those that move on to adjacent windows find tiles.
     fn alone(
         &self,
         library: &Library,
@@ -552,11 +555,11 @@ impl World {
         Ok(alone.then_some(keys))
     }
 
-    /// Samples `step_m` apart, the south-west one at `origin_m`: lattice points where they stand on them, bilinear between the points of the next
-    /// finer lattice elsewhere.
+    /// Samples `step_m` apart with the south-west one at `origin_m`: exact where they fall on lattice points, else bilinear between the points of the
+    /// next finer lattice.
     ///
     /// # Errors
-    /// Places beyond the end of the world; a library that has no room for the request.
+    /// Positions beyond the end of the world; a busy library.
     pub async fn samples(
         self: &Arc<Self>,
         maker: &Maker,
@@ -570,7 +573,7 @@ impl World {
         let own_m = self.step_m(zoom);
         if step_m > 2.0 * own_m {
             return Err(Problem::bad_request(format!(
-                "`resolution_m` is {step_m}; at {} m or coarser use the DEM itself, or request a finer resolution",
+                "`resolution_m` must be at most {} m, got {step_m} m; for coarser samples use the DEM itself",
                 2.0 * own_m
             )));
         }
@@ -596,13 +599,13 @@ impl World {
         Ok(fine.between(&down, &right))
     }
 
-    /// The place nearest to another that stands on a lattice of that distance of samples.
-    pub fn settled(&self, at_m: [f64; 2], step_m: f64) -> [f64; 2] {
+    /// The position nearest to `at_m` on the lattice with spacing `step_m`.
+    pub fn snapped(&self, at_m: [f64; 2], step_m: f64) -> [f64; 2] {
         let on = self.to_lattice(at_m).map(|m| (m / step_m).round() * step_m);
         [0, 1].map(|axis| on[axis] + self.offset_m[axis])
     }
 
-    /// Samples at lattice points, from the tiles that they lie in or by themselves.
+    /// Samples at lattice points, from their tiles or generated on their own.
     async fn lattice(
         self: &Arc<Self>,
         maker: &Maker,
@@ -622,7 +625,7 @@ impl World {
             return self.window(maker, window, selection).await.map(|samples| Samples::clone(&samples));
         }
         let places = Self::tiles_of(first, shape);
-        // The same request is refused or not, however it is made.
+        // A request must be refused or not regardless of how its samples are generated.
         self.check_work(zoom, places.len() as u64, selection, maker.seconds_max)?;
         if piece == Piece::Either
             && let Some(tiles) = self.alone(&maker.library, &window, &places, selection)?
@@ -641,14 +644,14 @@ impl World {
             let Some(joined) = tiles.join_next().await else { break };
             let (place, tile) = joined.map_err(|e| Problem::internal(e.to_string()))?;
             let tile = tile?;
-            made.get_or_insert_with(|| tile.void_like(shape)).lay(&tile, first, place);
+            made.get_or_insert_with(|| tile.void_like(shape)).paste(&tile, first, place);
         }
         made.ok_or_else(|| Problem::bad_request("`size` must be at least 1,1"))
     }
 }
 
 impl Samples {
-    /// Without data, with the fields of another.
+    /// Samples without data, with the same fields as `self`.
     fn void_like(&self, [rows, cols]: [usize; 2]) -> Self {
         let void = || vec![f32::NAN; rows * cols];
         let like = |field: &Option<Vec<f32>>| field.as_ref().map(|_| void());
@@ -662,8 +665,8 @@ impl Samples {
         }
     }
 
-    /// Lays the part of a tile (in a column and row of tiles) that lies in the window from `first` on; rows of tiles count from the south.
-    fn lay(&mut self, tile: &Self, first: [i64; 2], [col, row]: [i64; 2]) {
+    /// Copies the part of a tile (at a column and row of tiles) that lies in the window starting at `first`; rows of tiles count from the south.
+    fn paste(&mut self, tile: &Self, first: [i64; 2], [col, row]: [i64; 2]) {
         let side = TILE as i64;
         let span = |tile: i64, first: i64, count: usize| {
             let (from, to) = ((side * tile).max(first), (side * (tile + 1)).min(first + count as i64));
@@ -692,7 +695,7 @@ impl Samples {
     }
 }
 
-/// A patch with row 0 in the north, in single precision as files hold it; rocks that were left out count by their share.
+/// Converts a patch to row 0 in the north and to single precision, as in files; rocks that were left out count with their share.
 fn from_south(ground: &dyn Windows, patch: &Patch, feature_min_m: f64) -> Samples {
     let Window { rows, cols, .. } = patch.window;
     let turned =
@@ -711,5 +714,73 @@ fn from_south(ground: &dyn Windows, patch: &Patch, feature_min_m: f64) -> Sample
         albedo: ground.has_albedo().then(|| turned(&patch.albedo)),
         rock,
         rock_potential: ground.has_rocks().then(|| turned(&patch.rock_potential)),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_windows_overlap_their_tiles() {
+        assert_eq!(World::tiles_of([0, 0], [256, 256]), [[0, 0]]);
+        assert_eq!(World::tiles_of([-1, 0], [1, 2]), [[-1, 0], [0, 0]]);
+        assert_eq!(World::tiles_of([0, -1], [257, 1]), [[0, -1], [0, 0]]);
+        assert_eq!(World::tiles_of([255, 255], [2, 2]), [[0, 0], [1, 0], [0, 1], [1, 1]]);
+    }
+
+    /// A window over four tiles, whose samples tell their column and row.
+    #[test]
+    fn val_windows_are_put_together_from_tiles() {
+        let value = |col: i64, row: i64| (col + 1000 * row) as f32;
+        let side = TILE as i64;
+        let tile = |[col, row]: [i64; 2]| {
+            // Row 0 of samples is the northernmost.
+            let heights: Vec<f32> =
+                (0..side * side).map(|k| value(side * col + k % side, side * row + side - 1 - k / side)).collect();
+            let rock = Some(heights.iter().map(|z| -z).collect());
+            Samples { rock, heights, ..Samples::empty(TILE, TILE) }
+        };
+        let (first, [rows, cols]) = ([250, -3], [10, 12]);
+        let mut made = tile([0, 0]).void_like([rows, cols]);
+        assert!(made.is_void() && made.rock.is_some() && made.albedo.is_none());
+        let tiles = World::tiles_of(first, [rows, cols]);
+        assert_eq!(tiles.len(), 4);
+        tiles.into_iter().for_each(|place| made.paste(&tile(place), first, place));
+        for k in 0..rows * cols {
+            let expected = value(first[0] + (k % cols) as i64, first[1] + (rows - 1 - k / cols) as i64);
+            assert_eq!((made.heights[k], made.rock.as_ref().map(|rock| rock[k])), (expected, Some(-expected)), "{k}");
+        }
+    }
+
+    #[test]
+    fn val_positions_on_the_lattice() {
+        let on = [0.3, -0.2, 0.35, 1e9, 0.1 + 1e-9].map(|at_m| World::on_lattice(at_m, 0.1));
+        assert_eq!(on, [Some(3), Some(-2), None, Some(10_000_000_000), Some(1)]);
+    }
+
+    /// Posts 2 m apart, their centres from 1 to 17 m and from 1 to 9 m, with details down to 0.25 m: pixels of 0.5 and 1 m.
+    #[test]
+    fn val_the_map_of_a_dem_covers_its_posts() {
+        let posts = Geometry { rows: 5, cols: 9, cell: [2.0; 2], origin: [0.0; 2] };
+        let expected = TileGrid { origin_m: [1.0, 9.0], size_m: [16.0, 8.0], finest_m: 0.5, levels: 2 };
+        assert_eq!(bounded(0.25, [0.0; 2], &posts), (expected, 2));
+        // A lattice that starts half a metre off reaches beyond the posts.
+        let expected = TileGrid { origin_m: [0.5, 9.5], size_m: [17.0, 9.0], ..expected };
+        assert_eq!(bounded(0.25, [0.5; 2], &posts), (expected, 2));
+    }
+
+    #[test]
+    fn val_a_few_samples_are_generated_on_their_own() {
+        let pieces = [[4, 4], [16, 1], [17, 1], [4, 5]].map(Piece::of);
+        assert_eq!(pieces, [Piece::Alone, Piece::Alone, Piece::Either, Piece::Either]);
+    }
+
+    #[test]
+    fn val_sections_state_where_their_draws_come_from() {
+        assert_eq!(seed_lines("seed/7/terrain", "ramp"), ("id = \"ramp\"\n".to_owned(), Some(7)));
+        let (head, seed) = seed_lines("item/7/terrain/hills", "ramp");
+        assert!(head.contains("`seed = 7`") && head.ends_with("id = \"hills\"\n"), "{head}");
+        assert_eq!(seed, None);
     }
 }

@@ -1,4 +1,4 @@
-//! What handlers take from a request; what cannot be taken is a problem in a sentence.
+//! Extractors of the handlers; whatever they cannot extract becomes a problem response.
 
 use super::query::Query;
 use super::{Problem, Service};
@@ -10,15 +10,15 @@ use hyper::body::Bytes;
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
 
-/// The parameters of an address, as they stand there.
+/// The query parameters as given.
 #[derive(Clone, Debug)]
 pub struct Pairs(pub Vec<(String, String)>);
 
 impl Pairs {
-    /// The checked parameters; `known` are those that the path takes.
+    /// Checks the parameters; `known` are those that the route takes.
     ///
     /// # Errors
-    /// One that it does not take.
+    /// A parameter that the route does not take.
     pub fn checked(self, known: &[&[&str]]) -> Result<Query, Problem> {
         Query::new(self.0, &known.concat())
     }
@@ -29,11 +29,13 @@ impl<S: Sync> FromRequestParts<S> for Pairs {
 
     async fn from_request_parts(parts: &mut Parts, _: &S) -> Result<Self, Problem> {
         let pairs = axum::extract::Query::<Vec<(String, String)>>::try_from_uri(&parts.uri);
-        pairs.map(|pairs| Self(pairs.0)).map_err(|e| Problem::bad_request(format!("the query cannot be read: {e}")))
+        pairs
+            .map(|pairs| Self(pairs.0))
+            .map_err(|e| Problem::bad_request(format!("the query string cannot be parsed: {e}")))
     }
 }
 
-/// An address without parameters.
+/// A URL without query parameters.
 pub struct Plain;
 
 impl<S: Sync> FromRequestParts<S> for Plain {
@@ -44,7 +46,7 @@ impl<S: Sync> FromRequestParts<S> for Plain {
     }
 }
 
-/// Parts of the path.
+/// Segments of the path.
 pub struct Segments<T>(pub T);
 
 impl<T: DeserializeOwned + Send, S: Send + Sync> FromRequestParts<S> for Segments<T> {
@@ -52,11 +54,11 @@ impl<T: DeserializeOwned + Send, S: Send + Sync> FromRequestParts<S> for Segment
 
     async fn from_request_parts(parts: &mut Parts, state: &S) -> Result<Self, Problem> {
         let path = Path::from_request_parts(parts, state).await;
-        path.map(|Path(own)| Self(own)).map_err(|_| Problem::bad_request("the path cannot be read; it must be UTF-8"))
+        path.map(|Path(own)| Self(own)).map_err(|_| Problem::bad_request("the path cannot be parsed; it must be UTF-8"))
     }
 }
 
-/// The collection that the path names.
+/// The collection named in the path.
 pub struct On(pub Arc<Collection>);
 
 #[derive(serde::Deserialize)]
@@ -73,7 +75,7 @@ impl FromRequestParts<Arc<Service>> for On {
     }
 }
 
-/// Where clients find the server, as they call it.
+/// Base URL of the server as the client addresses it.
 pub struct Base(pub String);
 
 impl FromRequestParts<Arc<Service>> for Base {
@@ -81,7 +83,7 @@ impl FromRequestParts<Arc<Service>> for Base {
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, Problem> {
         let host = host(&parts.headers).map_or_else(|| service.address.to_string(), str::to_owned);
-        // A proxy that speaks TLS says so.
+        // Set by a proxy that terminates TLS.
         let scheme = match text(&parts.headers, "x-forwarded-proto") {
             Some("https") => "https",
             _ => "http",
@@ -94,30 +96,30 @@ fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     headers.get(name).and_then(|value| value.to_str().ok())
 }
 
-/// The host that a client asks, if it looks like one.
+/// The `Host` of a request, if it is well-formed.
 pub fn host(headers: &HeaderMap) -> Option<&str> {
     let host = headers.get(header::HOST)?.to_str().ok()?;
     let plain = |b: u8| b.is_ascii_alphanumeric() || b".:-_[]".contains(&b);
     (!host.is_empty() && host.bytes().all(plain)).then_some(host)
 }
 
-/// The body of a request, in JSON: an object.
+/// The body of a request: a JSON object.
 pub struct Body<T>(pub T);
 
 impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
     type Rejection = Problem;
 
     async fn from_request(request: Request, state: &S) -> Result<Self, Problem> {
-        // Pages of other sites can send anything but this type unasked.
+        // Without a CORS preflight, pages of other sites can send any content type but this one.
         let media = text(request.headers(), "content-type").unwrap_or_default();
         if media.split(';').next().is_none_or(|own| !own.trim().eq_ignore_ascii_case("application/json")) {
             return Err(Problem::media("the body must be JSON, with `Content-Type: application/json`"));
         }
         let bytes = Bytes::from_request(request, state).await.map_err(|e| {
             if e.status() == axum::http::StatusCode::PAYLOAD_TOO_LARGE {
-                Problem::too_large("the body is too long", "body_bytes_max", super::service::BODY_BYTES as u64)
+                Problem::too_large("the body is too large", "body_bytes_max", super::service::BODY_BYTES as u64)
             } else {
-                Problem::bad_request("the body of the request ends early")
+                Problem::bad_request("the body ends early")
             }
         })?;
         let value: serde_json::Value =
@@ -125,6 +127,28 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
         if !value.is_object() {
             return Err(Problem::bad_request("the body must be a JSON object"));
         }
-        serde_json::from_value(value).map(Self).map_err(|e| Problem::bad_request(format!("the body: {e}")))
+        serde_json::from_value(value)
+            .map(Self)
+            .map_err(|e| Problem::bad_request(format!("the body does not match the schema: {e}")))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_only_well_formed_hosts_count() {
+        let of = |value: &'static str| {
+            let headers = HeaderMap::from_iter([(header::HOST, axum::http::HeaderValue::from_static(value))]);
+            host(&headers).map(str::to_owned)
+        };
+        for plain in ["localhost", "127.0.0.1:8080", "[::1]:80", "a_b.example-1.org"] {
+            assert_eq!(of(plain).as_deref(), Some(plain));
+        }
+        for odd in ["", "a b", "a/b", "a\"b", "user@host"] {
+            assert_eq!(of(odd), None, "{odd}");
+        }
+        assert_eq!(host(&HeaderMap::new()), None);
     }
 }

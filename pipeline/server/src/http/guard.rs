@@ -1,7 +1,7 @@
-//! What every request passes: the token, the limits, and the books.
+//! Checks on every request (token, limits) and its log entry.
 
 use super::Problem;
-use super::answer::Behind;
+use super::answer::Retained;
 use super::extract::host;
 use super::query::TOKEN;
 use super::room::Load;
@@ -19,25 +19,25 @@ use std::sync::{Arc, MutexGuard, PoisonError};
 use std::task::{Context, Poll, ready};
 use std::time::{Duration, Instant};
 
-/// Where a request comes from.
+/// Address of the client.
 #[derive(Clone, Copy, Debug)]
 pub struct Peer(pub SocketAddr);
 
-/// The page takes everything from here.
+/// Content security policy: the page loads everything from this server.
 const POLICY: &str =
     "default-src 'self'; img-src 'self' blob: data:; style-src 'self' 'unsafe-inline'; frame-ancestors 'none'";
 
-/// Bytes of a body that are handed over at once.
+/// Largest piece of a body that is handed over at once, bytes.
 const PIECE: usize = 256 << 10;
-/// The last bytes of a body are handed over as copies of at most so many: what a connection still holds when its answer is done with must not keep
-/// all of the answer in memory. It holds no more than [`TAIL`] then.
+/// The last [`TAIL`] bytes of a body are handed over as copies of at most this many bytes. Whatever the connection still holds when the response has
+/// ended must not keep the complete response in memory, and it holds at most `TAIL` by then.
 const LAST: usize = 16 << 10;
 /// See [`LAST`].
 const TAIL: usize = 64 << 10;
-/// Longest time that a client may take for its answer.
+/// Time limit for a client to read its response.
 const SENDING: Duration = Duration::from_secs(600);
 
-/// Lets a request through, or says why not.
+/// Admits a request or refuses it with a reason.
 pub async fn guard(State(service): State<Arc<Service>>, request: Request, next: Next) -> Response {
     let started = Instant::now();
     let route = request.extensions().get::<MatchedPath>().map_or("none".to_owned(), |p| p.as_str().to_owned());
@@ -63,11 +63,11 @@ pub async fn guard(State(service): State<Arc<Service>>, request: Request, next: 
 fn late(service: &Service) -> Problem {
     let seconds = service.limits.request.as_secs();
     Problem::unavailable(format!(
-        "the request took longer than {seconds} s and was abandoned; ask for fewer samples, or set `feature_min_m`"
+        "the request took longer than {seconds} s and was cancelled; request fewer samples, or set `feature_min_m`"
     ))
 }
 
-/// A place among the requests of a client; given back when dropped.
+/// One of the client's concurrent requests; released when dropped.
 struct Seat {
     service: Arc<Service>,
     client: IpAddr,
@@ -89,11 +89,11 @@ fn seats(service: &Service) -> MutexGuard<'_, HashMap<IpAddr, usize>> {
     service.under_way.lock().unwrap_or_else(PoisonError::into_inner)
 }
 
-/// A body that keeps its place among requests, and its bytes among those on their way, until it is sent: a piece goes out when the one before has
+/// A body that counts as a request in progress, and its bytes as being sent, until it has been sent. Each piece goes out once the previous one has
 /// gone.
 struct Held {
     body: Body,
-    /// What is left of the last frame.
+    /// Remainder of the last frame.
     rest: Bytes,
     until: Instant,
     _seat: Option<Seat>,
@@ -135,7 +135,7 @@ impl HttpBody for Held {
     }
 }
 
-/// The next piece of what is left.
+/// Takes the next piece of the remainder.
 fn piece_of(rest: &mut Bytes) -> Bytes {
     match rest.len().saturating_sub(TAIL) {
         0 => {
@@ -147,11 +147,11 @@ fn piece_of(rest: &mut Bytes) -> Bytes {
 }
 
 fn send(service: &Arc<Service>, response: Response, seat: Option<Seat>) -> Response {
-    // Small answers always go: clients that read nothing cannot keep others from them, and the number of connections bounds them.
-    let behind = response.extensions().get::<Behind>().map_or_else(|| response.body().size_hint().lower(), |b| b.0);
-    let bytes = Some(behind).filter(|bytes| *bytes > PIECE as u64).unwrap_or(0);
+    // Small responses are never refused: clients that read nothing cannot block them, and the number of connections bounds them.
+    let retained = response.extensions().get::<Retained>().map_or_else(|| response.body().size_hint().lower(), |r| r.0);
+    let bytes = Some(retained).filter(|bytes| *bytes > PIECE as u64).unwrap_or(0);
     let Some(load) = service.sending.add(bytes, service.limits.sending) else {
-        return Problem::unavailable("too many response bytes are in flight; try again in 2 s").into_response();
+        return Problem::unavailable("too many response bytes are being sent; try again in 2 s").into_response();
     };
     let (rest, until) = (Bytes::new(), Instant::now() + SENDING);
     response.map(|body| Body::new(Held { body, rest, until, _seat: seat, _load: load }))
@@ -193,11 +193,11 @@ fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Prob
     Ok(Some(Seat { service: Arc::clone(service), client }))
 }
 
-/// A server for this computer alone, without a token, answers those who know that they talk to it: a page of another site may have had its own
-/// name lead here.
+/// A server without a token that listens on loopback only answers requests whose `Host` names this machine; otherwise a page of another site could
+/// reach it through a name of its own (DNS rebinding).
 fn check_host(service: &Service, request: &Request) -> Result<(), Problem> {
     if request.headers().get_all(header::HOST).iter().count() > 1 {
-        return Err(Problem::bad_request("the header `Host` is given more than once"));
+        return Err(Problem::bad_request("the `Host` header is given more than once"));
     }
     let Some(host) = host(request.headers()) else { return Ok(()) };
     if !service.address.ip().is_loopback() || service.token.is_some() {
@@ -219,7 +219,7 @@ fn check_host(service: &Service, request: &Request) -> Result<(), Problem> {
     )))
 }
 
-/// Whether a request shows the token, in its header or, for pictures, in its address.
+/// Whether a request carries the token, in its header or, for images, in its query.
 fn shows(request: &Request, token: &str) -> bool {
     let header = request.headers().get(header::AUTHORIZATION).and_then(|value| value.to_str().ok());
     let of_header = header
@@ -231,12 +231,12 @@ fn shows(request: &Request, token: &str) -> bool {
     }
 }
 
-/// Equality in a time that does not tell where two texts differ.
+/// Equality in a time that does not depend on where two texts differ.
 fn same(a: &str, b: &str) -> bool {
     blake3::hash(a.as_bytes()) == blake3::hash(b.as_bytes())
 }
 
-/// One tag for each encoding of an answer: compressed bytes are others.
+/// Gives each encoding of a response its own tag, because compressed bytes differ.
 pub async fn tag_encodings(request: Request, next: Next) -> Response {
     let mut response = next.run(request).await;
     if response.status() == StatusCode::NOT_ACCEPTABLE {
@@ -259,9 +259,9 @@ mod tests {
     use super::*;
     use std::task::Waker;
 
-    /// A client that takes too long gets no more of its answer, and what it held is free again.
+    /// A client that reads too slowly gets no more of its response, and the memory is released.
     #[test]
-    fn val_answers_end_for_who_takes_too_long() {
+    fn val_slow_clients_are_cut_off() {
         let sending = Sending::default();
         let next = |late: Duration| {
             let until = (Instant::now() + SENDING).checked_sub(late).unwrap();
@@ -278,16 +278,16 @@ mod tests {
         assert_eq!(sending.bytes(), 0);
     }
 
-    /// The last pieces do not keep the whole in memory.
+    /// The last pieces do not keep the complete response in memory.
     #[test]
     fn val_last_pieces_are_copies() {
-        let whole: Bytes = (0..700_000_u32).map(|n| n as u8).collect::<Vec<_>>().into();
-        let inside = |piece: &Bytes| whole.as_ptr_range().contains(&piece.as_ptr());
-        let (mut rest, mut pieces) = (whole.clone(), Vec::new());
+        let complete: Bytes = (0..700_000_u32).map(|n| n as u8).collect::<Vec<_>>().into();
+        let inside = |piece: &Bytes| complete.as_ptr_range().contains(&piece.as_ptr());
+        let (mut rest, mut pieces) = (complete.clone(), Vec::new());
         while !rest.is_empty() {
             pieces.push(piece_of(&mut rest));
         }
-        assert_eq!(pieces.concat(), whole);
+        assert_eq!(pieces.concat(), complete);
         let (shared, copied): (Vec<&Bytes>, Vec<&Bytes>) = pieces.iter().partition(|piece| inside(piece));
         assert!(shared.iter().all(|piece| piece.len() <= PIECE) && copied.iter().all(|piece| piece.len() <= LAST));
         assert_eq!(copied.iter().map(|piece| piece.len()).sum::<usize>(), TAIL);

@@ -1,4 +1,4 @@
-//! Work ahead: the tiles of an area, made while nobody waits.
+//! Jobs: tiles of an area, generated in advance.
 
 use super::extract::Body;
 use super::service::Service;
@@ -20,16 +20,16 @@ use std::time::Duration;
 use tokio::sync::Notify;
 use tokio::task::JoinSet;
 
-/// Most jobs that are remembered.
+/// Largest number of jobs kept in the list.
 const JOBS_MAX: usize = 1000;
-/// Tiles of a job that are under way at once.
+/// Tiles of a job that are generated at once.
 const AT_ONCE: usize = 4;
-/// Areas lie no farther out, m.
+/// Largest coordinate of an area, m.
 const FARTHEST_M: f64 = 1e12;
-/// How long a job waits where the library has no room for it.
+/// How long a job waits before it retries while the library is busy.
 const WAIT: Duration = Duration::from_millis(200);
 
-/// What is asked for.
+/// Body of a job request.
 #[derive(Clone, Debug, Deserialize)]
 #[serde(deny_unknown_fields)]
 pub struct Order {
@@ -44,7 +44,7 @@ pub struct Order {
     feature_min_m: f64,
 }
 
-/// How far a job is.
+/// State of a job.
 #[derive(Clone, Debug, PartialEq)]
 enum Progress {
     Running,
@@ -92,7 +92,7 @@ impl Job {
         *locked(&self.state) != Progress::Running
     }
 
-    /// Ends it, if it has not ended; false where it has.
+    /// Ends the job; false if it has already ended.
     fn end(&self, how: Progress) -> bool {
         let mut state = locked(&self.state);
         let runs = *state == Progress::Running;
@@ -124,7 +124,7 @@ impl Jobs {
         Ok(job)
     }
 
-    /// Tells all jobs to end.
+    /// Cancels all jobs.
     pub fn stop(&self) {
         for job in locked(&self.all).values() {
             job.end(Progress::Cancelled);
@@ -132,11 +132,11 @@ impl Jobs {
     }
 }
 
-/// The tiles of the lattice that a job makes.
+/// The lattice tiles that a job generates.
 struct Area {
     world: Arc<World>,
     zoom: u32,
-    /// First column and row, and how many there are.
+    /// First column and row, and their numbers.
     first: [i64; 2],
     count: [u64; 2],
     selection: Selection,
@@ -146,7 +146,7 @@ impl Area {
     fn of(service: &Service, order: &Order) -> Result<Self, Problem> {
         let collection = service.collection(&order.collection)?;
         let Ground::World(world) = &collection.ground else {
-            return Err(Problem::bad_request("jobs are for worlds; rasters need no generation in advance"));
+            return Err(Problem::bad_request("jobs are for worlds; a raster has nothing to generate in advance"));
         };
         let [west, south, east, north] = order.bounds_m;
         if !order.bounds_m.iter().all(|v| v.abs() <= FARTHEST_M) {
@@ -156,13 +156,13 @@ impl Area {
         }
         if !(west < east && south < north) {
             return Err(Problem::bad_request(
-                "`bounds_m` must be west, south, east, north in metres, west below east and south below north",
+                "`bounds_m` must be west, south, east, north in metres, with west < east and south < north",
             ));
         }
         let step_m = order.resolution_m.unwrap_or(world.cell_m());
         let zoom = world.zoom_of(step_m).ok_or_else(|| {
             Problem::bad_request(format!(
-                "`resolution_m` is {step_m}; it must be {} m times a power of 2",
+                "`resolution_m` must be {} m times a power of 2, got {step_m} m",
                 world.spacing_m()
             ))
         })?;
@@ -210,23 +210,23 @@ pub async fn order(
     Ok((StatusCode::ACCEPTED, [(header::LOCATION, place)], Json(described)).into_response())
 }
 
-/// Makes the tiles of a job until it is cancelled.
+/// Generates the tiles of a job until it is cancelled.
 async fn work(service: Arc<Service>, job: Arc<Job>, area: Area) {
     tokio::select! {
         end = make(&service, &job, area) => { job.end(end); }
-        // Dropping what is under way tells its makers to stop.
+        // Dropping the future cancels the generation in progress.
         () = job.cancel.notified() => {}
     }
 }
 
-/// Makes the tiles of a job, a few at a time.
+/// Generates the tiles of a job, a few at a time.
 async fn make(service: &Service, job: &Job, area: Area) -> Progress {
     let maker = Maker { priority: Priority::Background, seconds_max: f64::INFINITY, ..service.maker() };
     let area = Arc::new(area);
     let (mut under_way, mut places) = (JoinSet::new(), area.places());
     loop {
         for place in places.by_ref().take(AT_ONCE - under_way.len()) {
-            under_way.spawn(patiently(Arc::clone(&area), maker.clone(), place));
+            under_way.spawn(make_when_free(Arc::clone(&area), maker.clone(), place));
         }
         match under_way.join_next().await {
             None => return Progress::Done,
@@ -237,8 +237,8 @@ async fn make(service: &Service, job: &Job, area: Area) -> Progress {
     }
 }
 
-/// Makes a tile, as soon as the library has room for it.
-async fn patiently(area: Arc<Area>, maker: Maker, place: [i64; 2]) -> Result<(), Problem> {
+/// Generates a tile; retries while the library is busy.
+async fn make_when_free(area: Arc<Area>, maker: Maker, place: [i64; 2]) -> Result<(), Problem> {
     loop {
         match area.world.lattice_tile(&maker, area.zoom, place, &area.selection).await {
             Err(problem) if problem.status() == StatusCode::SERVICE_UNAVAILABLE => tokio::time::sleep(WAIT).await,
@@ -280,7 +280,7 @@ pub async fn cancel(
 mod tests {
     use super::*;
 
-    /// As many jobs as are remembered may run; one that has ended makes room.
+    /// All listed jobs may be running; one that has ended makes room for a new one.
     #[test]
     fn val_running_jobs_are_bounded() {
         let jobs = Jobs::default();

@@ -1,4 +1,4 @@
-//! Counters, as Prometheus reads them.
+//! Counters in the Prometheus text format.
 
 use super::service::Service;
 use axum::extract::State;
@@ -13,7 +13,7 @@ use prometheus_client::metrics::histogram::Histogram;
 use prometheus_client::registry::Registry;
 use std::sync::Arc;
 
-/// Bounds of the times of answers, s.
+/// Upper bounds of the histogram of response times, s.
 const SECONDS: [f64; 11] = [0.001, 0.002, 0.005, 0.01, 0.02, 0.05, 0.1, 0.3, 1.0, 5.0, 30.0];
 
 #[derive(Clone, Debug, PartialEq, Eq, Hash, EncodeLabelSet)]
@@ -24,7 +24,7 @@ struct Labels {
 
 type Seconds = Family<Vec<(String, String)>, Histogram, fn() -> Histogram>;
 
-/// Counters of requests.
+/// Counters and histograms of requests.
 pub struct Metrics {
     requests: Family<Labels, Counter>,
     seconds: Seconds,
@@ -47,7 +47,7 @@ impl Default for Metrics {
 }
 
 impl Metrics {
-    /// Counts an answer.
+    /// Counts a response.
     pub fn count(&self, route: &str, status: u16, seconds: f64) {
         self.requests.get_or_create(&Labels { route: route.to_owned(), status }).inc();
         self.seconds.get_or_create(&vec![("route".to_owned(), route.to_owned())]).observe(seconds);
@@ -55,27 +55,27 @@ impl Metrics {
 
     fn text(&self, service: &Service) -> Result<String, std::fmt::Error> {
         let mut registry = Registry::with_prefix("sastrugi");
-        registry.register("requests", "Answers by route and status", self.requests.clone());
-        registry.register("request_seconds", "Time of answers", self.seconds.clone());
+        registry.register("requests", "Responses by route and status", self.requests.clone());
+        registry.register("request_seconds", "Time to respond, s", self.seconds.clone());
         registry.register("connections", "Open connections", self.connections.clone());
-        for figure in service.library.statistics().figures() {
-            let (name, value) = (format!("library_{}", figure.name), figure.value);
-            if figure.counts {
+        for statistic in service.library.statistics().list() {
+            let (name, value) = (format!("library_{}", statistic.name), statistic.value);
+            if statistic.is_counter {
                 let counter: Counter = Counter::default();
                 counter.inc_by(value);
-                registry.register(name, figure.help, counter);
+                registry.register(name, statistic.help, counter);
             } else {
                 let gauge: Gauge = Gauge::default();
                 gauge.set(i64::try_from(value).unwrap_or(i64::MAX));
-                registry.register(name, figure.help, gauge);
+                registry.register(name, statistic.help, gauge);
             }
         }
         let answers: Gauge = Gauge::default();
         answers.set(i64::try_from(service.answers.bytes()).unwrap_or(i64::MAX));
-        registry.register("answers_bytes", "Bytes of answers in memory", answers);
+        registry.register("answers_bytes", "Bytes of cached responses", answers);
         let sending: Gauge = Gauge::default();
         sending.set(i64::try_from(service.sending.bytes()).unwrap_or(i64::MAX));
-        registry.register("sending_bytes", "Bytes of answers on their way to clients", sending);
+        registry.register("sending_bytes", "Bytes of responses being sent", sending);
         let mut text = String::new();
         encode(&mut text, &registry)?;
         Ok(text)

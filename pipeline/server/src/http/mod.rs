@@ -1,4 +1,4 @@
-//! The service: addresses, parameters, answers and their limits.
+//! HTTP service: routes, parameters, responses and their limits.
 
 pub mod answer;
 pub mod extract;
@@ -21,7 +21,7 @@ pub use problem::Problem;
 pub use query::Query;
 pub use service::{Limits, Service};
 
-use answer::AsItIs;
+use answer::SkipCompression;
 use axum::extract::{DefaultBodyLimit, State};
 use axum::http::{HeaderMap, HeaderValue, Method, StatusCode, Version, header};
 use axum::middleware::{from_fn, from_fn_with_state};
@@ -34,9 +34,12 @@ use tower_http::compression::CompressionLayer;
 use tower_http::compression::predicate::{DefaultPredicate, Predicate};
 use tower_http::cors::{AllowOrigin, CorsLayer};
 
+#[cfg(test)]
+mod tests;
+
 type Route = (&'static str, fn() -> MethodRouter<Arc<Service>>);
 
-/// Every address of the API; `openapi.rs` describes them.
+/// All routes of the API; `openapi.rs` describes them.
 pub const ROUTES: [Route; 22] = [
     ("/v1", || get(ogc::landing)),
     ("/v1/conformance", || get(ogc::conformance)),
@@ -62,7 +65,7 @@ pub const ROUTES: [Route; 22] = [
     ("/metrics", || get(metrics::metrics)),
 ];
 
-/// The service as a router; pages of `origins` may use it.
+/// Builds the router; pages of `origins` may use it (CORS).
 pub fn router(service: &Arc<Service>, origins: &[HeaderValue]) -> Router {
     let mut router = Router::new();
     for (path, handlers) in ROUTES {
@@ -73,21 +76,21 @@ pub fn router(service: &Arc<Service>, origins: &[HeaderValue]) -> Router {
         .route("/", get(page::index))
         .route("/{*file}", get(page::file))
         .method_not_allowed_fallback(async |method: Method| {
-            Problem::method(format!("method {method} is not allowed here; see the header `Allow`"))
+            Problem::method(format!("method {method} is not allowed here; the `Allow` header lists those that are"))
         })
         .layer(DefaultBodyLimit::max(service::BODY_BYTES))
-        .layer(CompressionLayer::new().compress_when(DefaultPredicate::new().and(is_packed)))
+        .layer(CompressionLayer::new().compress_when(DefaultPredicate::new().and(is_compressed)))
         .layer(from_fn(guard::tag_encodings))
         .layer(CatchPanicLayer::custom(panicked))
         .layer(from_fn_with_state(Arc::clone(service), guard::guard))
-        // Around all others, so that pages can read what is refused.
+        // Outermost, so that pages of other origins can read refusals too.
         .layer(cors(origins))
         .with_state(Arc::clone(service))
 }
 
-/// Whether a response is packed where the client takes it packed.
-fn is_packed(_: StatusCode, _: Version, _: &HeaderMap, extensions: &axum::http::Extensions) -> bool {
-    extensions.get::<AsItIs>().is_none()
+/// Whether to compress a response for clients that accept it.
+fn is_compressed(_: StatusCode, _: Version, _: &HeaderMap, extensions: &axum::http::Extensions) -> bool {
+    extensions.get::<SkipCompression>().is_none()
 }
 
 fn cors(origins: &[HeaderValue]) -> CorsLayer {
@@ -109,11 +112,11 @@ fn cors(origins: &[HeaderValue]) -> CorsLayer {
 }
 
 fn panicked(_: Box<dyn std::any::Any + Send>) -> Response {
-    Problem::internal("internal error; see the log of the server").into_response()
+    Problem::internal("internal error; see the server log").into_response()
 }
 
 /// `GET /v1/library`
 async fn library(State(service): State<Arc<Service>>, _: Plain) -> Json<serde_json::Value> {
-    let figures = service.library.statistics().figures().map(|f| (f.name.to_owned(), f.value.into()));
-    Json(serde_json::Value::Object(figures.into_iter().collect()))
+    let values = service.library.statistics().list().map(|s| (s.name.to_owned(), s.value.into()));
+    Json(serde_json::Value::Object(values.into_iter().collect()))
 }

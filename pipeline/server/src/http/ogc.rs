@@ -1,4 +1,4 @@
-//! Landing page, collections and tile sets as OGC API - Tiles has them.
+//! Landing page, collections and tile sets of OGC API - Tiles.
 
 use super::service::Service;
 use super::{Base, On, Plain, Problem, Segments};
@@ -9,12 +9,12 @@ use axum::extract::State;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// Side of a pixel that scale denominators refer to, m.
+/// Pixel size that scale denominators refer to, m.
 const STANDARD_PIXEL_M: f64 = 0.00028;
 const JSON: &str = "application/json";
-/// Media type of the description of the API.
+/// Media type of the API description.
 pub const OPENAPI: &str = "application/vnd.oai.openapi+json;version=3.1";
-/// Conformance classes.
+/// Conformance classes that the server implements.
 const CONFORMANCE: [&str; 7] = [
     "http://www.opengis.net/spec/ogcapi-common-1/1.0/conf/core",
     "http://www.opengis.net/spec/ogcapi-common-1/1.0/conf/landing-page",
@@ -24,9 +24,9 @@ const CONFORMANCE: [&str; 7] = [
     "http://www.opengis.net/spec/ogcapi-tiles-1/1.0/conf/tilesets-list",
     "http://www.opengis.net/spec/ogcapi-tiles-1/1.0/conf/png",
 ];
-/// Relation of a link to the tile sets of a map.
+/// Link relation: the tile sets of a map.
 const MAP_TILESETS: &str = "http://www.opengis.net/def/rel/ogc/1.0/tilesets-map";
-/// Relation of a link to the conformance classes; clients of the first drafts look for the plain word.
+/// Link relation: the conformance classes. Clients of the first drafts look for the plain word.
 const CONFORMANCE_RELATION: &str = "http://www.opengis.net/def/rel/ogc/1.0/conformance";
 const SCHEME: &str = "http://www.opengis.net/def/rel/ogc/1.0/tiling-scheme";
 const SCHEMES: &str = "http://www.opengis.net/def/rel/ogc/1.0/tiling-schemes";
@@ -44,7 +44,7 @@ pub async fn landing(State(service): State<Arc<Service>>, _: Plain, Base(base): 
         "collections": service.collections.len(),
         "links": [
             link(v1.clone(), "self", JSON, "this page"),
-            link(format!("{v1}/openapi.json"), "service-desc", OPENAPI, "the API"),
+            link(format!("{v1}/openapi.json"), "service-desc", OPENAPI, "API description"),
             link(format!("{v1}/conformance"), CONFORMANCE_RELATION, JSON, "conformance classes"),
             link(format!("{v1}/conformance"), "conformance", JSON, "conformance classes"),
             link(format!("{v1}/collections"), "data", JSON, "worlds and rasters"),
@@ -100,8 +100,7 @@ fn described(collection: &Collection, base: &str) -> Value {
     all
 }
 
-/// The plane of a collection, whose coordinates are metres from its own origin, as PROJJSON, which tile matrix sets take where no registry has a
-/// name for it.
+/// The plane of a collection, in metres from its own origin, as PROJJSON; tile matrix sets accept it for a CRS that no registry names.
 fn crs(id: &str) -> Value {
     let axis = |name: &str, letter: &str, direction: &str| json!({ "name": name, "abbreviation": letter, "direction": direction, "unit": "metre" });
     json!({ "wkt": {
@@ -140,16 +139,16 @@ pub async fn matrix_set(On(collection): On, _: Plain) -> Json<Value> {
     }))
 }
 
-/// Refuses a tile matrix set that is not the collection's own.
+/// Refuses a tile matrix set other than the collection's own.
 ///
 /// # Errors
-/// Another one.
+/// Any other tile matrix set.
 pub fn check_matrix_set(collection: &Collection, set: &str) -> Result<(), Problem> {
     let id = &collection.id;
     if set == id {
         return Ok(());
     }
-    Err(Problem::not_found(format!("\"{id}\" has one tile matrix set, \"{id}\"")))
+    Err(Problem::not_found(format!("no such tile matrix set; the only one of \"{id}\" is \"{id}\"")))
 }
 
 /// `GET /v1/collections/{id}/styles/{layer}/map/tiles`

@@ -1,7 +1,8 @@
-//! The description of the API: OpenAPI 3.1.
+//! OpenAPI 3.1 description of the API.
 
 use super::ogc::OPENAPI;
-use super::patch::{FIELDS, FORMATS};
+use super::patch::{DOWNSAMPLE_MAX, FIELDS, FORMATS};
+use super::values::{CORNERS_MAX, SAMPLES_MAX};
 use super::{Plain, Service};
 use axum::Json;
 use axum::extract::State;
@@ -15,7 +16,7 @@ pub async fn description(State(service): State<Arc<Service>>, _: Plain) -> Respo
     ([(header::CONTENT_TYPE, OPENAPI)], Json(document(&service))).into_response()
 }
 
-/// A parameter of a query.
+/// A query parameter.
 fn query(name: &str, schema: Value, description: &str) -> Value {
     json!({ "name": name, "in": "query", "required": false, "schema": schema, "description": description })
 }
@@ -29,7 +30,7 @@ fn number(low: f64, high: f64) -> Value {
     json!({ "type": "number", "minimum": low, "maximum": high })
 }
 
-/// A place, `a,b`.
+/// A position, `a,b`.
 const PLACE: &str = r"-?[0-9]{1,9}(\.[0-9]{1,6})?,-?[0-9]{1,9}(\.[0-9]{1,6})?";
 
 fn text(pattern: &str, example: &str) -> Value {
@@ -39,29 +40,29 @@ fn text(pattern: &str, example: &str) -> Value {
 fn selection() -> Vec<Value> {
     let numbers = json!({ "type": "string", "pattern": "^([1-9][0-9]?(,[1-9][0-9]?)*)?$" });
     vec![
-        query("phenomena", numbers, "Numbers of the processes that act; all when absent"),
+        query("phenomena", numbers, "Numbers of the processes to apply, from 1; all if absent"),
         query("feature_min_m", number(0.0, 1e9), "Omit craters and rocks up to this width, m"),
     ]
 }
 
 fn sun() -> Vec<Value> {
     vec![
-        query("sun_azimuth_deg", number(-360.0, 720.0), "Azimuth that the light comes from, clockwise from north"),
-        query("sun_elevation_deg", number(0.1, 90.0), "Elevation of the light above the horizon"),
+        query("sun_azimuth_deg", number(-360.0, 720.0), "Azimuth of the light, clockwise from north, degrees"),
+        query("sun_elevation_deg", number(0.1, 90.0), "Elevation of the light above the horizon, degrees"),
     ]
 }
 
 fn window() -> Vec<Value> {
     vec![
-        query("origin", text(PLACE, "0,0"), "Position of the south-west sample, m; give it or `center`"),
+        query("origin", text(PLACE, "0,0"), "Position of the south-west sample, m; give this or `center`"),
         query("center", text(PLACE, "0,0"), "Position of the centre, snapped to the nearest sample, m"),
-        query("size", text("[1-9][0-9]{0,3},[1-9][0-9]{0,3}", "64,64"), "Columns and rows; give it or `size_m`"),
+        query("size", text("[1-9][0-9]{0,3},[1-9][0-9]{0,3}", "64,64"), "Columns and rows; give this or `size_m`"),
         query(
             "size_m",
             text(r"[1-9][0-9]{0,5}(\.[0-9]{1,6})?,[1-9][0-9]{0,5}(\.[0-9]{1,6})?", "2,2"),
             "Size east-west and north-south, m",
         ),
-        query("resolution_m", number(1e-6, 1e9), "Distance of the samples, m"),
+        query("resolution_m", number(1e-6, 1e9), "Sample spacing, m"),
     ]
 }
 
@@ -72,16 +73,16 @@ fn words(words: &[&str]) -> Value {
 fn patch() -> Vec<Value> {
     let mut all = window();
     all.extend([
-        query("field", words(&FIELDS), "What the samples are"),
+        query("field", words(&FIELDS), "Field to return"),
         query("format", words(&FORMATS), "GeoTIFF (COG), NumPy, float32 little-endian, or 16-bit PNG"),
-        query("rotate", words(&["0", "90", "180", "270"]), "Counterclockwise, degrees"),
-        query("flip", words(&["none", "horizontal", "vertical"]), "Mirror"),
+        query("rotate", words(&["0", "90", "180", "270"]), "Counterclockwise rotation, degrees"),
+        query("flip", words(&["none", "horizontal", "vertical"]), "Mirror the patch"),
         query(
             "downsample",
-            json!({ "type": "integer", "minimum": 0, "maximum": 12 }),
+            json!({ "type": "integer", "minimum": 0, "maximum": DOWNSAMPLE_MAX }),
             "Exponent m: one sample per block of 2^m x 2^m",
         ),
-        query("method", words(&["point", "mean"]), "How blocks are reduced"),
+        query("method", words(&["point", "mean"]), "How each block is reduced to one sample"),
     ]);
     all.extend(sun());
     all.extend(selection());
@@ -95,13 +96,13 @@ fn tile() -> Vec<Value> {
     all
 }
 
-/// What is said of one address and method.
+/// One method of one route.
 struct Operation {
     path: &'static str,
     method: &'static str,
     summary: &'static str,
     parameters: Vec<Value>,
-    /// Media types of what is answered with 200.
+    /// Media types of a response with status 200.
     media: &'static [&'static str],
 }
 
@@ -120,12 +121,14 @@ fn operations() -> Vec<Operation> {
     let point = vec![
         required(query("x", number(-1e12, 1e12), "Easting, m")),
         required(query("y", number(-1e12, 1e12), "Northing, m")),
-        query("resolution_m", number(1e-6, 1e9), "Distance of the samples that the point lies between, m"),
+        query("resolution_m", number(1e-6, 1e9), "Spacing of the samples to interpolate between, m"),
     ];
+    let corners = format!("{PLACE}(;{PLACE}){{1,{}}}", CORNERS_MAX - 1);
+    let samples = json!({ "type": "integer", "minimum": 2, "maximum": SAMPLES_MAX });
     let profile = vec![
-        required(query("line", text(&format!("{PLACE}(;{PLACE}){{1,99}}"), "0,0;10,5"), "Places along the line")),
-        query("samples", json!({ "type": "integer", "minimum": 2, "maximum": 4096 }), "Number of samples"),
-        query("resolution_m", number(1e-6, 1e9), "Distance of the samples of the ground, m"),
+        required(query("line", text(&corners, "0,0;10,5"), "Corners of the line, m")),
+        query("samples", samples, "Number of samples along the line"),
+        query("resolution_m", number(1e-6, 1e9), "Spacing of the ground samples to interpolate between, m"),
     ];
     let with_selection = |mut parameters: Vec<Value>| {
         parameters.extend(selection());
@@ -136,13 +139,13 @@ fn operations() -> Vec<Operation> {
         operation("/v1", "Landing page", vec![], JSON),
         operation("/v1/conformance", "Conformance classes", vec![], JSON),
         operation("/v1/openapi.json", "This description", vec![], &[OPENAPI]),
-        operation("/v1/library", "What the tile library has done", vec![], JSON),
+        operation("/v1/library", "Statistics of the tile library", vec![], JSON),
         operation("/v1/collections", "Worlds and rasters", vec![], JSON),
         operation("/v1/collections/{id}", "One collection", vec![], JSON),
         operation("/v1/collections/{id}/patch", "Samples of a window", patch(), media),
         operation(
             "/v1/collections/{id}/study",
-            "A section of a study that makes the same patch",
+            "A study section that reproduces the patch",
             window(),
             &["text/plain; charset=utf-8"],
         ),
@@ -176,14 +179,14 @@ fn operations() -> Vec<Operation> {
         Operation { method: "delete", ..operation("/v1/jobs/{id}", "Cancel a job", vec![], JSON) },
         operation(
             "/metrics",
-            "Counters for Prometheus",
+            "Prometheus metrics",
             vec![],
             &["application/openmetrics-text; version=1.0.0; charset=utf-8"],
         ),
     ]
 }
 
-/// The names in braces, as parameters.
+/// The names in braces, as path parameters.
 fn in_path(path: &str, ids: &[&String]) -> Vec<Value> {
     let names = path.split('{').skip(1).filter_map(|part| part.split('}').next());
     let schema = |name: &str| match name {
@@ -211,12 +214,12 @@ fn document(service: &Service) -> Value {
         }
         let is_tile = o.path.ends_with("{col}") || o.path.ends_with("{y}");
         if is_tile {
-            responses["204"] = json!({ "description": "There is no data in this tile" });
+            responses["204"] = json!({ "description": "The tile has no data" });
         }
         if is_tile || o.path.ends_with("/patch") {
-            responses["206"] = json!({ "description": "The range that was asked for" });
+            responses["206"] = json!({ "description": "The requested range" });
             responses["304"] = json!({ "description": "Not modified" });
-            responses["416"] = problem("The range lies beyond the end");
+            responses["416"] = problem("The range starts beyond the end");
         }
         let mut entry = json!({ "summary": o.summary, "parameters": parameters, "responses": responses });
         if o.method == "post" {
@@ -237,7 +240,7 @@ fn document(service: &Service) -> Value {
             "type": "object", "required": ["type", "title", "status", "detail"],
             "properties": {
                 "type": { "type": "string" }, "title": { "type": "string" }, "status": { "type": "integer" },
-                "detail": { "type": "string", "description": "What is wrong, and what would be right" },
+                "detail": { "type": "string", "description": "What is wrong, and what would be accepted" },
             },
         } } },
     });
@@ -252,14 +255,14 @@ fn problems(method: &str) -> Vec<(&'static str, &'static str)> {
     let mut all = vec![
         ("400", "A parameter is missing, unknown or out of range"),
         ("401", "The token is missing or wrong"),
-        ("404", "There is no such thing, or no data"),
+        ("404", "No such resource, or no data"),
         ("405", "Method not allowed"),
-        ("406", "No encoding that the client takes"),
+        ("406", "No acceptable encoding"),
         ("413", "A limit is exceeded"),
-        ("414", "The address is too long"),
+        ("414", "The URL is too long"),
         ("421", "Host not allowed"),
         ("422", "Beyond the end of the world"),
-        ("429", "Too many requests of one client are in progress"),
+        ("429", "The client has too many requests in progress"),
         ("500", "Internal error"),
         ("503", "The server is busy"),
     ];
@@ -297,15 +300,15 @@ mod tests {
     use super::*;
     use std::collections::BTreeSet;
 
-    /// The description names every address, and no other.
+    /// The description covers exactly the routes.
     #[test]
-    fn val_every_address_is_described() {
+    fn val_every_route_is_described() {
         let described: BTreeSet<&str> = operations().iter().map(|o| o.path).collect();
         let routed: BTreeSet<&str> = super::super::ROUTES.iter().map(|(path, _)| *path).collect();
         assert_eq!(described, routed);
     }
 
-    /// It names the parameters that are taken, and no other.
+    /// It covers exactly the parameters that are accepted.
     #[test]
     fn val_every_parameter_is_described() {
         let names = |path: &str| -> BTreeSet<String> {
@@ -319,5 +322,23 @@ mod tests {
         let known = |own_names: &[&'static str]| own(&[own_names, &super::super::service::SELECTION].concat());
         assert_eq!(names("/v1/collections/{id}/point"), known(&super::super::values::POINT));
         assert_eq!(names("/v1/collections/{id}/profile"), known(&super::super::values::PROFILE));
+    }
+
+    /// The pattern of `line` allows exactly as many corners as the server accepts.
+    #[test]
+    fn val_lines_have_as_many_corners_as_the_server_accepts() {
+        let all = operations();
+        let profile = all.iter().find(|o| o.path.ends_with("/profile")).unwrap();
+        let line = profile.parameters.iter().find(|p| p["name"] == "line").unwrap();
+        let pattern = line["schema"]["pattern"].as_str().unwrap();
+        // `^CORNER(;CORNER){1,MOST}$`
+        let (_, counts) = pattern.rsplit_once("){").unwrap();
+        let most: usize = counts.strip_prefix("1,").and_then(|rest| rest.strip_suffix("}$")).unwrap().parse().unwrap();
+        let accepted = |corners: usize| {
+            let text = vec!["0,0"; corners].join(";");
+            let query = crate::http::Query::new(vec![("line".to_owned(), text)], &["line"]).unwrap();
+            query.line("line", CORNERS_MAX).is_ok()
+        };
+        assert_eq!([1, 2, 1 + most, 2 + most].map(accepted), [false, true, true, false], "{pattern}");
     }
 }

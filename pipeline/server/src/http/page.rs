@@ -1,4 +1,4 @@
-//! The map page: files that are part of the program.
+//! The map page, whose files are embedded in the program.
 
 use super::answer::{held, not_modified, tag};
 use super::{Problem, Segments};
@@ -27,7 +27,7 @@ pub async fn file(Segments(name): Segments<String>, headers: HeaderMap) -> Resul
 
 fn send(name: &str, headers: &HeaderMap) -> Result<Response, Problem> {
     let found = FILES.iter().find(|(own, ..)| *own == name);
-    let (_, media, bytes) = found.ok_or_else(|| Problem::not_found("no such page; the API is below /v1"))?;
+    let (_, media, bytes) = found.ok_or_else(|| Problem::not_found("no such page; the API is under /v1"))?;
     let tag = tag(bytes);
     if let Some(own) = held(headers, &tag) {
         return Ok(not_modified(own));

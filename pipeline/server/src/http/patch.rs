@@ -1,4 +1,4 @@
-//! `patch`: samples of any place at any resolution, in the format that is asked for.
+//! `patch`: samples at any position and resolution, in the requested format.
 
 use super::answer::Answer;
 use super::service::{Service, selection};
@@ -14,7 +14,7 @@ use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
 use std::sync::Arc;
 
-/// The parameters that patches take.
+/// Query parameters of patches.
 pub const KNOWN: [&str; 15] = [
     "origin",
     "center",
@@ -36,27 +36,27 @@ pub const KNOWN: [&str; 15] = [
 pub const FIELDS: [&str; 5] = ["elevation", "albedo", "class", "rock_potential", "image"];
 /// Names of the formats.
 pub const FORMATS: [&str; 4] = ["tif", "npy", "raw", "png"];
-/// An image may have this part of the samples of a patch: rendering takes far longer than samples that are there.
+/// Divisor of the sample limit for images, because rendering takes far longer than returning samples.
 const IMAGE_PART: u64 = 4;
 /// Blocks of at most 2^12 x 2^12 samples.
-const DOWNSAMPLE_MAX: u32 = 12;
+pub const DOWNSAMPLE_MAX: u32 = 12;
 
-/// Where samples lie.
+/// Position of the samples.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Window {
-    /// Place of the south-west sample, m.
+    /// Position of the south-west sample, m.
     pub origin_m: [f64; 2],
     /// Rows and columns.
     pub shape: [usize; 2],
-    /// Distance of the samples, m.
+    /// Sample spacing, m.
     pub step_m: f64,
 }
 
 impl Window {
-    /// The window of a request.
+    /// The window that a request describes.
     ///
     /// # Errors
-    /// Parameters that are missing, exclude each other, or ask for too much.
+    /// Parameters that are missing, exclude each other, or exceed a limit.
     pub fn of(query: &Query, collection: &Collection, most: u64) -> Result<Self, Problem> {
         let [cell_m, _] = collection.spacings_m();
         let (origin, center) = (query.pair("origin")?, query.pair("center")?);
@@ -68,7 +68,7 @@ impl Window {
         };
         if shape.iter().any(|n| !(*n >= 1.0 && n.fract() == 0.0)) {
             return Err(Problem::bad_request(if query.text("size").is_some() {
-                "`size` must be two whole numbers of at least 1, columns and rows".to_owned()
+                "`size` must be two integers of at least 1, columns and rows".to_owned()
             } else {
                 format!("`size_m` must be at least one sample spacing, {step_m} m")
             }));
@@ -88,26 +88,26 @@ impl Window {
             (Some(origin), None) => origin,
             (None, Some(center)) => {
                 let half = [cols, rows].map(|n| 0.5 * (n - 1) as f64 * step_m);
-                settled(collection, [center[0] - half[0], center[1] - half[1]], step_m)
+                snapped(collection, [center[0] - half[0], center[1] - half[1]], step_m)
             }
             _ => {
-                return Err(Problem::bad_request("give either `origin` (the south-west sample) or `center`"));
+                return Err(Problem::bad_request("give either `origin` (south-west sample) or `center`"));
             }
         };
         Ok(Self { origin_m, shape: [rows, cols], step_m })
     }
 
-    /// Shape and place with each sample in the middle of its cell.
+    /// Geometry with each sample at the centre of its cell.
     pub fn geometry(&self) -> Geometry {
         let origin = self.origin_m.map(|at| at - 0.5 * self.step_m);
         Geometry { rows: self.shape[0], cols: self.shape[1], cell: [self.step_m; 2], origin }
     }
 }
 
-/// The nearest place that has samples of its own: a window about a centre may move by half a sample.
-fn settled(collection: &Collection, at: [f64; 2], step_m: f64) -> [f64; 2] {
+/// The nearest position with samples of its own; a window given by its centre may move by half a sample.
+fn snapped(collection: &Collection, at: [f64; 2], step_m: f64) -> [f64; 2] {
     match &collection.ground {
-        Ground::World(world) => world.settled(at, step_m),
+        Ground::World(world) => world.snapped(at, step_m),
         Ground::Raster(raster) => {
             let g = &raster.geometry;
             [0, 1].map(|a| ((at[a] - g.origin[a]) / step_m - 0.5).round() * step_m + g.origin[a] + 0.5 * step_m)
@@ -115,7 +115,7 @@ fn settled(collection: &Collection, at: [f64; 2], step_m: f64) -> [f64; 2] {
     }
 }
 
-/// What becomes of the samples.
+/// Processing of the samples before they are sent.
 #[derive(Clone, Copy, Debug)]
 struct Treatment {
     field: &'static str,
@@ -157,7 +157,7 @@ impl Treatment {
         Ok(Self { field, format, quarters, flip, downsample, method, sun: sun(query)? })
     }
 
-    /// False where the result does not lie as the ground does.
+    /// False if the result is rotated or mirrored and so has no position on the ground.
     fn has_place(&self) -> bool {
         self.quarters == 0 && self.flip.is_none()
     }
@@ -165,7 +165,7 @@ impl Treatment {
     fn apply(&self, samples: Samples, window: &Window, crs: &Crs) -> Result<Answer, Problem> {
         let samples = samples.thinned(self.downsample, self.method)?;
         let step_m = window.step_m * f64::from(1u32 << self.downsample);
-        // A mean stands in the middle of its block.
+        // The mean belongs to the centre of its block.
         let middle = if self.method == Thinning::Mean { 0.5 * (step_m - window.step_m) } else { 0.0 };
         let origin_m = window.origin_m.map(|at| at + middle);
         let thinned = Window { origin_m, shape: [samples.rows, samples.cols], step_m };
@@ -187,13 +187,13 @@ impl Treatment {
         self.encode(&Grid::new(geometry, field.heights), &crs)
     }
 
-    /// Values of the field.
+    /// Values of the requested field.
     fn values(&self, samples: &Samples, geometry: Geometry) -> Result<Vec<f32>, Problem> {
         let there = |field: &Option<Vec<f32>>| {
             let name = self.field;
             field.clone().ok_or_else(|| {
                 Problem::bad_request(format!(
-                    "`field`: `phenomena` excludes the process that produces {name}; include it"
+                    "`phenomena` excludes the process that produces {name}; include it, or request another `field`"
                 ))
             })
         };
@@ -206,7 +206,7 @@ impl Treatment {
         }
     }
 
-    /// The ground from straight above under the sun; ground beyond the patch casts no shadow into it.
+    /// Renders the ground from straight above under the sun; ground outside the patch casts no shadow into it.
     fn image(&self, samples: &Samples, geometry: Geometry) -> Result<Vec<f32>, Problem> {
         let grid = |values: &Vec<f32>| Grid::new(geometry, values.iter().map(|v| f64::from(*v)).collect());
         let (heights, albedo) = (grid(&samples.heights), samples.albedo.as_ref().map(grid));
@@ -230,9 +230,9 @@ impl Treatment {
                 let name = format!("patch.{format}");
                 let options =
                     WriteOptions { cloud_optimised: format == "tif", values: self.kind(), ..WriteOptions::default() };
-                let (bytes, said) = dem::encode(std::path::Path::new(&name), &double(), crs, &options)
+                let (bytes, warnings) = dem::encode(std::path::Path::new(&name), &double(), crs, &options)
                     .map_err(|e| Problem::unprocessable(e.to_string()))?;
-                notes = said;
+                notes = warnings;
                 Answer::new(media(format), bytes)
             }
         };
@@ -256,12 +256,13 @@ impl Treatment {
     }
 
     fn kind(&self) -> Values {
-        let figures = |description: &'static str| Values::Figures { unit: "1".into(), description: description.into() };
+        let unitless =
+            |description: &'static str| Values::Figures { unit: "1".into(), description: description.into() };
         match self.field {
-            "albedo" => figures("albedo, share of the light that is reflected"),
-            "class" => figures("share of the cell that rocks cover"),
-            "rock_potential" => figures("potential rock cover, share of the ground"),
-            "image" => figures("brightness, I/F"),
+            "albedo" => unitless("albedo, share of the light that is reflected"),
+            "class" => unitless("share of the cell that rocks cover"),
+            "rock_potential" => unitless("potential rock cover, share of the ground"),
+            "image" => unitless("brightness, I/F"),
             _ => Values::default(),
         }
     }
@@ -275,10 +276,10 @@ fn media(format: &str) -> &'static str {
     }
 }
 
-/// The sun of a request.
+/// The sun that a request describes.
 ///
 /// # Errors
-/// One that is not above the horizon.
+/// Angles out of bounds, such as a sun below the horizon.
 pub fn sun(query: &Query) -> Result<Sun, Problem> {
     let default = Sun::default();
     Ok(Sun {
@@ -328,14 +329,14 @@ async fn ground(
     if samples.is_void() {
         let [west, south, east, north] = collection.grid().bounds_m();
         return Err(Problem::not_found(format!(
-            "there is no data in this window; \"{}\" lies between x = {west:.2} and {east:.2} m, y = {south:.2} and {north:.2} m, and may have voids there",
+            "no data in this window; \"{}\" covers x = {west:.2} to {east:.2} m, y = {south:.2} to {north:.2} m, possibly with voids",
             collection.id
         )));
     }
     Ok(samples)
 }
 
-/// `GET /v1/collections/{id}/study`: a section of a study that makes the same patch.
+/// `GET /v1/collections/{id}/study`: a study section that reproduces the patch.
 pub async fn snippet(State(service): State<Arc<Service>>, On(collection): On, pairs: Pairs) -> Result<String, Problem> {
     let query = pairs.checked(&[&["origin", "center", "size", "size_m", "resolution_m"]])?;
     let Ground::World(world) = &collection.ground else {
@@ -345,4 +346,30 @@ pub async fn snippet(State(service): State<Arc<Service>>, On(collection): On, pa
     let window = Window::of(&query, &collection, service.limits.samples)?;
     let [rows, cols] = window.shape;
     world.snippet(window.origin_m, [cols, rows], window.step_m)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Samples lie at the centres of cells: the south-west one at the origin of the window.
+    #[test]
+    fn val_samples_are_centres_of_cells() {
+        let geometry = Window { origin_m: [1.0, 2.0], shape: [3, 4], step_m: 0.5 }.geometry();
+        assert_eq!((geometry.rows, geometry.cols, geometry.cell), (3, 4, [0.5; 2]));
+        assert_eq!([geometry.x(0), geometry.x(3)], [1.0, 2.5]);
+        assert_eq!([geometry.y(2), geometry.y(0)], [2.0, 3.0]);
+    }
+
+    fn query(pairs: &[(&str, &str)]) -> Query {
+        Query::new(pairs.iter().map(|(a, b)| ((*a).to_owned(), (*b).to_owned())).collect(), &KNOWN).unwrap()
+    }
+
+    #[test]
+    fn val_the_sun_stands_above_the_horizon() {
+        let at = |elevation: &str| sun(&query(&[("sun_azimuth_deg", "90"), ("sun_elevation_deg", elevation)]));
+        assert_eq!(at("30").unwrap(), Sun { azimuth_deg: 90.0, elevation_deg: 30.0 });
+        assert!(["0", "-5", "90.1", "nan"].iter().all(|elevation| at(elevation).is_err()));
+        assert_eq!(sun(&query(&[])).unwrap(), Sun::default());
+    }
 }

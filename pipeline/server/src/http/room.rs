@@ -1,20 +1,20 @@
-//! Memory for what is under way: patches that are being put together, and answers on their way to clients.
+//! Memory budgets: for patches being assembled, and for responses being sent.
 
 use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 use tokio::sync::{AcquireError, OwnedSemaphorePermit, Semaphore};
 
-/// Most bytes that a sample of a patch takes while the patch is put together: four fields of it and, where it lies between lattice points, of the
-/// four around it, and three copies for turns and files.
+/// Most memory that a patch takes per sample while it is assembled, bytes: four fields, plus those of the four surrounding samples if it lies between
+/// lattice points, plus three copies for rotation and encoding.
 const SAMPLE_BYTES: usize = 128;
-/// Room is counted in so many bytes.
+/// Unit of the budgets, bytes.
 const UNIT: usize = 1 << 20;
-/// Room for small patches, and as much for large ones, in units: the largest at a time.
+/// Budget of small patches, and separately of large ones, in units; enough for the largest patch.
 const UNITS: usize = 1 << 9;
-/// A patch of more units is large: 362 x 362 samples.
+/// A patch of more than this many units, 362 x 362 samples, is large.
 const SMALL_UNITS: usize = 16;
 
-/// Room for patches, in two lines: small ones do not wait behind large ones.
+/// Memory budget of patches, in two queues, so that small patches do not wait behind large ones.
 pub struct Rooms {
     small: Arc<Semaphore>,
     large: Arc<Semaphore>,
@@ -28,11 +28,10 @@ impl Default for Rooms {
 }
 
 impl Rooms {
-    /// Waits in line for the memory that the samples of a patch take, which is given back when the permit is dropped. A patch that would need more
-    /// than there is waits for all of it.
+    /// Waits in line for the memory of a patch of `samples`; dropping the permit releases it. A patch larger than the budget waits for all of it.
     ///
     /// # Errors
-    /// None: a room is never closed.
+    /// None: the semaphores are never closed.
     pub async fn take(&self, samples: usize) -> Result<OwnedSemaphorePermit, AcquireError> {
         let units = (samples * SAMPLE_BYTES).div_ceil(UNIT).min(UNITS);
         let line = if units > SMALL_UNITS { &self.large } else { &self.small };
@@ -40,18 +39,17 @@ impl Rooms {
     }
 }
 
-/// Bytes of answers on their way to clients.
+/// Bytes of responses being sent.
 #[derive(Clone, Default)]
 pub struct Sending(Arc<AtomicU64>);
 
 impl Sending {
-    /// How many there are.
+    /// The present number.
     pub fn bytes(&self) -> u64 {
         self.0.load(Ordering::Relaxed)
     }
 
-    /// Adds an answer, unless more than `most` bytes would be on their way; one answer alone may have any length, and one that does not count always
-    /// goes.
+    /// Adds a response unless the total would exceed `most` bytes. A single response may have any size, and one of 0 bytes is always accepted.
     pub fn add(&self, bytes: u64, most: u64) -> Option<Load> {
         let more = |sending: u64| (bytes == 0 || sending == 0 || sending + bytes <= most).then_some(sending + bytes);
         self.0.fetch_update(Ordering::Relaxed, Ordering::Relaxed, more).ok()?;
@@ -59,7 +57,7 @@ impl Sending {
     }
 }
 
-/// Bytes of one answer; no longer on their way when dropped.
+/// Bytes of one response; subtracted when dropped.
 pub struct Load {
     sending: Sending,
     bytes: u64,
@@ -79,7 +77,7 @@ mod tests {
 
     const LARGEST: usize = 1 << 22;
 
-    /// The permit, if there is room now.
+    /// The permit, if it is available now.
     fn now(
         taking: Pin<&mut impl Future<Output = Result<OwnedSemaphorePermit, AcquireError>>>,
     ) -> Option<OwnedSemaphorePermit> {
@@ -89,14 +87,14 @@ mod tests {
         }
     }
 
-    /// The largest patch takes all of its room, one that is larger still no more; small ones pass by it.
+    /// The largest patch takes the complete budget of large ones, and an even larger one no more than that; small ones bypass them.
     #[test]
     fn val_large_patches_wait_and_small_ones_do_not() {
         let rooms = Rooms::default();
         let first = now(pin!(rooms.take(LARGEST))).unwrap();
         let mut second = pin!(rooms.take(4 * LARGEST));
         assert!(now(second.as_mut()).is_none());
-        // 32 of 16 MB.
+        // 32 patches of 16 MB.
         let small: Vec<_> = (0..32).map(|_| now(pin!(rooms.take(362 * 362))).unwrap()).collect();
         let mut one_more = pin!(rooms.take(1));
         assert!(now(one_more.as_mut()).is_none());
@@ -107,7 +105,7 @@ mod tests {
     }
 
     #[test]
-    fn val_answers_on_their_way_are_bounded() {
+    fn val_responses_being_sent_are_bounded() {
         let sending = Sending::default();
         let alone = sending.add(200, 100).unwrap();
         assert!(sending.add(1, 100).is_none() && sending.add(0, 100).is_some() && sending.bytes() == 200);

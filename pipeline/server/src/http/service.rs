@@ -1,4 +1,4 @@
-//! What every request can see.
+//! State shared by all requests.
 
 use super::answer::Answers;
 use super::jobs::Jobs;
@@ -16,27 +16,27 @@ use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::Semaphore;
 
-/// Most bytes of the body of a request.
+/// Largest body of a request, bytes.
 pub const BODY_BYTES: usize = 1 << 16;
 
-/// What a request may ask for, and how much may be under way.
+/// Limits of a request, and of what is in progress.
 #[derive(Clone, Debug)]
 pub struct Limits {
-    /// Most samples of a patch; of an image a quarter.
+    /// Samples of a patch; a quarter of it for an image.
     pub samples: u64,
-    /// Most processor time that a request may be expected to take, s.
+    /// Expected processor time of a request, s.
     pub work_s: f64,
-    /// Most tiles of a job.
+    /// Tiles of a job.
     pub job_tiles: u64,
-    /// Most requests of one client under way.
+    /// Concurrent requests per client.
     pub per_client: usize,
-    /// Most connections.
+    /// Concurrent connections.
     pub connections: usize,
-    /// Longest time of a request.
+    /// Time limit of a request.
     pub request: Duration,
-    /// Longest address, bytes.
+    /// Length of a URL, bytes.
     pub address: usize,
-    /// Most bytes of answers on their way to clients.
+    /// Bytes of responses being sent.
     pub sending: u64,
 }
 
@@ -55,57 +55,57 @@ impl Default for Limits {
     }
 }
 
-/// The service.
+/// State shared by all requests.
 pub struct Service {
-    /// Where it listens.
+    /// Address that the server listens on.
     pub address: SocketAddr,
-    /// What is served.
+    /// The collections.
     pub collections: Collections,
-    /// Tiles that were made.
+    /// Cache of tiles.
     pub library: Arc<Library>,
-    /// Answers that were given.
+    /// Cache of responses.
     pub answers: Answers,
     /// Limits.
     pub limits: Limits,
-    /// What clients must show.
+    /// Bearer token that clients must send.
     pub token: Option<String>,
-    /// Names of this computer beside those of its loopback, as clients call it.
+    /// Names of this machine, other than those of loopback, that clients may use.
     pub hosts: Vec<String>,
-    /// Work ahead.
+    /// Jobs.
     pub jobs: Jobs,
-    /// Counters.
+    /// Request metrics.
     pub metrics: Metrics,
-    /// Requests under way by client.
+    /// Requests in progress per client.
     pub under_way: Mutex<HashMap<IpAddr, usize>>,
-    /// Bytes of answers on their way to clients.
+    /// Bytes of responses being sent.
     pub sending: Sending,
-    /// Room for patches that are being put together.
+    /// Memory budget of patches being assembled.
     pub rooms: Rooms,
-    /// Processors for work that is not that of the library.
+    /// Processors for work outside the library.
     pub processors: Arc<Semaphore>,
 }
 
 impl Service {
-    /// The collection of an id.
+    /// The collection with this id.
     ///
     /// # Errors
-    /// There is none.
+    /// There is no such collection.
     pub fn collection(&self, id: &str) -> Result<&Arc<Collection>, Problem> {
         self.collections.get(id).ok_or_else(|| {
             let shown: String = id.chars().take(80).collect();
-            Problem::not_found(format!("\"{shown}\": no such collection; /v1/collections lists them"))
+            Problem::not_found(format!("no such collection: \"{shown}\"; /v1/collections lists them"))
         })
     }
 
-    /// Makes tiles for somebody who waits.
+    /// Generates tiles for a waiting client.
     pub fn maker(&self) -> Maker {
         Maker { library: Arc::clone(&self.library), priority: Priority::Answer, seconds_max: self.limits.work_s }
     }
 
-    /// Samples `step_m` apart, the south-west one at `origin_m`; bilinear between those that there are.
+    /// Samples `step_m` apart with the south-west one at `origin_m`; bilinear between the existing samples.
     ///
     /// # Errors
-    /// Places beyond the end of a world; files that cannot be read; no room for the request.
+    /// Positions beyond the end of a world; unreadable files; a busy library.
     pub async fn samples(
         &self,
         collection: &Collection,
@@ -125,17 +125,17 @@ impl Service {
         }
     }
 
-    /// The levels of a raster. Requests that wait for another that reads them keep no processor.
+    /// The levels of a raster. Requests that wait for another request to read them hold no processor.
     ///
     /// # Errors
-    /// Files that cannot be read, or are not those that were sealed.
+    /// Files that are unreadable, or changed since the release was sealed.
     pub async fn levels(&self, raster: &Arc<Raster>) -> Result<Arc<Pyramid>, Problem> {
         let reader = Arc::clone(raster);
         raster.levels(self.blocking(move || reader.read())).await
     }
 
-    /// Work that takes a processor for a while, or reads files: not on the threads of the runtime, and no more of it at once than there are
-    /// processors. Who leaves while it waits takes it away; once begun it ends.
+    /// Runs CPU-bound or file-reading work on a blocking thread, at most one at a time per processor. A request dropped while it waits withdraws its
+    /// work; work that has started runs to its end.
     ///
     /// # Errors
     /// Those of the work.
@@ -143,7 +143,7 @@ impl Service {
         &self,
         work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let ended = |e: &dyn std::fmt::Display| Problem::internal(format!("the work ended early: {e}"));
+        let ended = |e: &dyn std::fmt::Display| Problem::internal(format!("a task of the server ended early: {e}"));
         let seat = Arc::clone(&self.processors).acquire_owned().await.map_err(|e| ended(&e))?;
         let done = tokio::task::spawn_blocking(move || {
             let done = work();
@@ -154,21 +154,21 @@ impl Service {
     }
 }
 
-/// What a request selects of a ground.
+/// The part of a collection that a request selects.
 ///
 /// # Errors
-/// A process that a world does not have; any for a raster, whose ground is as it is.
+/// A process that the world does not have; any selection for a raster, whose ground is fixed.
 pub fn selection(collection: &Collection, query: &Query) -> Result<Selection, Problem> {
     let numbers = query.numbers("phenomena")?;
     let feature_min_m = query.number("feature_min_m", [0.0, 1e9])?.unwrap_or(0.0);
     match &collection.ground {
         Ground::World(world) => Ok(Selection { phenomena: world.choose(numbers)?, feature_min_m }),
         Ground::Raster(_) if numbers.is_some() || feature_min_m > 0.0 => {
-            Err(Problem::bad_request("`phenomena` and `feature_min_m` are for worlds; a raster does not support them"))
+            Err(Problem::bad_request("`phenomena` and `feature_min_m` are for worlds; omit them for a raster"))
         }
         Ground::Raster(_) => Ok(Selection::default()),
     }
 }
 
-/// The parameters of [`selection`].
+/// Parameters of [`selection`].
 pub const SELECTION: [&str; 2] = ["phenomena", "feature_min_m"];

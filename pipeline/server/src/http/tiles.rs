@@ -1,4 +1,4 @@
-//! Map tiles: by level, row and column of the collection's own grid, and by z, x, y for clients of the web-Mercator kind.
+//! Map tiles: by level, row and column of the collection's own grid, and by z, x, y for web-Mercator clients.
 
 use super::answer::Answer;
 use super::ogc::check_matrix_set;
@@ -15,7 +15,7 @@ use axum::response::Response;
 use serde_json::{Value, json};
 use std::sync::Arc;
 
-/// The parameters that tiles take.
+/// Query parameters of tiles.
 pub const KNOWN: [&str; 4] = ["sun_azimuth_deg", "sun_elevation_deg", "exaggeration", "phenomena"];
 
 /// `GET /v1/collections/{id}/styles/{layer}/map/tiles/{tms}/{level}/{row}/{col}`
@@ -27,7 +27,7 @@ pub async fn tile(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     check_matrix_set(&collection, &set)?;
-    let [level, row, col] = whole([&level, &row, &col])?;
+    let [level, row, col] = integers([&level, &row, &col])?;
     send(&service, &collection, &layer, TileIndex { level, row, col }, pairs, &headers).await
 }
 
@@ -40,21 +40,21 @@ pub async fn xyz(
     headers: HeaderMap,
 ) -> Result<Response, Problem> {
     let y = y.strip_suffix(".png").unwrap_or(&y);
-    let [z, x, y] = whole([&z, &x, y])?;
+    let [z, x, y] = integers([&z, &x, y])?;
     let tile = of_web_mercator(z, x, y).ok_or_else(|| {
         let [col, row] = WINDOW_TILE;
-        Problem::not_found(format!("outside the map, which is the tile {WINDOW_ZOOM}/{col}/{row} and those within it"))
+        Problem::not_found(format!("outside the map, which covers the tile {WINDOW_ZOOM}/{col}/{row} and its subtiles"))
     })?;
     send(&service, &collection, &layer, tile, pairs, &headers).await
 }
 
-fn whole<const N: usize>(texts: [&str; N]) -> Result<[u32; N], Problem> {
+fn integers<const N: usize>(texts: [&str; N]) -> Result<[u32; N], Problem> {
     let mut numbers = [0; N];
     for (number, text) in numbers.iter_mut().zip(texts) {
         let digits = Some(text).filter(|text| text.bytes().all(|b| b.is_ascii_digit()));
         *number = digits
             .and_then(|text| text.parse().ok())
-            .ok_or_else(|| Problem::not_found("level, row and column of a tile are whole numbers"))?;
+            .ok_or_else(|| Problem::not_found("level, row and column of a tile must be integers"))?;
     }
     Ok(numbers)
 }
@@ -73,7 +73,7 @@ async fn send(
     if !grid.has(tile) {
         let levels = grid.levels - 1;
         return Err(Problem::not_found(format!(
-            "no such tile: the level must be 0 to {levels}, and row and column inside the collection"
+            "no such tile: the level must be 0 to {levels}, and the row and column inside the collection"
         )));
     }
     let phenomena = selection(collection, &query)?.phenomena;
@@ -110,7 +110,7 @@ fn style(collection: &Collection, query: &Query, level: u32) -> Result<Style, Pr
     })
 }
 
-/// Lowest and highest height of the tints, and the height in the middle of what is looked at first, m.
+/// Heights of the lowest and the highest tint, and the height that `elevation` is centred on, m.
 fn heights(collection: &Collection) -> ([f64; 2], f64) {
     match &collection.ground {
         Ground::World(world) => (world.height_range_m(), world.middle_height_m()),
@@ -121,7 +121,7 @@ fn heights(collection: &Collection) -> ([f64; 2], f64) {
     }
 }
 
-/// Height of step 0 of [`Layer::Elevation`] for a height in the middle of its range: whole metres.
+/// Height of step 0 of [`Layer::Elevation`], rounded to 1 m, for a given height at the middle of its range.
 fn offset_m(middle_m: f64) -> f64 {
     (middle_m - 0.5 * ELEVATION_SPAN_M).round()
 }
@@ -142,8 +142,8 @@ pub async fn tilejson(
         "maxzoom": WINDOW_ZOOM + finest_level(&collection, layer),
         "bounds": window_degrees(&collection),
         "scheme": "xyz",
-        "description": "A plane in the place of one tile of the web-Mercator map: distances and areas that a client works out from longitude \
-                        and latitude are not those of the ground; `metres_per_pixel` are.",
+        "description": "A plane in place of one tile of the web-Mercator map: distances and areas that a client computes from longitude \
+                        and latitude are not true to the ground; use `metres_per_pixel`.",
         "metres_per_pixel": (0..collection.grid().levels).map(|l| collection.grid().resolution_m(l)).collect::<Vec<_>>(),
     });
     let (_, middle_m) = heights(&collection);
@@ -162,23 +162,42 @@ pub async fn tilejson(
     Ok(Json(json))
 }
 
-/// The finest level of which a layer is offered to web-Mercator clients.
+/// The finest level of a layer that is offered to web-Mercator clients.
 fn finest_level(collection: &Collection, layer: Layer) -> u32 {
     let grid = collection.grid();
     let fits = |level: &u32| grid.resolution_m(*level) >= layer.finest_m();
     (0..grid.levels).rev().find(fits).unwrap_or(0)
 }
 
-/// West, south, east and north of the tiles of level 0 in a web-Mercator client, degrees.
+/// West, south, east and north of the level-0 tiles in a web-Mercator client, degrees.
 fn window_degrees(collection: &Collection) -> [f64; 4] {
     let [cols, rows] = collection.grid().matrix(0);
     let side = 360.0 / f64::from(1u32 << WINDOW_ZOOM);
     let [west, north] = [WINDOW_TILE[0], WINDOW_TILE[1]].map(f64::from);
-    // At the equator degrees of latitude are as long as those of longitude, to a part in 10 000.
+    // At the equator, degrees of latitude and of longitude agree in length to 1 part in 10 000.
     let latitude = |row: f64| {
         let y = std::f64::consts::PI * (1.0 - 2.0 * row / f64::from(1u32 << WINDOW_ZOOM));
         libm::atan(libm::sinh(y)).to_degrees()
     };
     let longitude = |col: f64| col * side - 180.0;
     [longitude(west), latitude(north + f64::from(rows)), longitude(west + f64::from(cols)), latitude(north)]
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_numbers_of_tiles_are_digits() {
+        assert_eq!(integers(["0", "17", "4294967295"]).unwrap(), [0, 17, u32::MAX]);
+        for text in ["", "-1", "+1", "1.0", "0x1", " 1", "4294967296"] {
+            assert!(integers(["0", text]).is_err(), "{text}");
+        }
+    }
+
+    /// The range of `elevation`, 838.8608 m, is centred on the middle height, to within half a metre.
+    #[test]
+    fn val_elevation_is_centred_on_the_middle_height() {
+        assert_eq!([offset_m(0.0), offset_m(1000.0), offset_m(-3000.0)], [-419.0, 581.0, -3419.0]);
+    }
 }

@@ -11,19 +11,19 @@ use serde_json::{Value, json};
 use std::sync::Arc;
 use tokio::task::JoinSet;
 
-/// The parameters of a point, and of a profile, beside the selection.
+/// Parameters of a point and of a profile, in addition to the selection.
 pub const POINT: [&str; 3] = ["x", "y", "resolution_m"];
 /// See [`POINT`].
 pub const PROFILE: [&str; 3] = ["line", "samples", "resolution_m"];
-/// From so many samples in a tile on, a profile is taken from tiles.
+/// A profile with at least this many samples per tile is taken from tiles.
 const SHARED: usize = 16;
-/// Most samples of a profile.
-const SAMPLES_MAX: u32 = 4096;
-/// Samples of a profile unasked.
+/// Largest number of samples of a profile.
+pub const SAMPLES_MAX: u32 = 4096;
+/// Default number of samples of a profile.
 const SAMPLES: u32 = 256;
-/// Most corners of a line.
-const CORNERS_MAX: usize = 1000;
-/// Parts of a profile that are made side by side.
+/// Largest number of corners of a line.
+pub const CORNERS_MAX: usize = 1000;
+/// Parts of a profile that are computed concurrently.
 const PARTS: usize = 16;
 
 /// `GET /v1/collections/{id}/point`
@@ -66,10 +66,10 @@ pub async fn profile(
     let line = query.line("line", CORNERS_MAX)?;
     let count = query.whole("samples", [2, SAMPLES_MAX])?.unwrap_or(SAMPLES) as usize;
     let (distances_m, places) = along(&line, count)
-        .ok_or_else(|| Problem::bad_request("`line` has no length; give at least two different places"))?;
+        .ok_or_else(|| Problem::bad_request("`line` has no length; give at least two different positions"))?;
     let apart_m = distances_m[count - 1] / (count - 1) as f64;
     let [_, finest_m] = collection.spacings_m();
-    // A spacing of the lattice, so that lines that differ a little share tiles.
+    // A spacing of the lattice, so that slightly different lines share tiles.
     let coarsest_m = match &collection.ground {
         Ground::World(world) => world.coarsest_m(),
         Ground::Raster(_) => f64::INFINITY,
@@ -80,7 +80,7 @@ pub async fn profile(
     let piece = if apart_m * SHARED as f64 <= TILE as f64 * step_m { Piece::Tiles } else { Piece::Alone };
     if let Ground::World(world) = &collection.ground {
         if query.text("feature_min_m").is_none() && step_m > finest_m {
-            // As in map tiles of that resolution.
+            // As in map tiles of this resolution.
             selection.feature_min_m = FEATURE_PIXELS * step_m;
         }
         world.check_places(&places, step_m, &selection, piece, service.limits.work_s)?;
@@ -126,7 +126,7 @@ async fn heights(
     Ok(all)
 }
 
-/// Places evenly along a line, and how far they are from its start; `None` where it has no length.
+/// Evenly spaced positions along a line and their distances from its start; `None` if it has no length.
 fn along(line: &[[f64; 2]], count: usize) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
     let mut ends = vec![0.0];
     for pair in line.windows(2) {
@@ -174,5 +174,8 @@ mod tests {
         assert_eq!(distances, [0.0, 2.5, 5.0, 7.5, 10.0]);
         assert_eq!(places, [[0.0, 0.0], [1.5, 2.0], [3.0, 4.0], [3.0, 6.5], [3.0, 9.0]]);
         assert_eq!(along(&[[1.0, 1.0], [1.0, 1.0]], 5), None);
+        // A repeated corner adds nothing.
+        let (distances, places) = along(&[[0.0, 0.0], [0.0, 0.0], [4.0, 0.0], [4.0, 0.0]], 3).unwrap();
+        assert_eq!((distances, places), (vec![0.0, 2.0, 4.0], vec![[0.0, 0.0], [2.0, 0.0], [4.0, 0.0]]));
     }
 }

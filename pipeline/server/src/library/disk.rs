@@ -1,8 +1,9 @@
-//! Records on disk: one file a tile, `ab/<hash>.tile`.
+//! Tile records on disk: one file per tile, `ab/<hash>.tile`.
 //!
-//! A record appears under its name only when it is whole and on disk, and is believed only when its checksum and its key are right: a damaged one is
-//! removed and made again. Files of the folder are its index. Several processes may use one folder: each may add and remove records at any time,
-//! one at a time makes room, and a record that is gone is made again. The least recently used go first, by the times of the files.
+//! A record is written under a temporary name and renamed when it is complete and on disk. It is used only if its checksum and its key match; a
+//! damaged record is removed and regenerated. The folder is its own index. Several processes may share a folder: each may add and remove records at
+//! any time, one at a time evicts, and a record that has been removed is regenerated. The least recently used records are evicted first, by file
+//! modification time.
 
 use super::record;
 use super::{LibraryError, TileKey};
@@ -15,29 +16,29 @@ use std::sync::Once;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::time::{Duration, Instant, SystemTime};
 
-/// Says what the folder is.
+/// Identifies the folder as a tile library.
 const MARKER: &str = "sastrugi-library.json";
 const MARKER_TEXT: &str = "{\"program\":\"sastrugi\",\"library\":1}\n";
-/// Tells backup programs that everything here can be made again.
+/// Tells backup programs that everything in the folder can be regenerated.
 const CACHE_TAG: &str = "CACHEDIR.TAG";
 const CACHE_TAG_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n";
-/// How long a process waits for another that makes room.
+/// How long a process waits for another that is evicting.
 const PATIENCE: Duration = Duration::from_secs(1);
-/// Bytes of a block of the file system.
+/// Block size of the file system, bytes.
 const BLOCK: u64 = 4096;
-/// Held by the process that makes room.
+/// Held by the process that is evicting.
 const LOCK: &str = "lock";
 const ENDING: &str = "tile";
-/// The time of a record is brought up to date at most this often.
+/// The modification time of a record is updated at most this often.
 const TOUCH: Duration = Duration::from_secs(60);
 
 /// The records of a folder.
 pub struct Disk {
     folder: PathBuf,
     limit: u64,
-    /// Of all records, as far as is known.
+    /// Size of all records, as far as this process knows.
     bytes: AtomicU64,
-    /// Of the records that were written since the folder was last looked at.
+    /// Size of the records written by this process since it last scanned the folder.
     own: AtomicU64,
     pub(super) damaged: AtomicU64,
     evicted: AtomicU64,
@@ -52,13 +53,13 @@ struct Record {
 }
 
 impl Disk {
-    /// Opens a folder, or makes it.
+    /// Opens a folder; creates it if it is missing.
     pub fn open(folder: &Path, limit: u64) -> Result<Self, LibraryError> {
         let at = |path: &Path| {
             let path = path.to_owned();
             move |source| LibraryError::Io { path, source }
         };
-        // A link that leads nowhere is none either.
+        // A dangling link is refused too.
         if folder.symlink_metadata().is_ok() && !folder.is_dir() {
             return Err(LibraryError::NoFolder(folder.to_owned()));
         }
@@ -106,19 +107,19 @@ impl Disk {
         self.folder.join(&name[..2]).join(format!("{name}.{ENDING}"))
     }
 
-    /// Whether there is a record of a key, whole or not.
+    /// Whether a key has a record, intact or not.
     pub fn has(&self, key: &TileKey) -> bool {
         self.path(key).is_file()
     }
 
-    /// The tile of a key, if its record is there, whole and undamaged.
+    /// The tile of a key, if it has an intact record.
     pub fn read(&self, key: &TileKey) -> Option<Samples> {
         let path = self.path(key);
         let bytes = fs::read(&path).ok()?;
         let tile = record::decode(&key.text, &bytes);
         if tile.is_none() {
             self.damaged.fetch_add(1, Ordering::Relaxed);
-            tracing::warn!(record = %path.display(), "damaged record; it will be regenerated");
+            tracing::warn!(record = %path.display(), "damaged tile record; it will be regenerated");
             if fs::remove_file(&path).is_ok() {
                 self.forget(on_disk(bytes.len() as u64));
             }
@@ -128,7 +129,7 @@ impl Disk {
         tile
     }
 
-    /// Keeps a tile. A record that cannot be written is left out: the tile is made again when it is asked for.
+    /// Writes a record. Failure is not an error: the tile is regenerated when it is next requested.
     pub fn write(&self, key: &TileKey, tile: &Samples) {
         let bytes = record::encode(&key.text, tile);
         if on_disk(bytes.len() as u64) > self.limit {
@@ -157,13 +158,13 @@ impl Disk {
         let _ = self.bytes.fetch_update(Ordering::Relaxed, Ordering::Relaxed, less);
     }
 
-    /// Whether the limit is passed, or this process has written a sixteenth of it since it last looked at the folder, to which others may write too.
+    /// Whether the limit is exceeded, or this process has written a sixteenth of it since its last scan; other processes may have written too.
     fn is_due(&self) -> bool {
         self.bytes.load(Ordering::Relaxed) > self.limit || self.own.load(Ordering::Relaxed) > self.limit / 16
     }
 
-    /// Removes the records that were not used for longest, down to nine tenths of the limit, once they pass it. One process at a time does it, and the
-    /// others wait for it: what they wrote meanwhile would not be counted.
+    /// Evicts the least recently used records down to nine tenths of the limit once they exceed it. One process evicts at a time; the others wait,
+    /// because records written meanwhile would not be counted.
     fn make_room(&self) {
         if !self.is_due() {
             return;
@@ -171,7 +172,7 @@ impl Disk {
         let Ok(lock) = File::options().create(true).truncate(false).write(true).open(self.folder.join(LOCK)) else {
             return;
         };
-        // Another thread may have made room meanwhile.
+        // Another thread may have evicted meanwhile.
         if !is_locked(&lock) || !self.is_due() {
             return;
         }
@@ -193,18 +194,18 @@ impl Disk {
         self.bytes.store(bytes, Ordering::Relaxed);
     }
 
-    /// Damaged, evicted and unwritten records, and bytes.
+    /// Numbers of damaged, evicted and unwritten records, and bytes on disk.
     pub fn counts(&self) -> [u64; 4] {
         [&self.damaged, &self.evicted, &self.unwritten, &self.bytes].map(|n| n.load(Ordering::Relaxed))
     }
 }
 
-/// Locks a file that others hold for a moment; false where one holds it for longer, as a process that was stopped.
+/// Locks a file that is normally held only briefly; false if it stays locked, for example by a suspended process.
 fn is_locked(file: &File) -> bool {
     let start = Instant::now();
     loop {
         match file.try_lock() {
-            // Without locks on this file system two may make room at once, which removes more than need be.
+            // On a file system without locks, two processes may evict at once and remove more than necessary.
             Ok(()) | Err(TryLockError::Error(_)) => return true,
             Err(TryLockError::WouldBlock) if start.elapsed() > PATIENCE => return false,
             Err(TryLockError::WouldBlock) => std::thread::sleep(PATIENCE / 500),
@@ -212,22 +213,22 @@ fn is_locked(file: &File) -> bool {
     }
 }
 
-/// Bytes that a file takes on disk, in the usual blocks.
+/// Bytes that a file occupies on disk, in blocks.
 fn on_disk(length: u64) -> u64 {
     length.next_multiple_of(BLOCK)
 }
 
-/// Brings the time of a record up to date.
+/// Updates the modification time of a record.
 fn touch(path: &Path) {
     let now = SystemTime::now();
     let stale = |used: SystemTime| now.duration_since(used).is_ok_and(|age| age > TOUCH);
     if fs::metadata(path).and_then(|m| m.modified()).is_ok_and(stale) {
-        // A record that cannot be touched only goes sooner.
+        // If this fails, the record is only evicted sooner.
         let _ = File::options().write(true).open(path).and_then(|file| file.set_modified(now));
     }
 }
 
-/// The folders of records.
+/// The subfolders that hold records.
 fn shelves(folder: &Path) -> Vec<PathBuf> {
     let is_shelf = |name: &str| name.len() == 2 && name.bytes().all(|b| b.is_ascii_hexdigit());
     let entries = fs::read_dir(folder).into_iter().flatten().flatten();

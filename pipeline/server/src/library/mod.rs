@@ -1,8 +1,8 @@
-//! Tiles that were made once, in memory and on disk; each is made once however many ask for it.
+//! Cache of generated tiles, in memory and on disk; concurrent requests for a tile share one generation.
 //!
-//! A request is answered from memory, from a record on disk (`disk`), or by generating the tile on a worker thread (`pool`). Records are read
-//! by threads of their own, so that they do not queue behind tiles that take long. All that ask for one tile while it is on its way share one
-//! flight. The flight belongs to none of them: whoever leaves, the others are served, and when the last has left the making is told to stop.
+//! A request is answered from memory, from a record on disk (`disk`), or by generating the tile on a worker thread (`pool`). Separate threads read
+//! records, so that reads do not queue behind slow tiles. Concurrent requests for a tile share one flight. No request owns the flight: if one is
+//! dropped, the others are still served, and when the last is dropped the generation is cancelled.
 
 mod disk;
 mod pool;
@@ -24,16 +24,16 @@ use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError, Weak};
 use tokio::sync::watch;
 
-/// Fewer samples than these are not worth a record.
+/// Tiles with fewer samples are not worth a record.
 const RECORD_MIN: usize = 64;
 /// Threads that read records.
 const READERS: usize = 4;
-/// Tiles that are known to have been asked for, beside those that are kept.
+/// Number of requested tiles to remember, in addition to those in the cache.
 const ASKED: usize = 1 << 16;
-/// Most records that wait for a reader.
+/// Longest queue of records to read.
 const READS: usize = 4096;
 
-/// What a tile is, as text that names all that its samples depend on. Its name is the hash of that text.
+/// Identity of a tile: a text that names everything its samples depend on, and the hash of that text.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct TileKey {
     text: String,
@@ -41,77 +41,77 @@ pub struct TileKey {
 }
 
 impl TileKey {
-    /// The key of a canonical text.
+    /// The key for a canonical text.
     pub fn new(text: String) -> Self {
         let digest = *blake3::hash(text.as_bytes()).as_bytes();
         Self { text, digest }
     }
 }
 
-/// Where tiles are kept, and how many.
+/// Where tiles are stored, and how many.
 #[derive(Clone, Debug)]
 pub struct Settings {
-    /// Folder of the records; tiles are kept in memory only without one.
+    /// Folder of the records; without it, tiles are kept in memory only.
     pub folder: Option<PathBuf>,
-    /// Most bytes of records.
+    /// Limit of the records on disk, bytes.
     pub disk_bytes: u64,
-    /// Most bytes in memory.
+    /// Limit of the tiles in memory, bytes.
     pub memory_bytes: u64,
-    /// Threads that make tiles.
+    /// Threads that generate tiles.
     pub workers: usize,
-    /// Most tiles that wait for a worker.
+    /// Longest queue of tiles to generate.
     pub queue: usize,
 }
 
-/// Why there is no tile.
+/// Why a tile is unavailable.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 pub enum Unavailable {
-    /// As many wait as may wait.
+    /// The queue is full.
     #[error("too many tiles are queued")]
     Busy,
-    /// Making it failed.
+    /// Generation failed.
     #[error("the tile could not be generated: {0}")]
     Failed(String),
 }
 
-/// Why a library was not opened.
+/// Why a library could not be opened.
 #[derive(Debug, thiserror::Error)]
 pub enum LibraryError {
-    /// The folder holds other things.
-    #[error("{}: not empty, and not a tile library; choose another folder with --library", .0.display())]
+    /// The folder holds other files.
+    #[error("{}: the folder is not empty and not a tile library; choose another folder with --library", .0.display())]
     Occupied(PathBuf),
-    /// The folder is of another version of the program.
-    #[error("{}: a tile library from another version of sastrugi; choose another folder with --library, or delete this one", .0.display())]
+    /// The folder was created by another version of the program.
+    #[error("{}: this tile library is from another version of sastrugi; choose another folder with --library, or delete this one", .0.display())]
     Version(PathBuf),
-    /// There is a file of that name.
-    #[error("{}: not a folder; --library takes one", .0.display())]
+    /// The path exists and is not a folder.
+    #[error("{}: not a folder; --library requires a folder", .0.display())]
     NoFolder(PathBuf),
-    /// The file system failed.
+    /// A file operation failed.
     #[error("{}: cannot use the tile library: {source}; choose another folder with --library", path.display())]
     Io {
         /// The folder or file.
         path: PathBuf,
-        /// What failed.
+        /// The error.
         source: std::io::Error,
     },
 }
 
-/// What a library has done so far.
+/// Counters since the library was opened, and its present size.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub struct Statistics {
     /// Tiles answered from memory.
     pub memory_hits: u64,
     /// Tiles read from disk.
     pub disk_hits: u64,
-    /// Tiles made.
+    /// Tiles generated.
     pub made: u64,
-    /// Makings that nobody waited for any longer.
+    /// Generations cancelled because no request was waiting.
     pub cancelled: u64,
-    /// Makings that failed.
+    /// Generations that failed.
     pub failed: u64,
-    /// Records that were damaged, and made again.
+    /// Damaged records, which were regenerated.
     pub damaged: u64,
-    /// Records that made room for others.
+    /// Records removed to make room.
     pub evicted: u64,
     /// Records that could not be written.
     pub unwritten: u64,
@@ -119,44 +119,44 @@ pub struct Statistics {
     pub disk_bytes: u64,
     /// Bytes of tiles in memory.
     pub memory_bytes: u64,
-    /// Tiles that wait for a worker.
+    /// Tiles waiting for a worker.
     pub queued: u64,
-    /// Workers that are at it.
+    /// Busy workers and readers.
     pub running: u64,
 }
 
-/// One number of the [`Statistics`].
+/// One value of the [`Statistics`].
 #[derive(Clone, Copy, Debug)]
-pub struct Figure {
+pub struct Statistic {
     /// Its name.
     pub name: &'static str,
-    /// What it is.
+    /// Description.
     pub help: &'static str,
-    /// Whether it only ever rises.
-    pub counts: bool,
+    /// Whether it is a counter, which never decreases.
+    pub is_counter: bool,
     /// Its value.
     pub value: u64,
 }
 
 impl Statistics {
-    /// All of them by name.
-    pub fn figures(&self) -> [Figure; 12] {
-        let figure = |(name, help, counts, value)| Figure { name, help, counts, value };
+    /// All values with their names.
+    pub fn list(&self) -> [Statistic; 12] {
+        let statistic = |(name, help, is_counter, value)| Statistic { name, help, is_counter, value };
         [
             ("memory_hits", "Tiles answered from memory", true, self.memory_hits),
             ("disk_hits", "Tiles read from disk", true, self.disk_hits),
             ("made", "Tiles generated", true, self.made),
-            ("cancelled", "Tiles cancelled, with no client waiting", true, self.cancelled),
+            ("cancelled", "Tiles cancelled because no client was waiting", true, self.cancelled),
             ("failed", "Tiles that could not be generated", true, self.failed),
-            ("damaged", "Damaged records", true, self.damaged),
+            ("damaged", "Damaged records, regenerated", true, self.damaged),
             ("evicted", "Records removed to make room", true, self.evicted),
             ("unwritten", "Records that could not be written", true, self.unwritten),
-            ("disk_bytes", "Bytes of records", false, self.disk_bytes),
+            ("disk_bytes", "Bytes of records on disk", false, self.disk_bytes),
             ("memory_bytes", "Bytes of tiles in memory", false, self.memory_bytes),
             ("queued", "Tiles queued", false, self.queued),
             ("running", "Tiles being generated or read", false, self.running),
         ]
-        .map(figure)
+        .map(statistic)
     }
 }
 
@@ -175,7 +175,7 @@ fn count(counter: &AtomicU64) {
 
 type Made = Result<Arc<Samples>, Unavailable>;
 
-/// A tile on its way.
+/// A tile that is being generated or read.
 struct Flight {
     number: u64,
     waiters: usize,
@@ -193,8 +193,8 @@ impl Weighter<[u8; 32], Arc<Samples>> for Bytes {
     }
 }
 
-/// A cache of one part, so that a value may take all of its room. Divided ones, the default, keep none that is larger than a part, of which
-/// there are more the more processors there are.
+/// A cache with a single shard, so that one value may use all of its capacity. The default has a number of shards that grows with the number of
+/// processors, and rejects any value larger than a shard.
 pub fn undivided<K, V, W>(items: usize, bytes: u64, weighter: W) -> Cache<K, V, W>
 where
     K: Eq + std::hash::Hash,
@@ -207,16 +207,16 @@ where
         Ok(options) => {
             Cache::with_options(options, weighter, DefaultHashBuilder::default(), DefaultLifecycle::default())
         }
-        // All that it asks for is given.
+        // All required options are set.
         Err(_) => Cache::with_weighter(items, bytes, weighter),
     }
 }
 
-/// Tiles that were made once.
+/// Cache of generated tiles.
 pub struct Library {
     memory: Cache<[u8; 32], Arc<Samples>, Bytes>,
     disk: Option<Disk>,
-    /// Tiles that somebody asked for a part of, see [`Library::remember`].
+    /// Tiles of which a request used a part; see [`Library::remember`].
     asked: Cache<[u8; 32], ()>,
     flights: Mutex<HashMap<[u8; 32], Flight>>,
     flown: AtomicU64,
@@ -226,10 +226,10 @@ pub struct Library {
 }
 
 impl Library {
-    /// Opens a library, and makes its folder where there is none.
+    /// Opens a library; creates its folder if it is missing.
     ///
     /// # Errors
-    /// A folder that holds other things, or cannot be used.
+    /// The folder holds other files, or cannot be used.
     pub fn open(settings: &Settings) -> Result<Arc<Self>, LibraryError> {
         let folder = settings.folder.as_deref().filter(|_| settings.disk_bytes > 0);
         let disk = folder.map(|folder| Disk::open(folder, settings.disk_bytes)).transpose()?;
@@ -246,10 +246,32 @@ impl Library {
         }))
     }
 
-    /// The tile of a key: kept, or made by `make` on a worker. `make` looks at its flag and ends early, with nothing, once it is set.
+    /// The tile of a key, from the cache or generated by `make` on a worker. `make` must poll its flag and return `None` once it is set.
     ///
     /// # Errors
     /// See [`Unavailable`].
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_server::LibrarySettings;
+    /// use sastrugi_server::library::{Library, Priority, TileKey};
+    /// use sastrugi_server::samples::Samples;
+    /// use std::sync::atomic::AtomicBool;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let settings = LibrarySettings { folder: None, disk_bytes: 0, memory_bytes: 1 << 20, workers: 1, queue: 16 };
+    /// let library = Library::open(&settings)?;
+    /// let runtime = tokio::runtime::Runtime::new()?;
+    /// let key = || TileKey::new("level ground 1.5 m high".to_owned());
+    /// let make = |_: &AtomicBool| Some(Samples { heights: vec![1.5; 64], ..Samples::empty(8, 8) });
+    /// let tile = runtime.block_on(library.tile(key(), Priority::Answer, make))?;
+    /// assert_eq!(tile.heights, [1.5; 64]);
+    /// // The second request is answered from memory.
+    /// let again = runtime.block_on(library.tile(key(), Priority::Answer, |_| None))?;
+    /// assert_eq!((again.heights.len(), library.statistics().memory_hits), (64, 1));
+    /// # Ok(())
+    /// # }
+    /// ```
     pub async fn tile(
         self: &Arc<Self>,
         key: TileKey,
@@ -272,24 +294,24 @@ impl Library {
         }
     }
 
-    /// Whether a tile is kept or on its way.
+    /// Whether a tile is cached or being generated.
     pub fn has(&self, key: &TileKey) -> bool {
         self.memory.peek(&key.digest).is_some()
             || self.flights().contains_key(&key.digest)
             || self.disk.as_ref().is_some_and(|disk| disk.has(key))
     }
 
-    /// Whether one of these tiles is kept, on its way, or remembered.
+    /// Whether any of these tiles is cached, being generated, or remembered.
     pub fn knows_any(&self, keys: &[TileKey]) -> bool {
         keys.iter().any(|key| self.asked.peek(&key.digest).is_some()) || keys.iter().any(|key| self.has(key))
     }
 
-    /// Remembers that somebody asked for a part of these tiles.
+    /// Remembers that a request used a part of these tiles.
     pub fn remember(&self, keys: &[TileKey]) {
         keys.iter().for_each(|key| self.asked.insert(key.digest, ()));
     }
 
-    /// Joins the flight of a key, or starts it.
+    /// Joins the flight of a key, or starts one.
     fn board(
         self: &Arc<Self>,
         key: TileKey,
@@ -298,7 +320,7 @@ impl Library {
     ) -> Result<Boarded, Unavailable> {
         let digest = key.digest;
         let mut flights = self.flights();
-        // A flight may have landed since memory was asked.
+        // A flight may have landed since the lookup in memory.
         if let Some(tile) = self.memory.get(&digest) {
             count(&self.counts.memory_hits);
             return Ok(Boarded::Kept(tile));
@@ -328,17 +350,17 @@ impl Library {
         Ok(Boarded::Waiting(Waiter { library: Arc::clone(self), digest, number }, landed))
     }
 
-    /// Ends a flight: its tile goes to memory and to those that wait.
+    /// Ends a flight: stores its tile in memory and passes it to all who wait.
     fn land(&self, waiting: &watch::Sender<Option<Made>>, digest: [u8; 32], made: Made) {
         if let Ok(tile) = &made {
-            // Known in memory before the flight is over: who comes in between finds it.
+            // Store the tile before the flight ends, so that a request that arrives in between finds it.
             self.memory.insert(digest, Arc::clone(tile));
         }
-        // Nobody may be left to hear it.
+        // There may be no receivers left.
         let _ = waiting.send(Some(made));
     }
 
-    /// Forgets a flight that has ended.
+    /// Removes a flight that has ended.
     fn forget(&self, digest: [u8; 32], number: u64) {
         let mut flights = self.flights();
         if flights.get(&digest).is_some_and(|flight| flight.number == number) {
@@ -350,7 +372,7 @@ impl Library {
         self.flights.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// What it has done so far.
+    /// Present values of the counters.
     pub fn statistics(&self) -> Statistics {
         let get = |counter: &AtomicU64| counter.load(Ordering::Relaxed);
         let [damaged, evicted, unwritten, disk_bytes] = self.disk.as_ref().map_or([0; 4], Disk::counts);
@@ -370,13 +392,13 @@ impl Library {
         }
     }
 
-    /// Tells all makings to stop.
+    /// Cancels all generations.
     pub fn stop(&self) {
         self.flights().values().for_each(|flight| flight.cancel.store(true, Ordering::Relaxed));
     }
 }
 
-/// The way of a tile to those that wait for it.
+/// Everything a thread needs to deliver a tile.
 struct Trip {
     library: Weak<Library>,
     key: TileKey,
@@ -386,7 +408,7 @@ struct Trip {
 }
 
 impl Trip {
-    /// Brings the tile of a record, on a reader. Where the record is damaged, a worker makes the tile.
+    /// Reads a tile from its record, on a reader thread; if the record is damaged, passes the tile to a worker.
     fn read(self, make: impl FnOnce(&AtomicBool) -> Option<Samples> + Send + 'static) {
         let Some(library) = self.library.upgrade() else { return };
         if let Some(tile) = library.disk.as_ref().and_then(|disk| disk.read(&self.key)) {
@@ -396,7 +418,7 @@ impl Trip {
         }
         let (digest, number, land) = (self.key.digest, self.number, self.land.clone());
         let pushed = {
-            // Who joins meanwhile finds it in one line or the other.
+            // Under the lock, so that a request that joins now finds the work in one queue or the other.
             let flights = library.flights();
             let Some(flight) = flights.get(&digest).filter(|flight| flight.number == number) else { return };
             library.workers.push(flight.priority, Arc::clone(&self.cancel), Box::new(move || self.make(make)))
@@ -407,11 +429,11 @@ impl Trip {
         }
     }
 
-    /// Makes the tile, on a worker.
+    /// Generates the tile, on a worker thread.
     fn make(self, make: impl FnOnce(&AtomicBool) -> Option<Samples>) {
         let Some(library) = self.library.upgrade() else { return };
         let made = match catch_unwind(AssertUnwindSafe(|| make(&self.cancel))) {
-            // What a stopped making gives is not a tile, whatever it is.
+            // The result of a cancelled generation is not a tile, whatever it returned.
             Ok(_) if self.cancel.load(Ordering::Relaxed) => {
                 count(&library.counts.cancelled);
                 Err(Unavailable::Failed("no client was waiting".to_owned()))
@@ -430,20 +452,20 @@ impl Trip {
                 disk.write(&self.key, &tile);
             }
         }
-        // Only now, so that whoever came while the record was written was served too.
+        // Last, so that requests that arrived while the record was being written joined this flight.
         library.forget(self.key.digest, self.number);
     }
 }
 
-/// What becomes of a request that memory did not answer at once.
+/// Outcome of a request that the first lookup in memory missed.
 enum Boarded {
-    /// It is answered after all.
+    /// The tile is in memory after all.
     Kept(Arc<Samples>),
-    /// It waits.
+    /// The request waits.
     Waiting(Waiter, watch::Receiver<Option<Made>>),
 }
 
-/// One that waits for a flight; dropped when it leaves.
+/// A request waiting for a flight; dropped when the request ends.
 struct Waiter {
     library: Arc<Library>,
     digest: [u8; 32],
@@ -457,7 +479,7 @@ impl Drop for Waiter {
         flight.waiters -= 1;
         if flight.waiters == 0 {
             flight.cancel.store(true, Ordering::Relaxed);
-            // Who comes now starts another flight.
+            // A later request starts a new flight.
             flights.remove(&self.digest);
         }
     }

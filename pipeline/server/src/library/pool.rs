@@ -1,15 +1,15 @@
-//! Threads that make tiles, and the tiles that wait for them.
+//! Threads that generate tiles, and the queues of tiles waiting for them.
 
 use std::collections::VecDeque;
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 use std::sync::{Arc, Condvar, Mutex, MutexGuard, PoisonError};
 
-/// What is made first.
+/// Priority of a tile.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Priority {
-    /// Somebody waits for it.
+    /// A client is waiting for the tile.
     Answer,
-    /// It is made ahead, when nobody waits.
+    /// The tile is generated in advance; no client is waiting.
     Background,
 }
 
@@ -19,7 +19,7 @@ pub struct Full;
 
 type Work = Box<dyn FnOnce() + Send>;
 
-/// Work that a thread takes up.
+/// Work taken from the queue.
 struct Taken {
     work: Work,
     priority: Priority,
@@ -49,7 +49,7 @@ impl Running {
 struct Queue {
     answers: VecDeque<Waiting>,
     background: VecDeque<Waiting>,
-    /// How many threads are at work for somebody who waits, and how many ahead.
+    /// Numbers of threads working for a waiting client, and in advance.
     running: Running,
     closed: bool,
 }
@@ -61,7 +61,7 @@ struct Shared {
     workers: usize,
 }
 
-/// A fixed number of threads and a bounded queue.
+/// A fixed number of threads with bounded queues.
 pub struct Pool {
     shared: Arc<Shared>,
     limit: usize,
@@ -72,7 +72,7 @@ impl Shared {
         self.queue.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// The next work, once there is some; `None` when the pool is closed.
+    /// Waits for the next work; `None` when the pool is closed.
     fn next(&self) -> Option<Taken> {
         let mut queue = self.queue();
         loop {
@@ -92,7 +92,7 @@ impl Shared {
         }
     }
 
-    /// Takes up work until the pool is closed.
+    /// Takes and runs work until the pool is closed.
     fn work(&self) {
         while let Some(Taken { work, priority }) = self.next() {
             work();
@@ -102,7 +102,8 @@ impl Shared {
 }
 
 impl Queue {
-    /// Takes the next work out of line. Tiles made ahead may take long: they leave a thread beside the `workers` to those that wait.
+    /// Takes the next work from the queues. Tiles generated in advance may take long, so they leave one thread in addition to `workers` free for
+    /// waiting clients.
     fn take(&mut self, workers: usize) -> Option<(Waiting, Priority)> {
         let Running { answers, ahead } = self.running;
         let answer = (answers < workers).then(|| self.answers.pop_front()).flatten();
@@ -115,8 +116,8 @@ impl Queue {
 }
 
 impl Pool {
-    /// `workers` threads, called `name`, and one more for an answer that finds all of them at work ahead. At most `limit` works wait in each of two
-    /// queues.
+    /// Starts `workers` threads named after `name`, and one more for a client that finds all of them busy in advance. Each of the two queues holds at
+    /// most `limit` items.
     pub fn new(name: &str, workers: usize, limit: usize) -> Self {
         let workers = workers.max(1);
         let shared =
@@ -131,10 +132,10 @@ impl Pool {
         Self { shared, limit }
     }
 
-    /// Queues work; a cancelled one is dropped unseen.
+    /// Queues work; cancelled work is dropped without being run.
     ///
     /// # Errors
-    /// As many wait as may wait.
+    /// The queue is full.
     pub fn push(&self, priority: Priority, cancel: Arc<AtomicBool>, work: Work) -> Result<(), Full> {
         let mut queue = self.shared.queue();
         let line = match priority {
@@ -154,7 +155,7 @@ impl Pool {
         Ok(())
     }
 
-    /// Puts waiting background work, known by its flag, in line with the answers: somebody now waits for it.
+    /// Moves queued background work, identified by its flag, to the queue of waiting clients.
     pub fn promote(&self, cancel: &Arc<AtomicBool>) {
         let mut queue = self.shared.queue();
         let place = queue.background.iter().position(|waiting| Arc::ptr_eq(&waiting.cancel, cancel));
@@ -164,20 +165,20 @@ impl Pool {
         }
     }
 
-    /// How many wait.
+    /// Number of queued items.
     pub fn queued(&self) -> usize {
         let queue = self.shared.queue();
         let wanted = |line: &VecDeque<Waiting>| line.iter().filter(|w| !w.cancel.load(Ordering::Relaxed)).count();
         wanted(&queue.answers) + wanted(&queue.background)
     }
 
-    /// How many workers are at it.
+    /// Number of busy threads.
     pub fn running(&self) -> u64 {
         let Running { answers, ahead } = self.shared.queue().running;
         (answers + ahead) as u64
     }
 
-    /// How many were dropped unseen.
+    /// Number of items dropped without being run.
     pub fn dropped(&self) -> u64 {
         self.shared.dropped.load(Ordering::Relaxed)
     }

@@ -1,4 +1,4 @@
-//! Flights, bounds, damage and kills.
+//! Shared generation, limits, damaged records and killed writers.
 
 use super::*;
 use std::fs;
@@ -14,7 +14,7 @@ fn mix(state: &mut u64) -> u64 {
     (*state ^ (*state >> 29)).wrapping_mul(0xbf58_476d_1ce4_e5b9) >> 16
 }
 
-/// A tile that its number decides.
+/// A tile determined by its number.
 fn tile_of(number: u64, size: usize) -> Samples {
     let count = size * size;
     let values = |salt: u64| (0..count as u64).map(|k| ((number * 31 + salt + k) % 9973) as f32).collect::<Vec<_>>();
@@ -51,12 +51,12 @@ async fn until(mut condition: impl FnMut() -> bool) {
     }
 }
 
-/// Waits until the writes behind the answers are done.
+/// Waits until pending writes are done.
 async fn idle(library: &Arc<Library>) {
     until(|| library.statistics().running == 0 && library.statistics().queued == 0).await;
 }
 
-/// All files below a folder whose name passes.
+/// All files below a folder whose name satisfies `wanted`.
 fn files(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Vec<PathBuf> {
     let mut found = Vec::new();
     for entry in fs::read_dir(folder).unwrap().flatten() {
@@ -69,9 +69,9 @@ fn files(folder: &Path, wanted: &dyn Fn(&str) -> bool) -> Vec<PathBuf> {
     found
 }
 
-/// The first of a hundred leaves; the others are served by one making.
+/// The first of a hundred requests is dropped; the other 99 are served by the same generation.
 #[test]
-fn val_a_hundred_requests_make_once_without_their_leader() {
+fn val_a_hundred_requests_generate_once_when_the_first_is_dropped() {
     runtime().block_on(async {
         let library = open(settings(None));
         let (go, wait) = mpsc::channel::<()>();
@@ -101,9 +101,9 @@ fn val_a_hundred_requests_make_once_without_their_leader() {
     });
 }
 
-/// The last to leave cancels; who comes while the cancelled making ends gets a right answer of its own.
+/// The last waiter to leave cancels; a request that arrives while the cancelled generation ends gets its own, correct tile.
 #[test]
-fn val_the_last_waiter_cancels_and_a_later_one_starts_anew() {
+fn val_the_last_waiter_cancels_and_a_later_one_starts_again() {
     runtime().block_on(async {
         let library = open(settings(None));
         let (go, wait) = mpsc::channel::<()>();
@@ -132,9 +132,9 @@ fn val_the_last_waiter_cancels_and_a_later_one_starts_anew() {
     });
 }
 
-/// One worker, held: the queue is bounded, what is left is taken off, answers go before background jobs.
+/// With one busy worker: the queue is bounded, abandoned work is dropped, and answers go before background jobs.
 #[test]
-fn val_the_queue_is_bounded_ordered_and_left() {
+fn val_the_queue_is_bounded_and_ordered() {
     runtime().block_on(async {
         let library = open(Settings { workers: 1, queue: 2, ..settings(None) });
         let (go, wait) = mpsc::channel::<()>();
@@ -176,11 +176,10 @@ fn val_the_queue_is_bounded_ordered_and_left() {
 }
 
 #[test]
-fn val_failures_reach_who_waits_and_the_pool_lives() {
+fn val_failures_reach_the_waiters_and_the_pool_survives() {
     runtime().block_on(async {
         let library = open(Settings { workers: 1, ..settings(None) });
-        let panicked =
-            library.tile(key_of(1), Priority::Answer, |_| panic!("a broken kernel, as this test has it")).await;
+        let panicked = library.tile(key_of(1), Priority::Answer, |_| panic!("a kernel that fails on purpose")).await;
         assert!(matches!(panicked, Err(Unavailable::Failed(_))));
         assert!(matches!(library.tile(key_of(1), Priority::Answer, |_| None).await, Err(Unavailable::Failed(_))));
         assert_eq!(*ask(&library, 1).await, tile_of(1, 8));
@@ -188,7 +187,7 @@ fn val_failures_reach_who_waits_and_the_pool_lives() {
     });
 }
 
-/// A tile larger than the memory is served and not kept.
+/// A tile larger than the memory limit is served but not kept.
 #[test]
 fn val_memory_is_bounded() {
     runtime().block_on(async {
@@ -204,7 +203,7 @@ fn val_memory_is_bounded() {
     });
 }
 
-/// Any flipped byte and any truncation is found, deleted and made again.
+/// Any flipped bit and any truncation is detected, and the record deleted and regenerated.
 #[test]
 fn prop_damaged_records_are_never_served() {
     runtime().block_on(async {
@@ -250,7 +249,7 @@ fn val_foreign_folders_are_refused_and_left_alone() {
     assert_eq!(files(fresh.path(), &|_| true).len(), 0);
 }
 
-/// A shelf that is a file: the tile cannot be written and is served all the same.
+/// With a file in place of a subfolder, the tile cannot be written but is still served.
 #[test]
 fn val_write_errors_do_not_fail_the_answer() {
     runtime().block_on(async {
@@ -265,9 +264,9 @@ fn val_write_errors_do_not_fail_the_answer() {
     });
 }
 
-/// What was made, is on its way, or was asked for in part is known; a record on disk too.
+/// Tiles that are cached, being generated, or partly used are known; so are records on disk.
 #[test]
-fn val_what_was_asked_for_is_known() {
+fn val_requested_tiles_are_known() {
     runtime().block_on(async {
         let folder = tempfile::tempdir().unwrap();
         let library = open(settings(Some(folder.path())));
@@ -284,7 +283,7 @@ fn val_what_was_asked_for_is_known() {
     });
 }
 
-/// Two libraries on one folder that holds a fraction of what is asked for.
+/// Two libraries share a folder that holds only a fraction of the requested tiles.
 #[test]
 fn prop_two_libraries_share_a_small_folder() {
     runtime().block_on(async {
@@ -310,13 +309,14 @@ fn prop_two_libraries_share_a_small_folder() {
         assert!(all.iter().all(|s| s.damaged == 0 && s.evicted > 0 && s.disk_hits > 0), "{all:?}");
         drop(Library::open(&small()).unwrap());
         let left = files(folder.path(), &|name| name.ends_with(".tile"));
-        // Each takes a block.
+        // Each record occupies one block.
         assert!(left.len() <= 20, "{}", left.len());
     });
 }
 
-/// The child of the test below: writes records until it is killed.
+/// Child process of the test below; writes records until it is killed.
 #[test]
+#[ignore = "the process that the next test starts"]
 fn val_child_writes_until_it_is_killed() {
     let Some(folder) = std::env::var_os(WRITER) else { return };
     let disk = Disk::open(Path::new(&folder), 1 << 30).unwrap();
@@ -334,14 +334,14 @@ fn val_child_writes_until_it_is_killed() {
     });
 }
 
-/// Writers killed at any instant leave whole records only, and no temporary file stays after the next opening.
+/// Writers killed at any instant leave only complete records, and the next opening removes all temporary files.
 #[test]
 fn prop_killed_writers_leave_whole_records() {
     let folder = tempfile::tempdir().unwrap();
     let (mut state, mut leftovers) = (3, 0);
     for _ in 0..30 {
         let mut child = Command::new(std::env::current_exe().unwrap())
-            .args(["--exact", "library::tests::val_child_writes_until_it_is_killed"])
+            .args(["--ignored", "--exact", "library::tests::val_child_writes_until_it_is_killed"])
             .env(WRITER, folder.path())
             .stdout(Stdio::null())
             .spawn()
@@ -361,9 +361,9 @@ fn prop_killed_writers_leave_whole_records() {
     assert!(records > 0);
 }
 
-/// Prints what hits cost; asserts nothing about time.
+/// Hits are counted and return the tile; their cost is printed.
 #[test]
-fn val_hits_cost() {
+fn val_hits_return_the_tile() {
     runtime().block_on(async {
         let folder = tempfile::tempdir().unwrap();
         let library = open(Settings { memory_bytes: 1 << 24, ..settings(Some(folder.path())) });
@@ -375,14 +375,16 @@ fn val_hits_cost() {
             library.tile(key_of(1), Priority::Answer, make).await.unwrap();
         }
         println!("memory hit {:?}", start.elapsed() / 10_000);
+        assert_eq!((library.statistics().memory_hits, library.statistics().made), (10_000, 1));
         let disk = library.disk.as_ref().unwrap();
         let start = Instant::now();
         (0..100).for_each(|_| assert!(disk.read(&key_of(1)).is_some()));
         println!("disk hit {:?}", start.elapsed() / 100);
+        assert_eq!(disk.read(&key_of(1)), Some(tile_of(1, 256)));
     });
 }
 
-/// A library whose only worker waits for the sender.
+/// A library whose only worker blocks until the sender sends.
 async fn busy(folder: Option<&Path>) -> (Arc<Library>, mpsc::Sender<()>) {
     let library = open(Settings { workers: 1, ..settings(folder) });
     let (go, wait) = mpsc::channel::<()>();
@@ -395,9 +397,9 @@ async fn busy(folder: Option<&Path>) -> (Arc<Library>, mpsc::Sender<()>) {
     (library, go)
 }
 
-/// A tile that waits to be made ahead is made first once somebody waits for it.
+/// A tile queued in the background is generated first once a client waits for it.
 #[test]
-fn val_an_answer_overtakes_what_is_made_ahead() {
+fn val_an_answer_overtakes_background_tiles() {
     runtime().block_on(async {
         let (library, go) = busy(None).await;
         let order = Arc::new(Mutex::new(Vec::new()));
@@ -426,7 +428,7 @@ fn val_an_answer_overtakes_what_is_made_ahead() {
     });
 }
 
-/// Records are read while every worker is busy.
+/// Records are read even while every worker is busy.
 #[test]
 fn val_records_do_not_wait_for_workers() {
     let folder = tempfile::tempdir().unwrap();
@@ -442,9 +444,9 @@ fn val_records_do_not_wait_for_workers() {
     });
 }
 
-/// Tiles made ahead leave a thread to those that wait, and no more.
+/// Background tiles leave exactly one thread to waiting clients.
 #[test]
-fn val_work_ahead_leaves_a_thread_to_answers() {
+fn val_background_work_leaves_a_thread_to_answers() {
     runtime().block_on(async {
         let library = open(settings(None));
         let mut held = Vec::new();
@@ -458,7 +460,7 @@ fn val_work_ahead_leaves_a_thread_to_answers() {
         until(|| library.statistics().running == 2 && library.statistics().queued == 1).await;
         assert_eq!(*ask(&library, 7).await, tile_of(7, 8));
         until(|| library.statistics().running == 2 && library.statistics().queued == 1).await;
-        // One that waits to be made ahead is taken up by that thread once somebody waits for it.
+        // That thread takes a queued background tile once a client waits for it.
         let joined = tokio::spawn({
             let library = Arc::clone(&library);
             async move { ask(&library, 2).await }
@@ -472,7 +474,7 @@ fn val_work_ahead_leaves_a_thread_to_answers() {
     });
 }
 
-/// A damaged record is made again by a worker: readers are not kept by it.
+/// A damaged record is regenerated by a worker and does not occupy a reader.
 #[test]
 fn val_damaged_records_are_made_by_workers() {
     let folder = tempfile::tempdir().unwrap();
@@ -498,4 +500,37 @@ fn val_damaged_records_are_made_by_workers() {
             assert_eq!(*request.await.unwrap(), tile_of(number, 8));
         }
     });
+}
+
+/// Six records of one block exceed a limit of five; down to nine tenths of it, four remain. Those used longest ago go, whatever their numbers.
+#[test]
+fn val_the_least_recently_used_records_are_evicted() {
+    let folder = tempfile::tempdir().unwrap();
+    let disk = Disk::open(folder.path(), 5 * 4096).unwrap();
+    let write = |number: u64, used_s: u64| {
+        disk.write(&key_of(number), &tile_of(number, 8));
+        let used = std::time::SystemTime::UNIX_EPOCH + Duration::from_secs(used_s);
+        fs::File::options().write(true).open(disk.path(&key_of(number))).unwrap().set_modified(used).unwrap();
+    };
+    [(1, 500), (2, 100), (3, 400), (4, 200), (5, 300)].into_iter().for_each(|(number, used_s)| write(number, used_s));
+    assert_eq!(disk.counts(), [0, 0, 0, 5 * 4096]);
+    disk.write(&key_of(6), &tile_of(6, 8));
+    let left: Vec<u64> = (1..=6).filter(|number| disk.has(&key_of(*number))).collect();
+    assert_eq!((left, disk.counts()), (vec![1, 3, 5, 6], [0, 2, 0, 4 * 4096]));
+    // A record that is read counts as used now.
+    assert!(disk.read(&key_of(5)).is_some());
+    [7, 8].into_iter().for_each(|number| disk.write(&key_of(number), &tile_of(number, 8)));
+    let left: Vec<u64> = (1..=8).filter(|number| disk.has(&key_of(*number))).collect();
+    assert_eq!(left, [5, 6, 7, 8]);
+}
+
+/// A record larger than the limit is not written.
+#[test]
+fn val_records_beyond_the_limit_are_not_written() {
+    let folder = tempfile::tempdir().unwrap();
+    let disk = Disk::open(folder.path(), 5 * 4096).unwrap();
+    // 64 x 64 samples of four fields take 64 KiB.
+    disk.write(&key_of(1), &tile_of(1, 64));
+    assert!(!disk.has(&key_of(1)));
+    assert_eq!(disk.counts(), [0; 4]);
 }

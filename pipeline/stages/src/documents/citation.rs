@@ -6,8 +6,8 @@ use sastrugi_schemas::manifest::Source;
 use std::collections::BTreeSet;
 use std::fmt::Write as _;
 
-/// Identifiers that the Citation File Format 1.2.0 permits (`definitions.license-enum` of its `schema.json`,
-/// doi 10.5281/zenodo.5171937). It is the SPDX list of its day: later identifiers make a file invalid.
+/// Identifiers allowed by the Citation File Format 1.2.0 (`definitions.license-enum` of its `schema.json`,
+/// doi 10.5281/zenodo.5171937). It is the SPDX list at the time of that version; later identifiers make a file invalid.
 const CITABLE: &str = include_str!("cff_1_2_0_licenses.txt");
 
 /// The text of `CITATION.cff`.
@@ -41,7 +41,7 @@ pub fn text(described: &Described<'_>) -> String {
     text
 }
 
-/// The lines of `CITATION.cff` on a licence: identifiers as far as the format has them, an address for another, or a comment.
+/// The licence lines of `CITATION.cff`: identifiers if the format has them, otherwise an address or a comment.
 fn cited(license: &str) -> String {
     let citable =
         |part: &str| spdx_list::identifier(part).filter(|id| CITABLE.split_whitespace().any(|known| known == *id));
@@ -55,7 +55,7 @@ fn cited(license: &str) -> String {
             several.iter().fold("license:\n".to_owned(), |text, id| text + &format!("  - {}\n", quoted(id)))
         }
         None if is_address(&address) => format!("license-url: {}\n", quoted(&address)),
-        None => format!("# The format has no identifier for the licence {}; see the file LICENSE.\n", quoted(license)),
+        None => format!("# This format has no identifier for the licence {}; see the file LICENSE.\n", quoted(license)),
     }
 }
 
@@ -64,7 +64,7 @@ fn is_address(text: &str) -> bool {
     rest.is_some_and(|rest| !rest.is_empty() && rest.bytes().all(|b| b.is_ascii_graphic()))
 }
 
-/// Measured data as a work that the dataset refers to.
+/// Measured data as a reference of the dataset.
 fn reference(source: &Source) -> String {
     let author = source.attribution.as_deref().unwrap_or("unnamed");
     format!(
@@ -75,8 +75,8 @@ fn reference(source: &Source) -> String {
     )
 }
 
-/// An author of `CITATION.cff`: `name` is for organisations. Which part of a person's name is which only `Family, Given`
-/// tells; a name in one piece is what they are called.
+/// An author of `CITATION.cff`. `name` is for organisations; a person's name is split only if written as `Family, Given`,
+/// otherwise it becomes an alias.
 fn author(maker: Maker<'_>) -> String {
     let name = maker.name;
     if maker.is_organization {
@@ -101,7 +101,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_people_are_cited_with_what_identifies_them() {
+    fn val_people_are_cited_with_orcid_and_affiliation() {
         let orcid = Some("0000-0002-1825-0097");
         let jane = Maker { name: "Doe, Jane", is_organization: false, orcid, affiliation: Some("Snow Lab") };
         assert_eq!(
@@ -113,7 +113,7 @@ mod tests {
     }
 
     #[test]
-    fn val_what_a_citation_says_of_a_licence() {
+    fn val_licence_lines_of_a_citation() {
         for (license, lines) in [
             ("CC-BY-4.0", "license: \"CC-BY-4.0\"\n"),
             ("odbl-1.0", "license: \"ODbL-1.0\"\n"),

@@ -1,10 +1,10 @@
-//! `croissant.json`: every table in Croissant 1.1 (MLCommons, "Croissant Format Specification", version 1.1), so that data
-//! loaders find its columns with type, unit and description, and its files with their hashes.
+//! `croissant.json`: describes every table in Croissant 1.1 (MLCommons, "Croissant Format Specification", version 1.1), with which data
+//! loaders find the columns with type, unit and description, and the files with their hashes.
 //!
-//! Tables with a file for each terrain are long, and mlcroissant (1.1) makes a record in Python, one field at a time, looking each up in
-//! the list of the record set's fields: for 37 columns of `samples` more than half of the time went there. Their columns are therefore
-//! subfields of one field, `<table>/row`, and the id of the terrain is read from the name of the file, which is what mlcroissant can
-//! filter by: `records("samples", filters={"samples/terrain_id": "<id>"})` opens that file alone.
+//! Tables with one file per terrain are long, and mlcroissant (1.1) builds each record in Python, field by field, with a linear search
+//! in the list of the record set's fields: for the 37 columns of `samples` this took more than half of the time. Their columns are
+//! therefore subfields of one field, `<table>/row`, and the terrain id is read from the file name, by which mlcroissant can filter:
+//! `records("samples", filters={"samples/terrain_id": "<id>"})` opens only that file.
 
 use super::described::{Described, Maker, ORGANIZATION, add_terms, citation_line, map_files, map_words, page};
 use super::spdx_list;
@@ -15,22 +15,22 @@ use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::{self, Column, ColumnType, Table};
 use serde_json::{Value, json};
 
-/// Record set of the parts of a split, and the column that names one.
+/// Record set of the splits, and the column that names a split.
 const SPLITS: &str = "splits";
 const SPLIT_NAME: &str = "splits/name";
 const SPLIT_COLUMN: &str = "split";
 const PARQUET: &str = "application/x-parquet";
-/// Most files of a table that are described one by one; more are one set, and their hashes are in the manifest alone, so
-/// that this file, which loaders read whole, stays small.
+/// Maximum number of files of a table that are described individually. More are described as one set, with their hashes in the
+/// manifest only, so that this file, which loaders read completely, stays small.
 const DESCRIBED_FILES: usize = 64;
-/// Field that holds the columns of a long table.
+/// Field that contains the columns of a long table.
 const ROW: &str = "row";
 /// Set of the generated heightfields.
 const HEIGHTS: &str = "terrain-files";
-/// Files beside the tables, which the manifest lists with their hashes: id of the set, folder, ending, media type, what they are.
+/// Files other than tables, listed with hashes in the manifest: id of the set, folder, extension, media type, description.
 const SETS: [(&str, &str, &str, &str, &str); 14] = [
     (HEIGHTS, "terrain", ".tif", "image/tiff", "Generated heightfields, GeoTIFF, float32 metres"),
-    ("terrain-pictures", "terrain", ".png", "image/png", "Generated heightfields in steps of 16 bit"),
+    ("terrain-pictures", "terrain", ".png", "image/png", "Generated heightfields, 16-bit PNG"),
     ("texture-files", "texture", ".tif", "image/tiff", "Synthesised textures, GeoTIFF, float32 metres"),
     ("dem-files", "dem", ".metric.tif", "image/tiff", "Measured heights in metres, GeoTIFF"),
     (
@@ -46,7 +46,7 @@ const SETS: [(&str, &str, &str, &str, &str); 14] = [
         "fit",
         ".tif",
         "image/tiff",
-        "Background, residual, covariance and used cells of the fits, GeoTIFF",
+        "Background, residual, covariance and mask of used cells of the fits, GeoTIFF",
     ),
     (
         "route-files",
@@ -63,18 +63,18 @@ const SETS: [(&str, &str, &str, &str, &str); 14] = [
         "Rendered images, GeoTIFF, float32 brightness (I/F); sun and camera in `.json`",
     ),
     ("image-descriptions", "image", ".json", "application/json", "Sun, camera and photometry of the rendered images"),
-    ("image-pictures", "image", ".png", "image/png", "Rendered images to look at"),
+    ("image-pictures", "image", ".png", "image/png", "Rendered images, 8-bit PNG for viewing"),
     (
         "recovered-files",
         "photoclinometry",
         ".tif",
         "image/tiff",
-        "Surfaces recovered from images, GeoTIFF, float32 metres; maps of albedo, uncertainty and lit images beside them",
+        "Surfaces recovered from images, GeoTIFF, float32 metres; with maps of albedo, uncertainty and number of lit images",
     ),
     ("mcap-files", "mcap", ".mcap", "application/octet-stream", "Recordings of missions, teams and rovers, MCAP"),
-    ("bag-files", "mcap", "metadata.yaml", "application/yaml", "Descriptions of the recordings for bag readers"),
+    ("bag-files", "mcap", "metadata.yaml", "application/yaml", "Metadata of the recordings for bag readers"),
 ];
-/// What the release says of itself, and shows: id of the set, patterns, media types, what they are.
+/// Documents and report of the release: id of the set, patterns, media types, description.
 const DOCUMENTS: [(&str, &[&str], &[&str], &str); 2] = [
     (
         "documents",
@@ -90,13 +90,13 @@ const DOCUMENTS: [(&str, &[&str], &[&str], &str); 2] = [
             "SHA256SUMS",
         ],
         &["text/markdown", "application/yaml", "text/plain", "application/json", "application/toml"],
-        "What the release says of itself: study, licence, citation, and every file with its hash",
+        "Documents of the release: study, licence, citation, and list of all files with hashes",
     ),
     (
         "report",
         &["report/index.html", "report/figures/*.svg", "report/data/*.json"],
         &["text/html", "image/svg+xml", "application/json"],
-        "The report: one offline page, its figures and its numbers",
+        "The report: one offline page, with its figures and numbers",
     ),
 ];
 /// Folders for simulators.
@@ -104,22 +104,18 @@ const EXPORTS: (&str, &[&str], &[&str], &str) = (
     "exports",
     &["export/*/*/*"],
     &["image/png", "application/octet-stream", "application/xml", "text/plain", "application/json", "text/markdown"],
-    "Terrains to import into simulators: heights, README.md with the steps, import.json with the numbers",
+    "Terrains for import into simulators: heights, README.md (import steps), import.json (all numbers)",
 );
-/// Vehicles that drive on exported terrains.
+/// Vehicles of missions on exported terrains.
 const VEHICLES: (&str, &[&str], &[&str], &str) = (
     "vehicles",
     &["export/vehicle/*.xml", "export/vehicle/*.urdf"],
     &["application/xml"],
-    "Vehicles to import into simulators: MJCF and URDF, with masses, inertia, joints and friction",
+    "Vehicles for import into simulators: MJCF and URDF, with masses, inertia, joints and friction",
 );
-/// Layout of a viewer for recordings of that flavour.
-const LAYOUT: (&str, &[&str], &[&str], &str) = (
-    "viewer-layout",
-    &["mcap/foxglove-layout.json"],
-    &["application/json"],
-    "A layout of the viewer for the recordings",
-);
+/// Viewer layout, for recordings of that flavour.
+const LAYOUT: (&str, &[&str], &[&str], &str) =
+    ("viewer-layout", &["mcap/foxglove-layout.json"], &["application/json"], "Viewer layout for the recordings");
 
 /// The text of `croissant.json`.
 pub fn text(described: &Described<'_>) -> String {
@@ -172,8 +168,8 @@ fn work(source: &Source) -> Value {
     work
 }
 
-/// Every file of the release. Those of tables, up to [`DESCRIBED_FILES`], and what was measured come with their hashes; tables of
-/// several files, and all else, are sets.
+/// All files of the release. Measured files, and table files up to [`DESCRIBED_FILES`], are listed with hashes; tables of several
+/// files, and all other files, are sets.
 fn distribution(described: &Described<'_>) -> Vec<Value> {
     let few = |table: &&&'static Table| described.parts(table.name).count() <= DESCRIBED_FILES;
     let parts = |table: &&'static Table| described.parts(table.name);
@@ -194,13 +190,13 @@ fn distribution(described: &Described<'_>) -> Vec<Value> {
         let below = if folder == "mcap" { "**/" } else { "" };
         let mut set = file_set(id, &[&format!("{folder}/{below}*{ending}")], &[media], what);
         if id == HEIGHTS && !maps.is_empty() {
-            // The specification has the word, its context does not.
+            // The specification defines the term, but its context lacks it.
             set["cr:excludes"] = one_or_many(&maps.iter().map(String::as_str).collect::<Vec<_>>());
         }
         files.push(set);
     }
     files.extend(described.maps().map(|map| {
-        let what = format!("Maps beside the heightfields, GeoTIFF, float32: {}", map_words(map));
+        let what = format!("Maps of the heightfields, GeoTIFF, float32: {}", map_words(map));
         file_set(&format!("map-{}-files", map.name), &[&map_files(map)], &["image/tiff"], &what)
     }));
     let layout = (described.head.mcap == McapFlavour::Viewer && there("mcap", ".mcap")).then_some(LAYOUT);
@@ -245,7 +241,7 @@ fn file_set(id: &str, includes: &[&str], media: &[&str], description: &str) -> V
     })
 }
 
-/// JSON-LD's way to write one value.
+/// A single value is not wrapped in a list, as usual in JSON-LD.
 fn one_or_many(values: &[&str]) -> Value {
     match values {
         [one] => json!(one),
@@ -253,7 +249,7 @@ fn one_or_many(values: &[&str]) -> Value {
     }
 }
 
-/// Whether the files of a table are described as a set: several, or one for each terrain.
+/// Whether the files of a table are described as a set: several files, or one per terrain.
 fn is_set(table: &Table, described: &Described<'_>) -> bool {
     described.parts(table.name).count() > usize::from(table.file_per.is_none())
 }
@@ -262,7 +258,7 @@ fn set_id(table: &Table) -> String {
     format!("{}-files", table.name)
 }
 
-/// A table's columns; nothing for a table without a file.
+/// The record set of a table; `None` for a table without a file.
 fn record_set(table: &Table, described: &Described<'_>) -> Option<Value> {
     let first = described.parts(table.name).next()?;
     let source = match is_set(table, described) {
@@ -281,7 +277,7 @@ fn record_set(table: &Table, described: &Described<'_>) -> Option<Value> {
     }))
 }
 
-/// The fields of a record set: of a table with a file for each terrain, the column that names the file and one field for the others.
+/// The fields of a record set; for a table with one file per terrain, the column that names the file and one field for the others.
 fn nested(table: &Table, fields: Vec<Value>) -> Vec<Value> {
     let Some(file_per) = table.file_per.and_then(|key| table.position(key)) else { return fields };
     let mut rest = fields;
@@ -326,7 +322,7 @@ fn field(described: &Described<'_>, table: &Table, column: &Column, source: &Val
     }
     if column.name == SPLIT_COLUMN {
         field["dataType"] = json!(["sc:Text", "cr:Split"]);
-        // A reference is a join, which loads all files of a table before the first record.
+        // A reference would be a join, which loads all files of a table before the first record.
         if described.head.split.is_some() && table.file_per.is_none() {
             field["references"] = json!({ "field": { "@id": SPLIT_NAME } });
         }
@@ -338,7 +334,7 @@ fn field(described: &Described<'_>, table: &Table, column: &Column, source: &Val
     field
 }
 
-/// The parts that the column `split` names.
+/// Record set of the values of the column `split`.
 fn splits() -> Value {
     const SPLIT_URL: &str = "splits/url";
     let column = |id: &str, data_type: Value| {
@@ -351,7 +347,7 @@ fn splits() -> Value {
         "@type": "cr:RecordSet",
         "@id": SPLITS,
         "name": SPLITS,
-        "description": "Parts of the terrains: every group has each in the shares that the study asks for",
+        "description": "Splits of the terrains; every group is divided in the shares stated in the study",
         "dataType": "cr:Split",
         "key": { "@id": SPLIT_NAME },
         "field": [column(SPLIT_NAME, json!("sc:Text")), column(SPLIT_URL, json!(["sc:URL", "cr:Split"]))],
@@ -359,7 +355,7 @@ fn splits() -> Value {
     })
 }
 
-/// The context of the specification, word for word.
+/// The context, verbatim from the specification.
 fn context() -> Value {
     let croissant = [
         "arrayShape",

@@ -1,4 +1,4 @@
-//! What the documents tell of, and the words that several of them use.
+//! Contents of the documents, and texts that several of them share.
 
 use super::spdx_list;
 use crate::runner::execute::Failure;
@@ -11,39 +11,39 @@ use serde_json::Value;
 
 /// Folders of a release.
 pub const FOLDERS: [(&str, &str); 14] = [
-    ("dem/", "measured inputs, and the same in metres (`.metric.tif`)"),
-    ("mask/", "masks of the fits, obstacles of the routes"),
-    ("input/", "rasters and measured points that terrains and recovered surfaces are made with"),
-    ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999; maps of the same cells beside them"),
+    ("dem/", "measured DEMs as given, and their heights in metres (`.metric.tif`)"),
+    ("mask/", "masks of the fits and obstacles of the routes"),
+    ("input/", "input rasters and measured points for terrains and recovered surfaces"),
+    ("terrain/", "generated heightfields, GeoTIFF, float32 metres, no data -9999, and maps on the same cells"),
     (
         "export/",
-        "terrains to import into simulators: `export/<terrain>/<simulator>/README.md` says how; `export/vehicle/`: the vehicles",
+        "terrains for import into simulators (steps in `export/<terrain>/<simulator>/README.md`), and vehicles (`export/vehicle/`)",
     ),
     ("texture/", "synthesised textures, GeoTIFF, float32 metres, no data -9999"),
-    ("classes/", "roughness classes: 0 low, 1 semi, 2 high, 255 none; `.raw.tif` before closing"),
-    ("fit/", "covariance fits (JSON), with background, residual and the cells used"),
+    ("classes/", "roughness classes: 0 low, 1 semi, 2 high, 255 no data; `.raw.tif`: before closing"),
+    ("fit/", "covariance fits (JSON), with background, residual and mask of used cells"),
     (
         "route/",
-        "planned routes, GeoJSON in the terrain's own coordinates (m), not RFC 7946's WGS84; `.blocked.tif`: 1 where obstacles keep routes out",
+        "planned routes, GeoJSON in the terrain's own coordinates (m), not WGS84 as in RFC 7946; `.blocked.tif`: 1 where obstacles block routes",
     ),
     (
         "image/",
-        "rendered images, GeoTIFF, float32 brightness (I/F), no data -9999 where no ground is seen; `.json`: sun, camera and the rest; `.png` to look at",
+        "rendered images, GeoTIFF, float32 brightness (I/F), no data -9999 where no ground is visible; `.json`: sun, camera and photometry; `.png`: for viewing",
     ),
     (
         "photoclinometry/",
-        "surfaces recovered from images, GeoTIFF, float32 metres, no data -9999; beside them `.albedo.tif`, standard deviations (`.uncertainty.tif` of heights, m; `.slope-sigma.tif`; `.albedo-sigma.tif`), `.condition.tif` (condition number), `.lit.tif` (images that show a cell lit), `.leaning.tif` (1 where the albedo leans on neighbours)",
+        "surfaces recovered from images, GeoTIFF, float32 metres, no data -9999, with `.albedo.tif`, standard deviations (`.uncertainty.tif` of heights, m; `.slope-sigma.tif`; `.albedo-sigma.tif`), `.condition.tif` (condition number), `.lit.tif` (number of images in which a cell is lit), `.leaning.tif` (1 where the albedo is taken from neighbouring cells)",
     ),
-    ("mcap/", "one recording per mission, run of a team, or recorded rover"),
-    ("tables/", "Parquet, units and descriptions in the column metadata"),
-    ("report/", "report: `index.html`, one offline page"),
+    ("mcap/", "one recording per mission, team run or recorded rover"),
+    ("tables/", "Parquet files, with units and descriptions in the column metadata"),
+    ("report/", "report: open `index.html`, one offline page"),
 ];
-/// Type of a creator that is not a person, in the words of schema.org.
+/// The schema.org type of an organisation.
 pub const ORGANIZATION: &str = "Organization";
-/// Name of a creator who has none.
+/// Placeholder for a missing name.
 const UNNAMED: &str = "unnamed";
 
-/// Who made the release, or took part in it.
+/// A creator of, or contributor to, the release.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Maker<'a> {
     /// Name.
@@ -52,12 +52,12 @@ pub struct Maker<'a> {
     pub is_organization: bool,
     /// ORCID iD.
     pub orcid: Option<&'a str>,
-    /// Organisation that a person works for.
+    /// Affiliation of a person.
     pub affiliation: Option<&'a str>,
 }
 
 impl Maker<'_> {
-    /// Type in the words of schema.org.
+    /// Type in schema.org.
     pub fn kind(&self) -> &'static str {
         if self.is_organization { ORGANIZATION } else { "Person" }
     }
@@ -68,22 +68,22 @@ impl Maker<'_> {
     }
 }
 
-/// What the documents tell of.
+/// Contents of the documents.
 pub struct Described<'a> {
     /// The study's head.
     pub head: &'a StudyHead,
     /// Measured data.
     pub sources: &'a [Source],
-    /// Files of the release, sorted by path: all but the documents, the report and what seals it.
+    /// Files of the release, sorted by path, except documents, report, manifest and checksums.
     pub artifacts: &'a [Artifact],
-    /// Which terrains are for training, validation and test.
+    /// Split (training, validation or test) of each terrain.
     pub splits: &'a Splits,
     /// Items without a result.
     pub failures: &'a [Failure],
 }
 
 impl<'a> Described<'a> {
-    /// Maps that some terrain has.
+    /// Kinds of maps in the release.
     pub fn maps(&self) -> impl Iterator<Item = MapKind> {
         MAPS.into_iter().filter(|map| self.artifacts.iter().any(|artifact| is_map(&artifact.path, map.name)))
     }
@@ -94,7 +94,7 @@ impl<'a> Described<'a> {
         self.artifacts.iter().filter(move |artifact| artifact.path.starts_with(&folder))
     }
 
-    /// Paths of a table's files by the part that their rows are in, those in none last; empty where the files do not tell parts apart.
+    /// Paths of a table's files by split, files of rows without a split last; empty if the files are not divided by split.
     pub fn by_part(&self, table: &Table) -> Vec<(&'static str, Vec<&'a str>)> {
         let part = |path: &str| splits::of_file(table, part_name(path)?, self.splits);
         let of = |wanted: &'static str| {
@@ -104,7 +104,7 @@ impl<'a> Described<'a> {
         PARTS.into_iter().chain([OTHER]).map(of).filter(|(_, paths)| !paths.is_empty()).collect()
     }
 
-    /// Who made the release.
+    /// Creators of the release.
     pub fn creators(&self) -> impl Iterator<Item = Maker<'a>> {
         let head = self.head;
         let is_organization = move |name: &str| head.organizations.iter().any(|organization| organization == name);
@@ -129,12 +129,12 @@ impl<'a> Described<'a> {
     }
 }
 
-/// Name of a file of a table: `a` of `tables/samples/part-a.parquet`.
+/// Name of a table file, such as `a` for `tables/samples/part-a.parquet`.
 fn part_name(path: &str) -> Option<&str> {
     path.rsplit('/').next()?.strip_prefix("part-")?.strip_suffix(".parquet")
 }
 
-/// Whether a file of the release is that map of a terrain. No id ends so.
+/// Whether a file of the release is that map of a terrain; ids cannot have this suffix.
 fn is_map(path: &str, name: &str) -> bool {
     let id = path.strip_prefix("terrain/").and_then(|file| file.strip_suffix(".tif"));
     id.is_some_and(|id| id.ends_with(&format!(".{name}")))
@@ -145,17 +145,17 @@ pub fn map_files(map: MapKind) -> String {
     format!("terrain/*.{}.tif", map.name)
 }
 
-/// What a map shows, with its unit where it has one.
+/// Description of a map, with unit.
 pub fn map_words(map: MapKind) -> String {
     format!("{}{}", map.description, if map.unit == "m" { ", m" } else { "" })
 }
 
-/// Where the dataset is found, if anywhere.
+/// Address of the dataset, if any.
 pub fn page(head: &StudyHead) -> Option<String> {
     head.doi.as_ref().map(|doi| format!("https://doi.org/{doi}")).or_else(|| head.url.clone())
 }
 
-/// One line to cite the dataset by.
+/// Citation of the dataset, on one line.
 pub fn citation_line(head: &StudyHead) -> String {
     let version = head.version.as_ref().map_or_else(String::new, |v| format!(", version {v}"));
     let page = page(head).map_or_else(String::new, |page| format!(", {page}"));
@@ -163,13 +163,13 @@ pub fn citation_line(head: &StudyHead) -> String {
     folded(&format!("{} ({year}): {}{version}{page}", authors(head), head.title))
 }
 
-/// Names of the creators in one text.
+/// Names of the creators, joined.
 pub fn authors(head: &StudyHead) -> String {
     let names: Vec<&str> = head.creators.iter().map(Creator::name).collect();
     if names.is_empty() { UNNAMED.to_owned() } else { names.join("; ") }
 }
 
-/// One line on measured data: whose it is, under which licence, how to cite it.
+/// One line on measured data: attribution, licence, citation.
 pub fn source_line(source: &Source) -> String {
     let Source { id, license, attribution, citation } = source;
     let attribution = attribution.as_ref().map_or_else(String::new, |who| format!(" {who}."));
@@ -178,7 +178,7 @@ pub fn source_line(source: &Source) -> String {
     folded(&format!("`{id}`:{attribution}{license}{citation}"))
 }
 
-/// Adds what measured data asks for to its description in the words of schema.org.
+/// Adds licence, attribution and citation of measured data to its schema.org description.
 pub fn add_terms(work: &mut Value, source: &Source) {
     let terms = [
         ("license", source.license.as_deref().map(spdx_list::address)),
@@ -190,7 +190,7 @@ pub fn add_terms(work: &mut Value, source: &Source) {
     }
 }
 
-/// A YAML string in double quotes: JSON's, with what YAML does not take as it is, or takes for the end of a line, by its number.
+/// A YAML string in double quotes: a JSON string, with characters that YAML disallows or treats as line ends escaped by number.
 pub fn quoted(text: &str) -> String {
     let escaped =
         |c: char| matches!(c, '\u{7f}'..='\u{9f}' | '\u{2028}' | '\u{2029}' | '\u{feff}' | '\u{fffe}' | '\u{ffff}');
@@ -199,7 +199,64 @@ pub fn quoted(text: &str) -> String {
     json.chars().map(one).collect()
 }
 
-/// On one line: words of a study in a text whose lines mean something.
+/// Joins a text from a study onto one line, for formats in which lines matter.
 pub fn folded(text: &str) -> String {
     text.split_whitespace().collect::<Vec<_>>().join(" ")
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_texts_for_formats_of_lines() {
+        assert_eq!(folded(" a\n b\t c "), "a b c");
+        assert_eq!(quoted("a \"b\"\n\u{2028}\u{7f}é"), "\"a \\\"b\\\"\\n\\u2028\\u007fé\"");
+    }
+
+    #[test]
+    fn val_names_of_files() {
+        assert_eq!(part_name("tables/samples/part-a-0001.parquet"), Some("a-0001"));
+        assert_eq!((part_name("tables/samples/a.parquet"), part_name("tables/samples/part-a.csv")), (None, None));
+        for (path, found) in [
+            ("terrain/t.albedo.tif", true),
+            ("terrain/t.tif", false),
+            ("terrain/albedo.tif", false),
+            ("image/t.albedo.tif", false),
+            ("terrain/t.albedo.png", false),
+        ] {
+            assert_eq!(is_map(path, "albedo"), found, "{path}");
+        }
+    }
+
+    /// The DOI goes before the address, both may be missing, and so may the creators.
+    #[test]
+    fn val_a_dataset_is_cited_in_one_line() {
+        let names = ["Doe, Jane", "Snow Lab"].map(|name| Creator::Name(name.to_owned()));
+        let bare =
+            StudyHead { title: "Snow\n fields".to_owned(), date: "2026-11-21".to_owned(), ..StudyHead::default() };
+        assert_eq!(citation_line(&bare), "unnamed (2026): Snow fields");
+        let url = Some("https://example.org/snow".to_owned());
+        let head = StudyHead { creators: names.to_vec(), version: Some("1.2".to_owned()), url, ..bare };
+        let line = "Doe, Jane; Snow Lab (2026): Snow fields, version 1.2, ";
+        assert_eq!(citation_line(&head), format!("{line}https://example.org/snow"));
+        let head = StudyHead { doi: Some("10.5281/zenodo.1".to_owned()), ..head };
+        assert_eq!(citation_line(&head), format!("{line}https://doi.org/10.5281/zenodo.1"));
+    }
+
+    #[test]
+    fn val_measured_data_in_one_line() {
+        let bare = Source { id: "site".to_owned(), ..Source::default() };
+        assert_eq!(source_line(&bare), "`site`: No licence stated.");
+        let words = |text: &str| Some(text.to_owned());
+        let (license, attribution, citation) = (words("CC0-1.0"), words("The\nagency"), words("Agency (2000)"));
+        let full = Source { license, attribution, citation, ..bare };
+        assert_eq!(source_line(&full), "`site`: The agency. Licence: CC0-1.0. Cite as: Agency (2000)");
+        let mut work = Value::Null;
+        add_terms(&mut work, &full);
+        let license = "https://spdx.org/licenses/CC0-1.0";
+        let expected =
+            serde_json::json!({ "license": license, "creditText": "The\nagency", "citation": "Agency (2000)" });
+        assert_eq!(work, expected);
+    }
 }

@@ -1,4 +1,4 @@
-//! `LICENSE`: the licence of the release, and those of the measured data in it.
+//! `LICENSE`: the licence of the release and those of the measured data in it.
 
 use super::described::{Described, authors, folded, page, source_line};
 use super::spdx_list;
@@ -12,11 +12,11 @@ pub fn text(described: &Described<'_>) -> String {
     let license = spdx_list::identifier(&head.license).unwrap_or_else(|| head.license.trim());
     let mut text = match spdx_list::is_listed(&head.license) {
         true => format!(
-            "SPDX-License-Identifier: {0}\n\n{what} is licensed under {0}. Its text is found by that identifier in the SPDX licence list.\n",
+            "SPDX-License-Identifier: {0}\n\n{what} is licensed under {0}. The text of the licence is in the SPDX licence list under that identifier.\n",
             license,
         ),
         false => format!(
-            "{what} is licensed under:\n\n{}\n\nThe SPDX licence list does not have it; its terms are to be had from the creators.\n",
+            "{what} is licensed under:\n\n{}\n\nIt is not in the SPDX licence list; ask the creators for its terms.\n",
             license
         ),
     };
@@ -25,7 +25,7 @@ pub fn text(described: &Described<'_>) -> String {
     }
     if !sources.is_empty() {
         text.push_str(
-            "\nMeasured inputs in dem/ keep their own licences, and what comes from them names its source. The text of a licence that came with its data \
+            "\nMeasured inputs in dem/ keep their own licences, and everything derived from them names its source. The text of a licence supplied with the data \
              is dem/<id>.license.txt.\n\n",
         );
         sources.iter().for_each(|source| text.push_str(&format!("- {}\n", source_line(source))));
@@ -33,12 +33,12 @@ pub fn text(described: &Described<'_>) -> String {
     text
 }
 
-/// Warning for a release under a licence that the SPDX list does not have.
+/// Warning for a release under a licence that is not in the SPDX list.
 pub fn license_warning(license: &str) -> Option<String> {
     let listed = spdx_list::is_listed(license);
     (!listed).then(|| {
         format!(
-            "[study] license \"{license}\" is not in the SPDX list; write its identifier, as CC-BY-4.0, if it has one"
+            "[study] license \"{license}\" is not in the SPDX list; use its SPDX identifier, such as CC-BY-4.0, if it has one"
         )
     })
 }

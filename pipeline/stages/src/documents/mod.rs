@@ -1,6 +1,6 @@
-//! The documents of a release for people and catalogues: what it is, how to cite it, under which licence.
+//! The documents of a release for people and catalogues: description, citation, licence.
 //!
-//! Each document is a file here with a function `text`, and a line of [`all`].
+//! Each document is a module here with a function `text`, and an entry in [`all`].
 
 mod citation;
 mod croissant;
@@ -17,7 +17,7 @@ mod zenodo;
 pub use described::Described;
 pub use license::license_warning;
 
-/// Every document of a release: its path there, and its text.
+/// All documents of a release: path and text.
 pub fn all(described: &Described<'_>) -> Vec<(&'static str, String)> {
     let documents = [
         ("README.md", readme::text(described)),

@@ -1,4 +1,4 @@
-//! `README.md`: a dataset card, whose head lets hubs show the tables.
+//! `README.md`: a dataset card, with a head from which dataset hubs display the tables.
 
 use super::described::{Described, FOLDERS, folded, map_files, map_words, page, quoted, source_line};
 use super::spdx_list;
@@ -6,9 +6,9 @@ use sastrugi_schemas::Table;
 use sastrugi_schemas::manifest::Source;
 use std::fmt::Write as _;
 
-/// Names under which dataset hubs know licences, where they are not the SPDX identifier in lower case.
+/// Licence names of dataset hubs that are not the SPDX identifier in lower case.
 const HUB_NAMES: [(&str, &str); 3] = [("PDDL-1.0", "pddl"), ("ODC-By-1.0", "odc-by"), ("ODbL-1.0", "odbl")];
-/// Identifiers that dataset hubs know in lower case.
+/// SPDX identifiers that dataset hubs use in lower case.
 const HUB_IDENTIFIERS: [&str; 20] = [
     "Apache-2.0",
     "MIT",
@@ -32,7 +32,7 @@ const HUB_IDENTIFIERS: [&str; 20] = [
     "LGPL-3.0",
 ];
 
-/// Tables that a data loader opens where no other is asked for: the first of them that a release has.
+/// Default tables of data loaders: the first of these that a release has.
 const FIRST_TABLES: [&str; 4] = ["missions", "rovers", "formations", "terrains"];
 
 /// The text of `README.md`.
@@ -46,8 +46,8 @@ pub fn text(described: &Described<'_>) -> String {
     let page = page(head).map_or_else(String::new, |page| format!(" {page}"));
     let _ = writeln!(
         text,
-        "Study `{}`,{version} seed {}, {}. Licence: {}. Made with sastrugi {}; `sastrugi verify .` checks every file, and \
-         `sastrugi verify . --recompute all` makes it again and compares the bytes.{page}\n",
+        "Study `{}`,{version} seed {}, {}. Licence: {}. Made with sastrugi {}. `sastrugi verify .` checks every file; \
+         `sastrugi verify . --recompute all` recomputes everything and compares the bytes.{page}\n",
         head.name,
         head.seed,
         head.date,
@@ -57,19 +57,19 @@ pub fn text(described: &Described<'_>) -> String {
     if !head.funding.is_empty() {
         let _ = writeln!(text, "Funding: {}\n", folded(&head.funding.join("; ")));
     }
-    text.push_str("| where | what |\n|---|---|\n| `study.toml` | the study: everything here follows from it |\n");
+    text.push_str("| path | content |\n|---|---|\n| `study.toml` | the study, from which everything here follows |\n");
     for (folder, what) in FOLDERS.iter().filter(|(folder, _)| described.has(folder)) {
         let _ = writeln!(text, "| `{folder}` | {what} |");
     }
     for map in described.maps() {
-        let _ = writeln!(text, "| `{}` | map beside heights: {} |", map_files(map), map_words(map));
+        let _ = writeln!(text, "| `{}` | map of the heightfields: {} |", map_files(map), map_words(map));
     }
     text.push_str(
-        "| `croissant.json` | the tables in Croissant, for data loaders |\n\
-         | `ro-crate-metadata.json` | which stage made what from what |\n\
+        "| `croissant.json` | description of the tables in Croissant, for data loaders |\n\
+         | `ro-crate-metadata.json` | provenance: inputs and outputs of each stage |\n\
          | `.zenodo.json` | title, creators, licence, keywords and grants for a deposit on Zenodo |\n\
-         | `manifest.json`, `SHA256SUMS` | what each file is made from, and its checksum |\n\n\
-         | table | a row is |\n|---|---|\n",
+         | `manifest.json`, `SHA256SUMS` | inputs and checksum of each file |\n\n\
+         | table | content |\n|---|---|\n",
     );
     for table in described.tables() {
         let _ = writeln!(text, "| `{}` | {} |", table.name, table.description);
@@ -78,11 +78,7 @@ pub fn text(described: &Described<'_>) -> String {
         text.push_str(&sources_section(described.sources));
     }
     if !described.failures.is_empty() {
-        let _ = writeln!(
-            text,
-            "\n{} items failed; `manifest.json` lists them with their parameters:\n",
-            described.failures.len()
-        );
+        let _ = writeln!(text, "\n{} items failed (parameters in `manifest.json`):\n", described.failures.len());
         for failure in described.failures {
             let _ = writeln!(text, "- `{}`: {}", failure.item, failure.message);
         }
@@ -108,7 +104,7 @@ fn card(described: &Described<'_>) -> String {
     text + "---\n\n"
 }
 
-/// The files of a table for data loaders: by part where each is of one, else in all, which loaders call `train`.
+/// The files of a table for data loaders: by split if each file belongs to one, otherwise all together, which loaders call `train`.
 fn data_files(table: &Table, described: &Described<'_>) -> String {
     let parts = described.by_part(table);
     if parts.is_empty() {
@@ -122,7 +118,7 @@ fn data_files(table: &Table, described: &Described<'_>) -> String {
     text
 }
 
-/// Hubs know a list of licences by names of their own; others are named beside `other`.
+/// Licence in the names of dataset hubs; licences unknown to them are given as `other` with their name.
 fn hub_license(license: &str) -> String {
     let of_hub = |id: &str| {
         let known = HUB_NAMES.iter().find(|(spdx, _)| *spdx == id).map(|(_, name)| (*name).to_owned());
@@ -134,11 +130,30 @@ fn hub_license(license: &str) -> String {
     }
 }
 
-/// Measured data with what their makers ask for.
+/// Measured data with attribution, licence and citation.
 fn sources_section(sources: &[Source]) -> String {
     let mut text = String::from(
-        "\n## Sources\n\nMeasured data keep their own terms; `manifest.json` says which rasters, fits and recordings come from which (`sources`).\n\n",
+        "\n## Sources\n\nMeasured data keep their own terms; `manifest.json` states from which of them each raster, fit and recording is derived (`sources`).\n\n",
     );
     sources.iter().for_each(|source| text.push_str(&format!("- {}\n", source_line(source))));
     text
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn val_licences_have_the_names_of_hubs() {
+        for (license, name) in [
+            ("CC-BY-4.0", "license: cc-by-4.0\n"),
+            ("mit", "license: mit\n"),
+            ("ODbL-1.0", "license: odbl\n"),
+            // Listed by SPDX, but not by hubs; and by neither.
+            ("CC-BY-SA-2.0", "license: other\nlicense_name: \"CC-BY-SA-2.0\"\nlicense_link: LICENSE\n"),
+            ("our \"own\"", "license: other\nlicense_name: \"our \\\"own\\\"\"\nlicense_link: LICENSE\n"),
+        ] {
+            assert_eq!(hub_license(license), name);
+        }
+    }
 }

@@ -1,7 +1,7 @@
-//! `ro-crate-metadata.json`: what made what, as an RO-Crate 1.1 (<https://w3id.org/ro/crate/1.1>) of the profile Process Run
-//! Crate 0.5 (<https://w3id.org/ro/wfrun/process/0.5>): one `CreateAction` per stage, from what its items read to what they
-//! made. Measured data and masks were there before, so that no action makes them. Folders stand for their files; `manifest.json`
-//! has the parents, stream and hash of each.
+//! `ro-crate-metadata.json`: provenance as an RO-Crate 1.1 (<https://w3id.org/ro/crate/1.1>) of the profile Process Run
+//! Crate 0.5 (<https://w3id.org/ro/wfrun/process/0.5>): one `CreateAction` per stage, with the inputs and outputs of its items.
+//! Measured data and masks are inputs of the study, so no action creates them. Folders represent their files; `manifest.json`
+//! has the parents, stream and hash of each file.
 
 use super::described::{Described, FOLDERS, Maker, ORGANIZATION, add_terms, citation_line, page};
 use super::spdx_list;
@@ -16,14 +16,14 @@ const CRATE: &str = "https://w3id.org/ro/crate/1.1";
 const PROFILE: &str = "https://w3id.org/ro/wfrun/process/0.5";
 const PROGRAM: &str = "#sastrugi";
 const STUDY: &str = "study.toml";
-/// Files of the release itself: path, media type, what it is.
+/// Files of the release itself: path, media type, description.
 const OWN_FILES: [(&str, &str, &str); 8] = [
-    (STUDY, "application/toml", "The study: everything else follows from it"),
-    ("README.md", "text/markdown", "What the release holds"),
+    (STUDY, "application/toml", "The study, from which everything else follows"),
+    ("README.md", "text/markdown", "Contents of the release"),
     ("CITATION.cff", "application/yaml", "How to cite it"),
-    (".zenodo.json", "application/json", "What an archive asks for on deposit"),
-    ("LICENSE", "text/plain", "Its licence, and those of the measured data in it"),
-    ("croissant.json", "application/ld+json", "Its tables in Croissant"),
+    (".zenodo.json", "application/json", "Metadata for a deposit on Zenodo"),
+    ("LICENSE", "text/plain", "Its licence and those of the measured data in it"),
+    ("croissant.json", "application/ld+json", "Description of its tables in Croissant"),
     ("manifest.json", "application/json", "Every file with its parents, random stream and hashes"),
     ("SHA256SUMS", "text/plain", "Checksum of every file"),
 ];
@@ -43,7 +43,7 @@ pub fn text(described: &Described<'_>) -> String {
     graph.extend(described.head.funding.iter().enumerate().map(grant));
     graph.extend(described.sources.iter().map(work));
     graph.extend(stages.actions());
-    // Words of schema.org that came after the crate's context was frozen.
+    // Terms of schema.org that are newer than the crate's context.
     let words = ["sha256", "creditText", "funding", "Grant"].map(|word| (word, format!("https://schema.org/{word}")));
     let later: BTreeMap<&str, String> = words.into();
     let metadata = json!({ "@context": [format!("{CRATE}/context"), later], "@graph": graph });
@@ -98,15 +98,15 @@ fn own_file((path, media, description): &(&str, &str, &str)) -> Value {
     json!({ "@id": path, "@type": "File", "name": path, "description": description, "encodingFormat": media })
 }
 
-/// A licence of the SPDX list by its page there, any other by the file that names it.
+/// A licence in the SPDX list by its page there, any other by the file LICENSE.
 fn license_id(license: &str) -> String {
     spdx_list::identifier(license).map_or_else(|| "LICENSE".to_owned(), |_| spdx_list::address(license))
 }
 
-/// The entity of a licence that is no file of the release.
+/// The entity of a licence that is not a file of the release.
 fn license_entity(license: &str) -> Option<Value> {
     let name = spdx_list::identifier(license)?;
-    let description = format!("The licence that the SPDX list calls {name}");
+    let description = format!("The licence {name} of the SPDX list");
     Some(json!({ "@id": license_id(license), "@type": "CreativeWork", "name": name, "description": description }))
 }
 
@@ -119,7 +119,7 @@ fn program() -> Value {
     })
 }
 
-/// The page of an ORCID iD, else the position: names would have to be spelled anew to be part of an identifier, and two could become one.
+/// The page of the ORCID iD, else the position: names would have to be escaped in an identifier, and two could become equal.
 fn creator_id((position, maker): &(usize, Maker<'_>)) -> String {
     maker.page().unwrap_or_else(|| format!("#creator-{}", position + 1))
 }
@@ -133,12 +133,12 @@ fn creator(one: (usize, Maker<'_>)) -> Value {
     creator
 }
 
-/// Organisations that the creators work for, each once.
+/// Affiliations of the creators, without repetition.
 fn affiliations<'a>(described: &Described<'a>) -> BTreeSet<&'a str> {
     described.creators().filter_map(|maker| maker.affiliation).collect()
 }
 
-/// Letters and digits stand for themselves, all else for its number, so that no two become one.
+/// Letters and digits are kept, other characters are replaced by their number, so that different names stay different.
 fn affiliation_id(name: &str) -> String {
     let letter = |c: char| if c.is_ascii_alphanumeric() { c.to_string() } else { format!("-{:x}-", u32::from(c)) };
     format!("#affiliation-{}", name.chars().map(letter).collect::<String>())
@@ -166,10 +166,10 @@ fn work(source: &Source) -> Value {
     work
 }
 
-/// What each stage made, and from what, in entities of the crate.
+/// Outputs and inputs of each stage, as entities of the crate.
 #[derive(Default)]
 struct Stages {
-    /// Files that were there before: measured data and masks.
+    /// Input files: measured data and masks.
     given: BTreeSet<String>,
     made: BTreeMap<String, BTreeSet<String>>,
     used: BTreeMap<String, BTreeSet<String>>,
@@ -197,7 +197,7 @@ impl Stages {
         stages
     }
 
-    /// Tables that several stages fill come from what those stages read.
+    /// Tables filled by several stages are derived from the inputs of all of them.
     fn share_tables(&mut self) {
         let shared: Vec<String> = self.made.keys().filter(|stage| stage.contains('+')).cloned().collect();
         for stage in shared {
@@ -206,7 +206,7 @@ impl Stages {
         }
     }
 
-    /// The report shows the study, tables and what was computed of rasters.
+    /// The report is derived from the study, the tables and the rasters.
     fn add_report(&mut self, described: &Described<'_>) {
         let shown = |a: &&Artifact| a.path.starts_with("tables/") || a.path.ends_with(".tif");
         let derived = described.artifacts.iter().filter(|a| !original::only_copies(&a.origin.stage));
@@ -242,7 +242,7 @@ fn action_id(stage: &str) -> String {
     format!("#stage-{}", stage.replace('+', "-"))
 }
 
-/// What stands for a file: itself where it was given, else its folder.
+/// The entity of a file: itself if it is an input, else its folder.
 fn entity(artifact: &Artifact) -> String {
     let path = &artifact.path;
     let words: Vec<&str> = path.split('/').collect();

@@ -1,4 +1,4 @@
-//! Measured data behind the files of a release: what its makers ask for goes with everything that comes from it.
+//! Licence and attribution of measured data, propagated to everything derived from it.
 
 use super::terms::{self, Objection};
 use crate::error::Error;
@@ -14,16 +14,16 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Measured data of a study.
 #[derive(Default)]
 pub struct Sources {
-    /// What is asked for each, in the study's order.
+    /// The measured data, in the study's order.
     pub list: Vec<Source>,
-    /// Licences that the program does not know.
+    /// Notes on unknown licences.
     pub notes: Vec<ItemNote>,
-    /// Ids of the data that an item comes from, by the item's name.
+    /// Ids of the data that an item is derived from, by the item's name.
     behind: BTreeMap<String, BTreeSet<String>>,
 }
 
 impl Sources {
-    /// Measured data of a study.
+    /// Collects the measured data of a study.
     ///
     /// # Errors
     /// A section that cannot be read.
@@ -40,7 +40,7 @@ impl Sources {
         Ok(sources)
     }
 
-    /// Traces an item to the data behind it, after its parents.
+    /// Traces an item to its data; call it after its parents.
     pub fn trace(&mut self, record: &Record) {
         let Record { item, ingredients, .. } = record;
         let of_parents = ingredients.parents.keys().filter_map(|parent| self.behind.get(parent)).flatten().cloned();
@@ -51,7 +51,7 @@ impl Sources {
         }
     }
 
-    /// Ids of the data that an item comes from.
+    /// Ids of the data that an item is derived from.
     pub fn behind(&self, item: &ItemRef) -> Vec<String> {
         self.behind.get(&item.to_string()).into_iter().flatten().cloned().collect()
     }

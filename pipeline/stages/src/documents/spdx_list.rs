@@ -1,21 +1,21 @@
-//! How the documents name a licence: by its identifier in the SPDX list.
+//! Licence identifiers of the SPDX list.
 
-/// What the crate lists beside the licences: that nothing is said of one.
+/// The crate's entry for a missing licence, which is not a licence.
 const NO_LICENSE: &str = "NOASSERTION";
 
-/// The identifier of the SPDX list that a licence is, whatever its case.
+/// The SPDX identifier of a licence, ignoring case.
 pub fn identifier(license: &str) -> Option<&'static str> {
     let license = license.trim();
     let names = spdx::identifiers::LICENSES.iter().map(|listed| listed.name);
     names.into_iter().find(|name| name.eq_ignore_ascii_case(license) && *name != NO_LICENSE)
 }
 
-/// Where a licence can be read: its page in the SPDX list, or the licence as it is stated.
+/// Address of a licence: its page in the SPDX list, or the licence as stated.
 pub fn address(license: &str) -> String {
     identifier(license).map_or_else(|| license.to_owned(), |id| format!("https://spdx.org/licenses/{id}"))
 }
 
-/// True for an expression of nothing but identifiers of the SPDX list, as `MIT OR Apache-2.0`.
+/// True for an expression made only of SPDX identifiers, such as `MIT OR Apache-2.0`.
 pub fn is_listed(license: &str) -> bool {
     let of_list = |e: spdx::Expression| {
         e.requirements().all(|r| r.req.license.id().is_some_and(|id| identifier(id.name).is_some()))
@@ -29,7 +29,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_licences_are_named_as_the_lists_have_them() {
+    fn val_licences_have_the_identifiers_of_the_list() {
         assert_eq!(identifier("cc-by-4.0"), Some("CC-BY-4.0"));
         assert_eq!(identifier("DL-DE-BY-2.0"), Some("DL-DE-BY-2.0"));
         for other in ["NOASSERTION", "proprietary", "public-domain", "CC-BY-9.0", "MIT OR Apache-2.0", ""] {

@@ -1,25 +1,25 @@
-//! Licences of measured data against the licence of what is made from them.
+//! Compatibility of the licences of measured data with the licence of what is derived from them.
 //!
-//! A release holds derivatives of its DEMs (heights in metres, fits, textures), so that its licence must be one that the
+//! A release contains derivatives of its DEMs (heights in metres, fits, textures), so its licence must be one that the
 //! DEMs' licences permit for adaptations: Creative Commons, "Frequently Asked Questions", *If I derive or adapt material
 //! offered under a Creative Commons license, which CC license(s) can I use?*, with its chart (boxes that are not recommended
-//! count as refused); the database licences of Open Data Commons by their own texts. This is no legal advice: what the table
-//! does not know is left to the reader, with a note.
+//! count as refused); the database licences of Open Data Commons by their own texts. This is not legal advice: licences
+//! missing from the table are left to the reader, with a note.
 
 use sastrugi_schemas::study::DemItem;
 
-/// What a licence asks of those who adapt the work.
+/// Conditions of a licence on adaptations.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Terms {
-    /// Nothing.
+    /// None.
     Free,
-    /// To name the source.
+    /// Attribution.
     Attribution,
-    /// To name the source and to share alike.
+    /// Attribution and share-alike.
     ShareAlike,
     /// No commercial use.
     NonCommercial,
-    /// No commercial use, and to share alike.
+    /// No commercial use, and share-alike.
     NonCommercialShareAlike,
     /// No adaptations.
     NoDerivatives,
@@ -43,14 +43,14 @@ const FAMILIES: [(&str, Terms); 14] = [
     ("ETALAB", Terms::Attribution),
 ];
 
-/// A licence that the table knows: its family and version, as `("CC-BY-SA", "4.0")`.
+/// A licence in the table: its family and version, such as `("CC-BY-SA", "4.0")`.
 struct Known {
     family: &'static str,
     version: String,
     terms: Terms,
 }
 
-/// Finds a licence by its SPDX identifier; case, and blanks for hyphens, do not matter.
+/// Finds a licence by its SPDX identifier, ignoring case and treating blanks as hyphens.
 fn known(license: &str) -> Option<Known> {
     let name = license.trim().to_uppercase().replace([' ', '_'], "-");
     FAMILIES.iter().find_map(|&(family, terms)| {
@@ -61,8 +61,8 @@ fn known(license: &str) -> Option<Known> {
     })
 }
 
-/// True for a number, with a region or organisation behind it where there is one (`3.0-IGO`); an expression of several licences is
-/// no version.
+/// True for a number, optionally followed by a region or organisation (`3.0-IGO`); an expression of several licences is not
+/// a version.
 fn is_version(text: &str) -> bool {
     let (number, port) = text.split_once('-').unwrap_or((text, ""));
     let digits =
@@ -70,28 +70,28 @@ fn is_version(text: &str) -> bool {
     digits && port.len() <= 3 && port.bytes().all(|b| b.is_ascii_alphabetic())
 }
 
-/// What stands between the licence of a release and that of data it is made from.
+/// A conflict or doubt between the licence of a release and that of its data.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub enum Objection {
-    /// The data's licence does not permit it; the sentence says what would be right.
+    /// The data's licence does not permit it; the sentence says which licences would be valid.
     Conflict(String),
-    /// One of the two is unknown here.
+    /// One of the two licences is unknown.
     Unknown(String),
 }
 
-/// What stands against releasing derivatives of data under `source` under the licence `release`; nothing where the data
+/// The objection to releasing derivatives of data under licence `source` under the licence `release`; `None` if the data
 /// states no licence.
 pub fn objection(source: &DemItem, release: &str) -> Option<Objection> {
     let stated = source.license.as_deref()?;
     let (Some(theirs), Some(ours)) = (known(stated), known(release)) else {
         let sentence = format!(
-            "whether data under \"{stated}\" may be released under \"{release}\" is not known here; check it yourself"
+            "it is unknown whether data under \"{stated}\" may be released under \"{release}\"; check the licences yourself"
         );
         return Some(Objection::Unknown(sentence));
     };
     let reason = refusal(&theirs, &ours, stated)?;
     Some(Objection::Conflict(format!(
-        "is \"{stated}\", but the release, which holds derivatives, is under \"{release}\": {reason}"
+        "is \"{stated}\", but the release, which contains derivatives, is under \"{release}\": {reason}"
     )))
 }
 
@@ -102,13 +102,13 @@ fn refusal(theirs: &Known, ours: &Known, stated: &str) -> Option<String> {
     match theirs.terms {
         Terms::Free => None,
         Terms::Attribution if ours.terms != Terms::Free => None,
-        Terms::Attribution => Some(format!("[study] license must ask for attribution too, as \"{stated}\" does")),
+        Terms::Attribution => Some(format!("[study] license must require attribution, like \"{stated}\"")),
         Terms::ShareAlike | Terms::NonCommercialShareAlike if alike => None,
         Terms::ShareAlike | Terms::NonCommercialShareAlike => {
-            Some(format!("[study] license must be \"{stated}\" as well, or a later version of it"))
+            Some(format!("[study] license must also be \"{stated}\" or a later version of it"))
         }
         Terms::NonCommercial if non_commercial => None,
-        Terms::NonCommercial => Some("[study] license must be non-commercial too, as CC-BY-NC-4.0 is".to_owned()),
+        Terms::NonCommercial => Some("[study] license must also be non-commercial, such as CC-BY-NC-4.0".to_owned()),
         Terms::NoDerivatives => Some("it permits no derivatives under any licence; use other data".to_owned()),
     }
 }

@@ -1,17 +1,17 @@
-//! `.zenodo.json`: what Zenodo asks for on deposit, in its deposit metadata (<https://developers.zenodo.org/#deposit-metadata>; example:
+//! `.zenodo.json`: Zenodo's deposit metadata (<https://developers.zenodo.org/#deposit-metadata>; example:
 //! <https://help.zenodo.org/docs/github/describe-software/zenodo-json>).
 //!
-//! Licences are Zenodo's identifiers: those of the SPDX list in lower case. Others are `other-open`, because Zenodo takes a dataset
-//! without a licence for CC0; the notes then state the licence. Grants are listed where they are identifiers as Zenodo has them, the rest
-//! of the funding is in the notes.
+//! Licences are Zenodo's identifiers: those of the SPDX list in lower case. Others are `other-open`, because Zenodo treats a dataset
+//! without a licence as CC0; the notes then state the licence. Funding given as a Zenodo grant identifier is listed under `grants`,
+//! the rest in the notes.
 
 use super::described::{Described, Maker, source_line};
 use super::spdx_list;
 use serde_json::{Value, json};
 
-/// Zenodo's word for a licence that its list does not have.
+/// Zenodo's identifier for licences not in its list.
 const OTHER_LICENSE: &str = "other-open";
-/// What DOIs of funders begin with.
+/// Prefix of funder DOIs.
 const FUNDER: &str = "10.13039/";
 
 /// The text of `.zenodo.json`.
@@ -29,7 +29,7 @@ pub fn text(described: &Described<'_>) -> String {
     });
     let (grants, other): (Vec<&String>, Vec<&String>) = head.funding.iter().partition(|text| is_grant(text));
     let grants: Vec<Value> = grants.into_iter().map(|id| json!({ "id": id })).collect();
-    // Not the DOI, which is the deposit's own.
+    // Not the DOI, which is that of the deposit itself.
     let page = head.url.as_ref().map(|page| json!([{ "identifier": page, "relation": "isAlternateIdentifier" }]));
     let sources: Vec<String> = described.sources.iter().map(source_line).collect();
     let optional = [
@@ -61,12 +61,12 @@ fn creator(maker: Maker<'_>) -> Value {
     creator
 }
 
-/// A licence as Zenodo names it.
+/// Zenodo's identifier of a licence.
 fn license(license: &str) -> String {
     spdx_list::identifier(license).map_or_else(|| OTHER_LICENSE.to_owned(), str::to_lowercase)
 }
 
-/// What has no place of its own.
+/// Metadata without a field of its own.
 fn notes(license: &str, funding: &[&String]) -> Option<String> {
     let unlisted = spdx_list::identifier(license).is_none();
     let license = unlisted.then(|| format!("Licence: {license}; see the file LICENSE."));
@@ -76,7 +76,7 @@ fn notes(license: &str, funding: &[&String]) -> Option<String> {
     (!notes.is_empty()).then(|| notes.join(" "))
 }
 
-/// Whether a grant is named as Zenodo names it: by the DOI of its funder and its number, or, of the European Commission, by its number.
+/// Whether a grant is a Zenodo identifier: the funder's DOI and the grant number or, for the European Commission, the number alone.
 fn is_grant(text: &str) -> bool {
     let is_number = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_digit());
     let plain = |text: &str| !text.is_empty() && text.bytes().all(|b| b.is_ascii_graphic());
@@ -86,7 +86,7 @@ fn is_grant(text: &str) -> bool {
     }
 }
 
-/// Text as HTML, which Zenodo takes descriptions and notes for.
+/// Text as HTML, the format of Zenodo's descriptions and notes.
 fn html(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;")
 }
@@ -96,7 +96,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_licences_are_named_as_zenodo_names_them() {
+    fn val_licences_have_zenodo_identifiers() {
         for (ours, theirs) in [
             ("CC-BY-4.0", "cc-by-4.0"),
             ("cc0-1.0", "cc0-1.0"),
@@ -112,7 +112,7 @@ mod tests {
     }
 
     #[test]
-    fn val_grants_are_told_from_other_funding() {
+    fn val_grants_are_distinguished_from_other_funding() {
         for grant in ["10.13039/501100000780::101122956", "10.13039/501100001711::200021_192342", "283595"] {
             assert!(is_grant(grant), "{grant}");
         }

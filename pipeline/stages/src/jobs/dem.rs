@@ -1,4 +1,4 @@
-//! Stage `dem`: a measured DEM into metres, window applied.
+//! Stage `dem`: crops a measured DEM to its window and converts it to metres.
 
 use super::original::{self, Original};
 use super::rasters::{raster_options, raster_packing};
@@ -33,7 +33,7 @@ struct DemJob {
 /// Adds the items of `[[dem]]`.
 ///
 /// # Errors
-/// A wrong item, or a file that is not there.
+/// An invalid item, or a missing file.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -54,7 +54,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         builder.inputs.push(InputPlace { key: entry.path_of("license_file"), release_path });
     }
     let claimed = dem::claimed(&builder.study.folder.join(&item.file), &ReadOptions { cell_m: item.cell_m });
-    // Other formats have a byte or more for a cell.
+    // Other formats take at least one byte per cell.
     let claimed = claimed.unwrap_or_else(|| Claimed::size(original.bytes(), 0, None));
     let expected = expected(&claimed, item.window).map_err(|message| entry.error("window", message))?;
     let key = entry.path_of("file");
@@ -93,13 +93,13 @@ fn check(item: &DemItem) -> Result<(), (&'static str, String)> {
     {
         return Err((
             "window",
-            format!("is [{x0}, {y0}, {x1}, {y1}]; it is [x0, y0, x1, y1] with x0 < x1 and y0 < y1"),
+            format!("is [{x0}, {y0}, {x1}, {y1}]; it must be [x0, y0, x1, y1] with x0 < x1 and y0 < y1"),
         ));
     }
     gridding(item).map_err(|message| ("statistic", message))?;
     for (key, text) in [("license", &item.license), ("attribution", &item.attribution), ("citation", &item.citation)] {
         if text.as_ref().is_some_and(|text| text.trim().is_empty()) {
-            return Err((key, "is empty; leave it out where nothing is known".to_owned()));
+            return Err((key, "is empty; omit it if it is unknown".to_owned()));
         }
     }
     match item.cell_m {
@@ -110,15 +110,15 @@ fn check(item: &DemItem) -> Result<(), (&'static str, String)> {
     }
 }
 
-/// How a point cloud becomes cells.
+/// Settings for gridding a point cloud.
 fn gridding(item: &DemItem) -> Result<GridSettings, String> {
     let statistic = item.statistic.as_deref().map(str::parse).transpose()?.unwrap_or_default();
     let (fill_cells, ground_only) = (item.fill_cells.unwrap_or(0), item.ground_only.unwrap_or(false));
     Ok(GridSettings { cell_m: None, statistic, fill_cells, ground_only })
 }
 
-/// What decides the result beside the original, whose item is a parent. Licence, attribution and citation do not: they join the
-/// release when it is assembled.
+/// Everything that determines the result except the original, whose item is a parent. Licence, attribution and citation do not
+/// affect it: they are added when the release is assembled.
 fn recipe(item: &DemItem) -> Value {
     json!({
         "window": item.window,
@@ -143,8 +143,8 @@ impl Job for DemJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights are held twice while they are cut or converted, beside the file or its tiles; cells of a cloud take 40
-        // bytes, its points 8 for a median, and the search for a cell size 64 MiB.
+        // Cropping and converting hold the heights twice, in addition to the file or its tiles. Gridding a point cloud takes
+        // 40 bytes per cell, 8 bytes per point for a median, and 64 MiB for the cell-size search.
         let Claimed { cells, points, .. } = self.claimed;
         (128 << 20) + 2 * self.bytes + 40 * cells + 8 * points
     }
@@ -155,9 +155,10 @@ impl Job for DemJob {
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let copy = work.parent(&self.original, original::name(&self.release_path))?;
-        // Messages are part of the release: they name the file as it is called there, wherever it lies now.
-        let name_it = |e: JobError| e.reworded(|words| words.replace(&copy.display().to_string(), &self.release_path));
-        let Imported { metric, place, notes } = import(&copy, &self.item).map_err(name_it)?;
+        // Messages are part of the release, so they use the file's path in the release instead of its present one.
+        let with_release_path =
+            |e: JobError| e.reworded(|words| words.replace(&copy.display().to_string(), &self.release_path));
+        let Imported { metric, place, notes } = import(&copy, &self.item).map_err(with_release_path)?;
         dem::write(&work.output(HEIGHTS), &metric.grid, &metric.info.crs, &raster_options(self.geotiff))
             .map_err(JobError::io)?;
         let content = digest::heights(&metric.grid);
@@ -169,14 +170,14 @@ impl Job for DemJob {
     }
 }
 
-/// A DEM in metres, with its place in its file.
+/// A DEM in metres, with its position in the original file.
 struct Imported {
     metric: Dem,
     place: Place,
     notes: Vec<String>,
 }
 
-/// Reads a DEM as an item of a study asks for it: window cut, degrees turned into metres.
+/// Reads the DEM of an item, crops it to the window and converts degrees to metres.
 fn import(path: &Path, item: &DemItem) -> Result<Imported, JobError> {
     let gridding = gridding(item).map_err(JobError::new)?;
     let options = ReadOptions { cell_m: item.cell_m };

@@ -1,4 +1,4 @@
-//! Folders of a terrain to import into simulators: `export/<id>/<simulator>/` of the release.
+//! Exports of a terrain for simulators, in `export/<id>/<simulator>/` of the release.
 
 use crate::job::{JobError, Outcome, Product, Work};
 use sastrugi_numeric::{Geometry, Grid};
@@ -10,13 +10,13 @@ use std::collections::{BTreeMap, BTreeSet};
 
 /// Folder in the release.
 pub const FOLDER: &str = "export/";
-/// Bytes of a height as it is released, which is what is exported.
+/// Size of a released height, bytes; exports use the released heights.
 const BYTES_PER_CELL: u64 = 8;
 
-/// Working memory of an export whose mesh is decimated, over that of one whose mesh is not.
+/// Ratio of the working memory of an export with a decimated mesh to that of one without decimation.
 const DECIMATING: u64 = 4;
 
-/// The simulators that a terrain is exported for, and what each export takes.
+/// The simulators that a terrain is exported for, and the cost of each export.
 #[derive(Clone, Debug, Default)]
 pub struct Exports {
     costs: BTreeMap<Simulator, Cost>,
@@ -25,28 +25,28 @@ pub struct Exports {
 }
 
 impl Exports {
-    /// For terrains of this size.
+    /// Exports of terrains of this size.
     ///
     /// # Errors
-    /// Why a simulator takes none of this size.
+    /// The reason why a simulator cannot import a terrain of this size.
     pub fn new(simulators: &BTreeSet<Simulator>, geometry: &Geometry) -> Result<Self, String> {
         let cost = |&simulator| Ok((simulator, simulators::check_size(geometry, simulator, Fit::Resample)?));
         let costs: Result<_, DemError> = simulators.iter().map(cost).collect();
         costs.map(|costs| Self { costs, limits: None }).map_err(|e| e.to_string())
     }
 
-    /// The same with meshes that pass every post within `error_max_m`, where that is given.
+    /// The same exports with meshes decimated to within `error_max_m` of every post, if given.
     pub fn decimated(self, error_max_m: Option<f64>) -> Self {
         let limits = error_max_m.map(|_| MeshLimits { error_max_m, triangles_max: None });
         Self { limits, ..self }
     }
 
-    /// True when there is none.
+    /// True if no simulator was chosen.
     pub fn is_empty(&self) -> bool {
         self.costs.is_empty()
     }
 
-    /// Adds them to what says how the heights are packed.
+    /// Adds the exports to the packing of the heights.
     pub fn packing(&self, heights: Value) -> Value {
         if self.is_empty() {
             return heights;
@@ -62,7 +62,7 @@ impl Exports {
         self.costs.keys().copied().collect()
     }
 
-    /// Working memory, bytes: one export is made after the other.
+    /// Working memory, bytes. Exports are written one after the other.
     pub fn memory_bytes(&self, cells: u64) -> u64 {
         let factor = |simulator| {
             if self.limits.is_some() && simulators::has_mesh(simulator) { DECIMATING } else { 1 }
@@ -71,12 +71,12 @@ impl Exports {
         largest.map_or(0, |bytes| bytes + BYTES_PER_CELL * cells)
     }
 
-    /// Bytes of their files.
+    /// Total size of the files, bytes.
     pub fn bytes(&self) -> f64 {
         self.costs.values().map(|cost| cost.file_bytes as f64).sum()
     }
 
-    /// Writes the folders of the terrain `id`, of its heights as they are released.
+    /// Writes the exports of the terrain `id` from its released heights.
     ///
     /// # Errors
     /// When a file cannot be written.

@@ -1,4 +1,4 @@
-//! Stage `fit`: the covariance of a measured DEM.
+//! Stage `fit`: fits a covariance model to a DEM.
 
 use super::dem as measured;
 use super::mask::{self, Mask};
@@ -33,14 +33,14 @@ use serde_json::{Value, json};
 pub const STAGE: &str = "fit";
 /// Fit file.
 pub const FIT: &str = "fit.json";
-/// The background that was taken off.
+/// The background that was subtracted.
 pub const BACKGROUND: &str = "background.tif";
 const RESIDUAL: &str = "residual.tif";
 const MASK: &str = "mask.tif";
-/// Covariance at every lag; the raster's coordinates are the lag.
+/// Covariance at every lag; the coordinates of the raster are the lags.
 const MAP: &str = "covariance.tif";
 
-/// Rough time of a cell of the residual that is described, and of the rasters that are written, s.
+/// Approximate time to describe one cell of the residual and to write the rasters, s.
 const SECONDS_PER_DESCRIBED_CELL: f64 = 1e-6;
 
 /// The one kind of fit.
@@ -60,9 +60,9 @@ struct FitJob {
     streams: Streams,
     cells: u64,
     cell_m: Option<f64>,
-    /// Shape and place of the DEM, where they are known before the run.
+    /// Shape and position of the DEM, if known before the run.
     place: Option<Geometry>,
-    /// Whether it was measured, and may have holes.
+    /// Whether it was measured, and so may have holes.
     is_measured: bool,
 }
 
@@ -82,7 +82,7 @@ impl Subtrahend {
         Ok(Self { id: id.to_owned(), dem: field.item.clone(), source: builder.source_of(id, field) })
     }
 
-    /// The DEM of an item less this one.
+    /// The DEM of an item minus this one.
     fn subtract(&self, item: &ItemRef, dem: &Dem, work: &Work<'_>) -> Result<(Grid, Minus), JobError> {
         let other = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(input_error)?;
         for (item, heights) in [(item, &dem.grid), (&self.dem, &other.grid)] {
@@ -100,12 +100,12 @@ impl Subtrahend {
 /// Adds the items of `[[fit]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     add_where(builder, false)
 }
 
-/// Adds the fits of surfaces recovered from images, which come after those of DEMs and terrains: textures may lie between.
+/// Adds the fits to surfaces recovered from images. They come after the fits to DEMs and terrains, because textures may come between the two.
 ///
 /// # Errors
 /// As [`add`].
@@ -140,7 +140,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
         let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
         let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
         if noise_reference.is_some() {
-            // What the reference holds is known when it is read; whether the fit takes it, now.
+            // The noise itself is known only when the reference is read; whether the settings accept one can be checked now.
             settings
                 .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
                 .map_err(|e| entry.refuse(e))?;
@@ -192,7 +192,7 @@ impl Job for FitJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Background, residual, mask and what describes the residual take 81 bytes a cell, after the fit.
+        // After the fit: background, residual, mask and the statistics of the residual take 81 bytes per cell.
         let fit = self.settings.memory_bytes(self.cells, self.cell_m, rayon::current_num_threads() as u64);
         8 * self.cells + fit.max((256 << 20) + 81 * self.cells)
     }
@@ -222,7 +222,7 @@ impl Job for FitJob {
             notes.push(coregistration::sentence(&minus));
             source.minus = Some(minus);
         }
-        // A co-registration is a result whatever the fit says.
+        // The co-registration is a result even if the fit fails, so the error reports it.
         let failed = |e: FitError| match &source.minus {
             Some(minus) => JobError::new(format!("{e}; {}", coregistration::sentence(minus))),
             None => JobError::new(e),
@@ -233,7 +233,7 @@ impl Job for FitJob {
         let band = shown::covariance_band(&residual, &outcome);
         let map = outcome.covariance_map();
         let fit = with_source(outcome.fit, source);
-        // First: it is what a run ends with. Its warnings stand in the fit file and the table.
+        // The verdict comes first because the summary of a run shows it. Warnings are in the fit file and the table.
         notes.insert(0, fit.verdict.clone());
         work.write(FIT, to_json(&fit)?.as_bytes())?;
         let id = &self.id;

@@ -1,4 +1,4 @@
-//! Stage `image`: a surface under sun and camera.
+//! Stage `image`: renders a surface for a given sun and camera.
 
 use super::rasters::{raster_options, raster_packing};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, Image};
@@ -26,11 +26,11 @@ pub const IMAGE: &str = "image.tif";
 /// Its description, `sastrugi_imaging::ImageDescription`.
 pub const DESCRIPTION: &str = "image.json";
 const PICTURE: &str = "image.png";
-/// Map of a terrain beside its heights.
+/// Albedo map of a terrain, next to its heights.
 const ALBEDO: &str = "albedo.tif";
-/// Rough time of a ray and its shadow, s.
+/// Approximate time of a ray and its shadow ray, s.
 const SECONDS_PER_RAY: f64 = 5e-7;
-/// Memory of a pixel, bytes: what it sees, and the rasters made from it.
+/// Memory of a pixel, bytes: the point it sees, and the rasters derived from it.
 const BYTES_PER_PIXEL: u64 = 120;
 /// Memory of a cell, bytes: heights, albedo, highest points of blocks.
 const BYTES_PER_CELL: u64 = 40;
@@ -54,7 +54,7 @@ struct ImageJob {
 /// Adds the items of `[[image]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -70,7 +70,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         for (j, surface) in surfaces.iter().enumerate() {
             let id = if surfaces.len() == 1 { one.id.clone() } else { format!("{}-{surface}", one.id) };
             builder.claim(entry, STAGE, &id)?;
-            // Images differ by their noise, also those of one sweep and one explicit seed.
+            // Every image has its own noise, even within one sweep and with an explicit seed.
             let number = (k * surfaces.len() + j) as u64;
             let streams = builder.streams(STAGE, &id, envelope.seed, number);
             let pixels = pixels(builder.surface(entry, "surface", surface)?, &parameters) as u64;
@@ -110,14 +110,14 @@ fn add_one(
     Ok(())
 }
 
-/// Pixels of an image of a surface, roughly.
+/// Approximate number of pixels of an image of a surface.
 fn pixels(field: &Heightfield, parameters: &RenderParameters) -> f64 {
     let size = field.expected.map(|g| (g.size(), g.mean_cell()));
     size.map_or(field.cells as f64, |(size, cell)| parameters.camera.pixels(size, cell))
 }
 
 impl ImageJob {
-    /// Rays that it takes.
+    /// Number of rays.
     fn rays(&self) -> f64 {
         self.pixels() * f64::from(self.parameters.samples * self.parameters.samples)
     }

@@ -1,6 +1,6 @@
-//! What generators take as input in a study: surfaces of other items, their maps, and files.
+//! Inputs of generators in a study: surfaces of other items, their maps, and files.
 //!
-//! Files are taken into the release as they are (stage [`INPUT_STAGE`]), one copy for all replicates of an item.
+//! Files are copied into the release unchanged (stage [`INPUT_STAGE`]), one copy for all replicates of an item.
 
 use super::original::{self, INPUT_STAGE, Original};
 use super::terrain;
@@ -21,15 +21,15 @@ use std::path::Path;
 #[derive(Clone, Debug)]
 pub struct Source {
     named: NamedInput,
-    /// The item that makes or copies it.
+    /// The item that produces or copies it.
     pub item: ItemRef,
     /// Its file in the item's folder.
     file: String,
     /// Path in the release, for messages about a file.
     release_path: Option<String>,
-    /// Cells, as far as they are known before the run.
+    /// Number of cells, if known before the run; otherwise 0.
     cells: u64,
-    /// Shape and place of a raster, as far as they are known before the run.
+    /// Shape and position of a raster, if known before the run.
     place: Option<Geometry>,
 }
 
@@ -44,7 +44,7 @@ impl Sources {
     /// Finds the inputs of a generator, and adds the items that copy files.
     ///
     /// # Errors
-    /// A name that nothing has, or a file that is missing or swept over.
+    /// An unknown name, a missing file, or a sweep over files.
     pub fn find(
         builder: &mut Builder<'_>,
         (entry, item): (&Entry<'_>, &TerrainItem),
@@ -58,7 +58,7 @@ impl Sources {
         generator.inputs().into_iter().map(one).collect::<Result<_, _>>().map(Self)
     }
 
-    /// Parameters with files by their places in the release.
+    /// Parameters in which file names are replaced by paths in the release.
     pub fn as_released(&self, params: &Value) -> Value {
         let mut params = params.clone();
         for source in &self.0 {
@@ -70,12 +70,12 @@ impl Sources {
         params
     }
 
-    /// Cells of all.
+    /// Total number of cells.
     pub fn cells(&self) -> u64 {
         self.0.iter().map(|s| s.cells).sum()
     }
 
-    /// Shapes and places, as far as they are known before the run.
+    /// Shape and position of each input, if known before the run.
     pub fn places(&self) -> Vec<Option<Geometry>> {
         self.0.iter().map(|s| s.place).collect()
     }
@@ -89,7 +89,7 @@ impl Sources {
         let mut crs = None;
         for source in &self.0 {
             let path = work.parent(&source.item, &source.file)?;
-            let read = read(&source.named, &path).map_err(|e| source.name_it(e, &path))?;
+            let read = read(&source.named, &path).map_err(|e| source.with_release_path(e, &path))?;
             if let Some(own) = read.crs {
                 check_systems(&source.named, crs.as_ref(), &own)?;
                 crs.get_or_insert(own);
@@ -99,10 +99,10 @@ impl Sources {
         Ok((inputs, crs.unwrap_or_default()))
     }
 
-    /// Copies the files beside the heights, for ground that is made on demand.
+    /// Copies the files next to the heights, for ground that is generated on demand.
     ///
     /// # Errors
-    /// The file system refused.
+    /// A file cannot be read or written.
     pub fn keep(&self, work: &Work<'_>) -> Result<Vec<Product>, JobError> {
         let one = |(k, source): (usize, &Source)| {
             let from = work.parent(&source.item, &source.file)?;
@@ -116,8 +116,8 @@ impl Sources {
 }
 
 impl Source {
-    /// Messages are part of the release: they name a file as it is called there.
-    fn name_it(&self, error: JobError, path: &Path) -> JobError {
+    /// Messages are part of the release, so they use the file's path in the release.
+    fn with_release_path(&self, error: JobError, path: &Path) -> JobError {
         match &self.release_path {
             Some(released) => error.reworded(|words| words.replace(&path.display().to_string(), released)),
             None => error,
@@ -125,7 +125,7 @@ impl Source {
     }
 }
 
-/// The heights or a map of an earlier item, where the name is one.
+/// The heights or a map of an earlier item; `None` if the name refers to neither.
 fn of_item(builder: &Builder<'_>, entry: &Entry<'_>, named: &NamedInput) -> Result<Option<Source>, BuildError> {
     let source = |field: &Heightfield, file: String| Source {
         named: named.clone(),
@@ -156,7 +156,7 @@ fn of_item(builder: &Builder<'_>, entry: &Entry<'_>, named: &NamedInput) -> Resu
     Ok(Some(source(field, format!("{map}.tif"))))
 }
 
-/// A file beside the study.
+/// A file next to the study.
 fn of_file(
     builder: &mut Builder<'_>,
     (entry, item): (&Entry<'_>, &TerrainItem),
@@ -170,12 +170,12 @@ fn of_file(
     }
     if item.sweep.contains_key(&named.key) {
         let message =
-            format!("`{}` sweeps over files; sweep over ids of [[dem]], or write one item for each file", named.key);
+            format!("`{}` cannot sweep over files; sweep over ids of [[dem]], or write one item per file", named.key);
         return Err(entry.error("sweep", message).into());
     }
     let claimed = dem::claimed(&path, &ReadOptions::default()).filter(|_| named.holds != Holds::Points);
     let cells = claimed.map_or(0, |claimed| claimed.cells);
-    // Degrees are refused when the file is read.
+    // Rasters in degrees are refused when the file is read.
     let place = claimed.filter(|claimed| !claimed.geographic).and_then(|claimed| claimed.geometry);
     let (copy, release_path) = match copies.get(&named.name) {
         Some(known) => known.clone(),

@@ -1,4 +1,4 @@
-//! Stage `mask`: the files that say which cells of a DEM a fit takes, copied into the release; and their use.
+//! Stage `mask`: copies the mask files of fits and the obstacle files of routes into the release, and applies them.
 
 use super::original::{self, MASK_STAGE, Original};
 use crate::builder::{BuildError, Builder, InputPlace};
@@ -13,18 +13,18 @@ use sastrugi_schemas::study::{Files, FitItem, RouteItem};
 use sastrugi_texture::noise::{self, ReferenceNoise};
 use std::path::Path;
 
-/// A mask of a fit.
+/// A copied file that selects cells: a mask or noise reference of a fit, or obstacles of a route.
 #[derive(Clone)]
 pub struct Mask {
     /// The item that copies its file.
     pub item: ItemRef,
     /// Path in the release.
     release_path: String,
-    /// What the fit file says of it.
+    /// Its entry in the fit file.
     pub source: MaskSource,
 }
 
-/// Adds the copies of a fit's mask files; the key of each is known to the released study.
+/// Adds the copies of the mask files of a fit, and records their keys so that the released study can refer to the copies.
 ///
 /// # Errors
 /// A file that is missing or cannot be read.
@@ -44,7 +44,7 @@ pub fn add(builder: &mut Builder<'_>, entry: &Entry<'_>, item: &FitItem) -> Resu
     (0usize..).zip(files).map(copy).collect()
 }
 
-/// Adds the copies of the files that say what a route cannot enter.
+/// Adds the copies of the files that mark cells a route cannot enter.
 ///
 /// # Errors
 /// A file that is missing or cannot be read.
@@ -59,7 +59,7 @@ pub fn add_obstacles(builder: &mut Builder<'_>, entry: &Entry<'_>, item: &RouteI
     files.into_iter().enumerate().map(copy).collect()
 }
 
-/// Adds the copy of a fit's noise reference, where it has one.
+/// Adds the copy of the noise reference of a fit, if it has one.
 ///
 /// # Errors
 /// A file that is missing or cannot be read.
@@ -90,22 +90,22 @@ impl Mask {
         Ok(mask)
     }
 
-    /// Leaves the heights that the mask keeps.
+    /// Removes the heights that the mask excludes.
     fn apply(&self, heights: &mut Grid, place: &Place, work: &Work<'_>) -> Result<(), JobError> {
         self.with_file(work, |path| masks::apply(heights, place, path, self.source.excludes))
     }
 
-    /// Does something with the file. Messages are part of the release: they name it as it is called there.
+    /// Runs `act` on the file. Messages are part of the release, so they use the file's path in the release.
     fn with_file<T>(&self, work: &Work<'_>, act: impl FnOnce(&Path) -> Result<T, JobError>) -> Result<T, JobError> {
         let path = work.parent(&self.item, original::name(&self.release_path))?;
         act(&path).map_err(|e| e.reworded(|words| words.replace(&path.display().to_string(), &self.release_path)))
     }
 }
 
-/// The noise of an item's DEM in its reference.
+/// The noise of the DEM of an item, estimated in its reference area.
 ///
 /// # Errors
-/// A reference that cannot be used for the DEM, or that tells no noise.
+/// A reference that cannot be used for the DEM, or from which no noise can be estimated.
 pub fn noise_of_item(
     heights: &Grid,
     dem: &ItemRef,
@@ -118,10 +118,10 @@ pub fn noise_of_item(
     noise::of_reference(&part).map_err(|e| JobError::input(format!("{}: {e}", reference.release_path)))
 }
 
-/// Applies the masks of an item to its DEM's heights. Returns the share of the cells with data that they dropped.
+/// Applies the masks of an item to the heights of its DEM. Returns the share of the cells with data that they remove.
 ///
 /// # Errors
-/// A mask that cannot be used for the DEM, or cells of which none is left.
+/// A mask that cannot be used for the DEM, or masks that leave no cells.
 pub fn of_item(heights: &mut Grid, dem: &ItemRef, masks: &[Mask], work: &Work<'_>) -> Result<Option<f64>, JobError> {
     if masks.is_empty() {
         return Ok(None);
@@ -134,7 +134,7 @@ pub fn of_item(heights: &mut Grid, dem: &ItemRef, masks: &[Mask], work: &Work<'_
     masks::dropped_share(before, heights).map(Some)
 }
 
-/// Adds what the obstacles of an item mark on a terrain.
+/// Adds the polygons and cells that the obstacles of an item mark on a terrain.
 ///
 /// # Errors
 /// Obstacles that cannot be used for the terrain.

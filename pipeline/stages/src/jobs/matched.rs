@@ -1,4 +1,4 @@
-//! What a texture matches: a fit of the study, or a covariance that the study states.
+//! The covariance that a texture matches: a fit of the study, or a model stated in the study.
 
 use super::fit;
 use crate::job::{ItemRef, JobError, Work};
@@ -8,12 +8,12 @@ use sastrugi_texture::{Cost, Method, Prospect};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
 
-/// What a texture matches.
+/// The covariance that a texture matches.
 #[derive(Clone)]
 pub enum Matched {
     /// A fit of the study.
     Item(ItemRef),
-    /// A covariance that the study states.
+    /// A covariance stated in the study.
     Stated(Box<FitFile>),
 }
 
@@ -33,7 +33,7 @@ impl Matched {
         }
     }
 
-    /// As a recipe and the table `terrains` name it.
+    /// Its description in recipes and in the table `terrains`.
     pub fn describe(&self) -> Value {
         match self {
             Self::Item(item) => json!(item.id),
@@ -41,7 +41,7 @@ impl Matched {
         }
     }
 
-    /// The item that makes the fit.
+    /// The item that computes the fit.
     pub fn parent(&self) -> Option<ItemRef> {
         match self {
             Self::Item(item) => Some(item.clone()),
@@ -49,8 +49,8 @@ impl Matched {
         }
     }
 
-    /// What a texture of the method takes. For a fit of the study, only what the method's parameters determine, and memory for a
-    /// range as long as the fit's window; `prospects` tells of the fits.
+    /// Cost of a texture synthesised by the method. For a fit of the study, whose range is not known yet, it follows from the parameters
+    /// of the method, with memory for a range as long as the window of the fit; `prospects` holds the settings of the fits by id.
     ///
     /// # Errors
     /// A stated covariance that the method refuses.
@@ -62,7 +62,7 @@ impl Matched {
     }
 }
 
-/// Rough time of an arithmetic operation of a method, s: of transforms, of bumps that are added all over a field, of a dense factor.
+/// Approximate time of one arithmetic operation of a method, s: adding bumps all over a field, a dense factorisation, or transforms.
 pub fn seconds_per_operation(method: &str) -> f64 {
     match method {
         "gaussians" | "quasi_wavelets" => 3.5e-9,

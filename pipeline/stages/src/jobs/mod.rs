@@ -1,4 +1,14 @@
-//! One file per stage, the glue between a kernel and the files of an item, and what several of them share.
+//! The stages, one file each: they connect a kernel to the files of an item. Helpers shared by several stages live here too.
+//!
+//! A stage has a function `add`, which reads its tables of the study and adds their items to the graph, and a [`Job`](crate::job::Job),
+//! which reads the files of its parents, calls the kernel, and writes files and table rows.
+//!
+//! 1. Surfaces: [`mod@dem`] and [`original`], [`terrain`], [`fit`] with [`mask`] and [`matched`], [`texture`] with [`scoreboard`],
+//!    [`photoclinometry`], [`image`].
+//! 2. Descriptions: [`roughness`], [`mod@surface`].
+//! 3. Missions: [`missions`], [`traverse`], [`route`], [`navigate`], [`rover`] with [`perturbation`], [`rover_designs`] and
+//!    [`rover_effects`].
+//! 4. Exports: [`exports`] of terrains, [`vehicle`].
 
 pub mod dem;
 pub mod exports;

@@ -1,7 +1,7 @@
-//! Stage `original`: the bytes of a measured file, taken into the release as they are.
+//! Stage `original`: copies a measured file into the release unchanged.
 //!
-//! An item of its own, so that a release whose import failed still holds what it was made from. Masks are copied in the same
-//! way (stage [`MASK_STAGE`]), and rasters and points that generators take (stage [`INPUT_STAGE`]).
+//! It is an item of its own, so that a release still holds its source files if their import failed. Masks (stage [`MASK_STAGE`]) and
+//! the rasters and points that generators use (stage [`INPUT_STAGE`]) are copied in the same way.
 
 use crate::builder::{BuildError, input_file};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
@@ -15,15 +15,15 @@ use std::path::{Path, PathBuf};
 pub const STAGE: &str = "original";
 /// Name of the stage of masks.
 pub const MASK_STAGE: &str = "mask";
-/// Name of the stage of the files that generators take as input.
+/// Name of the stage of the input files of generators.
 pub const INPUT_STAGE: &str = "input";
 
-/// True for stages that only take files into the release.
+/// True for stages that only copy files into the release.
 pub fn only_copies(stage: &str) -> bool {
     [STAGE, MASK_STAGE, INPUT_STAGE].contains(&stage)
 }
 
-/// A measured file with what lies beside it.
+/// A measured file with its accompanying files.
 pub struct Original {
     files: Vec<Copied>,
 }
@@ -36,7 +36,7 @@ struct Copied {
 }
 
 impl Original {
-    /// A file in `folder` with its place in the release, without its ending.
+    /// A file in `folder`; `place` is its path in the release without the extension.
     ///
     /// # Errors
     /// A file that is missing or cannot be read.
@@ -50,7 +50,7 @@ impl Original {
         Ok(Self { files })
     }
 
-    /// Takes another file that belongs to it, with its place in the release.
+    /// Adds an accompanying file with its path in the release.
     ///
     /// # Errors
     /// A file that is missing or cannot be read.
@@ -59,7 +59,7 @@ impl Original {
         Ok(())
     }
 
-    /// Length of the measured file, bytes.
+    /// Size of the measured file, bytes.
     pub fn bytes(&self) -> u64 {
         self.files[0].bytes
     }
@@ -79,7 +79,7 @@ impl Original {
         self.files.iter().map(|f| f.input.clone()).collect()
     }
 
-    /// The item that takes the files into the release.
+    /// The item that copies the files into the release.
     pub fn node(self, stage: &str, id: &str) -> Node {
         let inputs = self.inputs();
         Node { item: ItemRef::new(stage, id), parents: Vec::new(), inputs, stream: None, job: Box::new(self) }
@@ -98,20 +98,27 @@ impl Copied {
     }
 }
 
-/// Name in the item's folder of what has this path in the release.
+/// Name in the item's folder of the file with this path in the release.
 pub fn name(release_path: &str) -> &str {
     release_path.rsplit('/').next().unwrap_or_default()
 }
 
-/// The file's ending in lower case, `dat` where it has none that a release path can hold.
+/// The file extension in lower case; `dat` if it has none that is allowed in a release path.
+///
+/// ```
+/// use sastrugi_stages::jobs::original::extension;
+///
+/// assert_eq!(extension("site/Snow.TIF"), "tif");
+/// assert_eq!(extension("no-ending"), "dat");
+/// ```
 pub fn extension(file: &str) -> String {
     let ending = Path::new(file).extension().and_then(|e| e.to_str()).unwrap_or("").to_ascii_lowercase();
     let plain = !ending.is_empty() && ending.len() <= 8 && ending.bytes().all(|b| b.is_ascii_alphanumeric());
     if plain { ending } else { "dat".to_owned() }
 }
 
-/// Where a file goes in the release: an .hgt tile keeps its name, which says where it lies, but nothing that was added to it, as by a
-/// second download.
+/// Path of a file in the release. An .hgt tile keeps its name, which gives its position, but without additions such as those of a
+/// repeated download.
 fn release_path(place: &str, file: &str, extension: &str) -> String {
     let stem = Path::new(file).file_stem().and_then(|n| n.to_str()).unwrap_or_default();
     let tile = stem.split(|c: char| !c.is_ascii_alphanumeric()).find(|word| !word.is_empty());
@@ -121,7 +128,7 @@ fn release_path(place: &str, file: &str, extension: &str) -> String {
     }
 }
 
-/// The .prj file beside an ESRI ASCII grid, which says whether it is geographic.
+/// The .prj file next to an ESRI ASCII grid, which states whether its coordinates are geographic.
 fn sidecar(path: &Path, extension: &str) -> Option<PathBuf> {
     Some(path.with_extension("prj")).filter(|prj| extension == "asc" && prj.is_file())
 }
@@ -156,15 +163,15 @@ impl Job for Original {
 }
 
 fn copy(input: &InputFile, work: &Work<'_>, name: &str) -> Result<(), JobError> {
-    let refused = |e| JobError::at(&work.folder.0.join(name), e);
+    let unwritable = |e| JobError::at(&work.folder.0.join(name), e);
     let unreadable = |e: std::io::Error| JobError::input(format!("{}: {e}", input.path.display()));
     let mut from = sastrugi_store::file::open(&input.path).map_err(unreadable)?;
-    let mut to = atomic::AtomicFile::create(&work.output(name)).map_err(refused)?;
-    let (_, sha256) = digest::copy(&mut from, &mut to).map_err(refused)?;
+    let mut to = atomic::AtomicFile::create(&work.output(name)).map_err(unwritable)?;
+    let (_, sha256) = digest::copy(&mut from, &mut to).map_err(unwritable)?;
     if sha256 != input.sha256 {
         return Err(JobError::input(format!("{}: the file changed during the run", input.path.display())));
     }
-    to.commit().map_err(refused)
+    to.commit().map_err(unwritable)
 }
 
 #[cfg(test)]
@@ -172,7 +179,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_places_in_the_release() {
+    fn val_paths_in_the_release() {
         let place = |file: &str| release_path("dem/site", file, &extension(file));
         assert_eq!(place("a/Snow.TIF"), "dem/site.tif");
         assert_eq!(place("tiles/N44W072.hgt"), "dem/site/N44W072.hgt");
@@ -180,9 +187,41 @@ mod tests {
         assert_eq!(place("odd.e n d"), "dem/site.dat");
     }
 
-    /// The name of a tile says where it lies, so it belongs to the key; that of any other file does not.
+    /// A repeated download has additions to its name, which are dropped.
     #[test]
-    fn prop_the_key_follows_what_decides_the_result() {
+    fn val_tiles_keep_only_their_position() {
+        let place = |file: &str| release_path("dem/site", file, &extension(file));
+        assert_eq!(place("N44W072 (1).hgt"), "dem/site/N44W072.hgt");
+        assert_eq!(place("_.hgt"), "dem/site.hgt");
+        assert_eq!(extension("a.toolongext"), "dat");
+        assert!(only_copies(STAGE) && only_copies(MASK_STAGE) && only_copies(INPUT_STAGE) && !only_copies("dem"));
+    }
+
+    /// The copy has the bytes and the hash of the file; a file that changed after it was hashed is refused.
+    #[test]
+    fn val_a_file_is_copied_unless_it_changed() {
+        let (folder, draft) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        std::fs::write(folder.path().join("c.asc"), b"abc").unwrap();
+        std::fs::write(folder.path().join("c.prj"), b"geographic").unwrap();
+        let original = Original::of("dem/site", folder.path(), "c.asc").unwrap();
+        let sha256 = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
+        assert_eq!((original.bytes(), original.release_path(), original.sha256()), (3, "dem/site.asc", sha256));
+        let parents = std::collections::BTreeMap::new();
+        let work = Work { folder: atomic::Draft(draft.path()), parents: &parents };
+        let products = original.run(&work).unwrap().products;
+        let places: Vec<Option<&str>> = products.iter().map(|product| product.release_path.as_deref()).collect();
+        assert_eq!(places, [Some("dem/site.asc"), Some("dem/site.prj")]);
+        assert_eq!(std::fs::read(draft.path().join("site.asc")).unwrap(), b"abc");
+        assert_eq!(std::fs::read(draft.path().join("site.prj")).unwrap(), b"geographic");
+        std::fs::write(folder.path().join("c.asc"), b"abd").unwrap();
+        let error = original.run(&work).unwrap_err();
+        assert!(error.message.ends_with("c.asc: the file changed during the run"), "{error}");
+        assert_eq!(error.cause, crate::job::Cause::Input);
+    }
+
+    /// The name of a tile gives its position, so it is part of the key; the names of other files are not.
+    #[test]
+    fn prop_the_key_depends_only_on_what_determines_the_result() {
         let folder = tempfile::tempdir().unwrap();
         let recipe = |file: &str| {
             std::fs::write(folder.path().join(file), b"x").unwrap();

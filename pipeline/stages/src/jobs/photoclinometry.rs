@@ -1,4 +1,4 @@
-//! Stage `photoclinometry`: a surface from its images.
+//! Stage `photoclinometry`: recovers a surface from its images.
 
 use super::image::{DESCRIPTION, IMAGE};
 use super::original::{self, INPUT_STAGE, Original};
@@ -25,13 +25,13 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "photoclinometry";
-/// Rough time of a cell of one image in a round, s.
+/// Approximate time of a cell of one image in a round, s.
 const SECONDS_PER_SAMPLE: f64 = 4.5e-7;
-/// Rough time of a cell in one perturbed solution, s.
+/// Approximate time of a cell in one perturbed solution, s.
 const SECONDS_PER_PERTURBED: f64 = 1.1e-6;
-/// Memory of a cell beside its images, bytes.
+/// Memory of a cell without its images, bytes.
 const BYTES_PER_CELL: u64 = 600;
-/// Memory of a cell of the surface that the result is compared with, bytes: its heights, and what they are at the cells of the map.
+/// Memory of a cell of the surface with which the result is compared, bytes: its heights, and those heights resampled to the map.
 const BYTES_PER_TRUE_CELL: u64 = 24;
 /// Memory of a cell of one image, bytes.
 const BYTES_PER_SAMPLE: u64 = 48;
@@ -53,22 +53,22 @@ struct PhotoclinometryJob {
     settings: Settings,
     streams: Streams,
     cells: u64,
-    /// Cells of the surface that the images show.
+    /// Number of cells of the surface that the images show.
     truth_cells: u64,
     geotiff: GeoTiff,
 }
 
-/// Measured points, a copy of a file beside the study.
+/// Measured points, copied from a file next to the study.
 #[derive(Clone)]
 struct Altimetry {
     item: ItemRef,
     release_path: String,
 }
 
-/// Adds the items of `[[photoclinometry]]`, and the fits of what they recover.
+/// Adds the items of `[[photoclinometry]]`, and the fits to the surfaces they recover.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)?;
     fit::add_of_recovered(builder)
@@ -150,7 +150,7 @@ fn add_one(
     Ok(())
 }
 
-/// Images of each surface, in the order of the study.
+/// The images of each surface, in the order of the study.
 fn images_by_surface(
     builder: &Builder<'_>,
     entry: &Entry<'_>,
@@ -175,15 +175,15 @@ fn images_by_surface(
     match by_surface.iter().find(|(_, images)| images.len() < 3) {
         Some((surface, images)) => {
             let message =
-                format!("`images` has {} of \"{surface}\"; two slopes and an albedo take at least 3", images.len());
+                format!("`images` has {} of \"{surface}\"; two slopes and an albedo need at least 3", images.len());
             Err(entry.error("images", message).into())
         }
-        None if by_surface.is_empty() => Err(entry.error("images", "`images` is empty; it takes at least 3").into()),
+        None if by_surface.is_empty() => Err(entry.error("images", "`images` is empty; at least 3 are needed").into()),
         None => Ok(by_surface),
     }
 }
 
-/// Refuses suns that cannot tell slopes from albedo, as they are told to the inversion.
+/// Refuses sun directions, as given to the inversion, that cannot separate slopes from albedo.
 fn check_suns(entry: &Entry<'_>, images: &[Image], settings: &Settings) -> Result<(), BuildError> {
     let sun = |(k, image): (usize, &Image)| match k {
         0 => settings.first_image_errors.sun(image.sun).direction(),
@@ -228,12 +228,12 @@ fn coarse(
             Err(entry.error("coarse", "`coarse` needs `coarse_sigma_m`, the standard deviation of its heights").into())
         }
         (None, Some(_)) => {
-            Err(entry.error("coarse_sigma_m", "`coarse_sigma_m` is that of `coarse`, which is missing").into())
+            Err(entry.error("coarse_sigma_m", "`coarse_sigma_m` describes `coarse`, which is missing").into())
         }
     }
 }
 
-/// Cells of the map, roughly: as many as the images have pixels, where its cells are not stated.
+/// Approximate number of cells of the map: the number of pixels of the largest image, unless `cell_m` is given.
 fn cells(truth: &Heightfield, settings: &Settings, images: &[Image]) -> u64 {
     match truth.expected.zip(settings.cell_m) {
         Some((g, cell_m)) => (g.size()[0] * g.size()[1] / (cell_m * cell_m)) as u64,
@@ -246,7 +246,7 @@ impl PhotoclinometryJob {
         format!("photoclinometry/{}.{ending}", self.id)
     }
 
-    /// The measured points. Messages are part of the release: they name the file as it is called there.
+    /// The measured points. Messages are part of the release, so they use the file's path in the release.
     fn points(&self, work: &Work<'_>) -> Result<Vec<HeightPoint>, JobError> {
         let Some(Altimetry { item, release_path }) = &self.altimetry else { return Ok(Vec::new()) };
         let path = work.parent(item, original::name(release_path))?;
@@ -278,7 +278,7 @@ impl PhotoclinometryJob {
             .as_ref()
             .map_or(f64::NAN, |s| sums::mean(&known(&s.values).iter().map(|v| v * v).collect::<Vec<_>>()).sqrt());
         let e = made.evaluation;
-        let figure =
+        let metric =
             |of: fn(&sastrugi_imaging::photoclinometry::evaluation::Evaluation) -> f64| e.as_ref().map_or(f64::NAN, of);
         PhotoclinometryRow {
             photoclinometry_id: self.id.clone(),
@@ -303,14 +303,14 @@ impl PhotoclinometryJob {
             height_sigma_m: sigma,
             albedo_mean: sums::mean(&known(&r.albedo.values)),
             cells: e.map(|e| e.cells as i64),
-            shaded_correlation: figure(|e| e.shaded_correlation),
-            shaded_correlation_ceiling: figure(|e| e.shaded_correlation_ceiling),
-            slope_error_rms: figure(|e| e.slope_error_rms),
-            slope_error_rms_ceiling: figure(|e| e.slope_error_rms_ceiling),
-            slope_rms: figure(|e| e.slope_rms),
-            height_error_rms_m: figure(|e| e.height_error_rms_m),
-            height_error_rms_detrended_m: figure(|e| e.height_error_rms_detrended_m),
-            height_rms_m: figure(|e| e.height_rms_m),
+            shaded_correlation: metric(|e| e.shaded_correlation),
+            shaded_correlation_ceiling: metric(|e| e.shaded_correlation_ceiling),
+            slope_error_rms: metric(|e| e.slope_error_rms),
+            slope_error_rms_ceiling: metric(|e| e.slope_error_rms_ceiling),
+            slope_rms: metric(|e| e.slope_rms),
+            height_error_rms_m: metric(|e| e.height_error_rms_m),
+            height_error_rms_detrended_m: metric(|e| e.height_error_rms_detrended_m),
+            height_rms_m: metric(|e| e.height_rms_m),
             path: self.released("tif"),
         }
     }
@@ -392,7 +392,7 @@ impl Job for PhotoclinometryJob {
     }
 }
 
-/// True for an id of the study's recovered surfaces, or while these are still to come.
+/// True if the id names a recovered surface, or if it is unknown so far and the study declares recovered surfaces.
 pub(super) fn may_be_recovered(builder: &Builder<'_>, id: &str) -> bool {
     let sections = [STAGE, image::STAGE];
     let declared = sections.iter().all(|s| builder.study.entries(s).is_ok_and(|entries| !entries.is_empty()));

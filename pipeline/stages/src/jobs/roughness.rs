@@ -1,4 +1,4 @@
-//! Stage `roughness`: every heightfield of a study described and classified.
+//! Stage `roughness`: describes and classifies every heightfield of a study.
 
 use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield};
@@ -22,16 +22,16 @@ pub const CLASSES: &str = "classes.tif";
 /// Class map before closing.
 pub const CLASSES_RAW: &str = "classes.raw.tif";
 
-/// Rough time of a cell, s: gradients, pair sums and spectra, and the class maps that are written. Cells are measured from 256 x 256 to
-/// 2048 x 2048.
+/// Approximate time per cell, s: gradients, pair sums, spectra, and writing the class maps. Measured on grids from 256 x 256 to
+/// 2048 x 2048 cells.
 const SECONDS_PER_CELL: f64 = 6e-7;
 
 /// Adds one item for every heightfield of the study, which describes and classifies it.
 ///
 /// # Errors
-/// None of a study's own.
+/// Only from adding items to the graph; no study causes one.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    // One for all: what is known of each of many items is little.
+    // Shared by all items, to keep the memory of each small.
     let section = Arc::new(builder.study.roughness.clone());
     let node = |(id, field): (&String, &Heightfield)| Node {
         item: item(id),
@@ -58,7 +58,7 @@ impl RoughnessJob {
             terrain_id: self.id.clone(),
             group: self.field.group.clone(),
             variant: self.field.variant.clone(),
-            // Known when a release is assembled: another split must not make anything again.
+            // Filled in when the release is assembled: changing the split must not recompute anything.
             split: None,
             stage: self.field.item.stage.clone(),
             kind: self.field.kind.clone(),
@@ -105,7 +105,7 @@ impl Job for RoughnessJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, and the padded transforms of pair sums: 81 bytes a cell measured at 4096 x 4096 with holes.
+        // Heights, and the padded transforms of pair sums: 81 bytes per cell, measured at 4096 x 4096 cells with holes.
         (64 << 20) + 88 * self.field.cells
     }
 

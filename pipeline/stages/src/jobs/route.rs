@@ -1,4 +1,4 @@
-//! Stage `route`: paths from starts to goals over each terrain.
+//! Stage `route`: plans paths from starts to goals on each terrain.
 
 use super::mask::{self, Mask};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
@@ -30,31 +30,31 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "route";
-/// The heights that were planned on, without data where a cell cannot be entered.
+/// The heights used for planning, with no data in cells that cannot be entered.
 pub const GROUND: &str = "ground.tif";
-/// Cells that obstacles block.
+/// Cells blocked by obstacles.
 const BLOCKED: &str = "blocked.tif";
 /// The planned routes, for teams.
 const ROUTES: &str = "routes.json";
 /// The planned routes, for the release.
 const LINES: &str = "routes.geojson";
 
-/// The ways to search.
+/// The search methods.
 pub fn kinds() -> Vec<Kind> {
     let kind = |method: Method| {
         let (summary, source) = match method {
             Method::Grid => {
-                ("A* over every cell", "Hart, Nilsson and Raphael (1968); costs after Bayrak (2008), section 3")
+                ("A* over all cells", "Hart, Nilsson and Raphael (1968); costs after Bayrak (2008), section 3")
             }
             Method::Roadmap => (
                 "A* over a roadmap of the cells where the ground changes",
                 "Bayrak (2008), Algorithms 1 to 5, corrected",
             ),
             Method::ThetaStar => {
-                ("straight legs at any angle over every cell", "Nash, Koenig and Tovey (2010), lazy Theta*")
+                ("straight legs at any angle over all cells", "Nash, Koenig and Tovey (2010), lazy Theta*")
             }
             Method::Anytime => (
-                "weighted A* over every cell that improves its path, within a bound or a number of expansions",
+                "weighted A* over all cells that keeps improving its path, up to a cost bound or a number of expansions",
                 "Likhachev, Gordon and Thrun (2003)",
             ),
         };
@@ -63,12 +63,12 @@ pub fn kinds() -> Vec<Kind> {
     Method::ALL.map(kind).into()
 }
 
-/// The parameters of the search and of drawn pairs, side by side.
+/// The parameters of the search and of drawn pairs in one schema.
 fn schema() -> Value {
     keys::schema_of_both::<RouteParameters, PairParameters>()
 }
 
-/// What is planned: the same on every terrain.
+/// A search with its settings, the same on every terrain.
 struct RouteSearch {
     /// Id; routes are named `<id>-0001`.
     id: String,
@@ -82,10 +82,10 @@ struct RouteSearch {
     roughness: RoughnessSection,
 }
 
-/// Where routes begin and end.
+/// Starts and goals of the routes.
 #[derive(Clone)]
 enum Pairs {
-    /// Stated, in the terrain's coordinates, m.
+    /// Given in the coordinates of the terrain, m.
     Given([[f64; 2]; 2]),
     /// Drawn on each terrain.
     Drawn { rules: PairParameters, count: usize },
@@ -110,7 +110,7 @@ impl Pairs {
 /// Adds the items of `[[route]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -122,7 +122,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let cost_raster = envelope.cost_raster.as_deref().map(|id| builder.surface(entry, "cost_raster", id));
     let cost_raster = cost_raster.transpose()?.map(|field| field.item.clone());
     let vehicle = envelope.vehicle.as_deref().map(|name| registry::vehicle(name, &Map::new()));
-    let vehicle = vehicle.transpose().map_err(|e| entry.error("vehicle", format!("`vehicle` {e}")))?;
+    let vehicle = vehicle.transpose().map_err(|e| entry.refuse(e))?;
     let obstacles = mask::add_obstacles(builder, entry, &envelope)?;
     let mut family = Vec::new();
     for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
@@ -154,7 +154,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
 /// Ids of the terrains that a key `terrains` names.
 fn terrains(builder: &Builder<'_>, entry: &Entry<'_>, named: &[String]) -> Result<BTreeSet<String>, StudyError> {
     if named.is_empty() {
-        return Err(entry.error("terrains", "`terrains` is empty; it names the terrains to plan on"));
+        return Err(entry.error("terrains", "`terrains` is empty; name the terrains to plan on"));
     }
     let mut ids = BTreeSet::new();
     for (k, id) in named.iter().enumerate() {
@@ -173,15 +173,14 @@ fn pairs(entry: &Entry<'_>, envelope: &RouteItem, rules: PairParameters) -> Resu
         }
         (Some(_), Some(_)) => Err(entry.error(
             "start",
-            "`start` and `goal` are stated, so that `pairs`, `distance_min_m` and `border_m`, which are for drawn ones, have no \
-             meaning",
+            "`start` and `goal` cannot be combined with `pairs`, `distance_min_m` or `border_m`, which apply only to drawn pairs",
         )),
         (None, None) => match envelope.pairs.unwrap_or(1) {
             0 => Err(entry.error("pairs", "`pairs` is 0; it must be 1 or more")),
             count => Ok(Pairs::Drawn { rules, count: count as usize }),
         },
-        (Some(_), None) => Err(entry.error("start", "`start` is stated without `goal`; state both, or none to draw them")),
-        (None, Some(_)) => Err(entry.error("goal", "`goal` is stated without `start`; state both, or none to draw them")),
+        (Some(_), None) => Err(entry.error("start", "`start` is given without `goal`; give both, or neither to draw them")),
+        (None, Some(_)) => Err(entry.error("goal", "`goal` is given without `start`; give both, or neither to draw them")),
     }
 }
 
@@ -217,11 +216,11 @@ fn add_search(
 }
 
 struct RouteJob {
-    /// The same on every terrain, of which there may be many.
+    /// Shared by all terrains, of which there may be many.
     search: Arc<RouteSearch>,
     terrain: String,
     field: Heightfield,
-    /// Pairs are drawn by this word: the terrain, or what it shares with others.
+    /// Names the stream of drawn pairs: the terrain, or a word shared by terrains with common draws.
     word: String,
     streams: Streams,
 }
@@ -245,7 +244,7 @@ impl RouteSearch {
         Ok((Site::new(&read.grid, &self.parameters, &given)?, read))
     }
 
-    /// Everything that decides the routes on a terrain.
+    /// Everything that determines the routes on a terrain.
     fn recipe(&self) -> Value {
         json!({
             "parameters": self.parameters,
@@ -264,7 +263,7 @@ impl RouteSearch {
     }
 }
 
-/// What teams need of the routes and of the ground that they were planned on, beside its heights.
+/// The routes and the properties of their ground that teams need, except its heights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedRoutes {
     /// Steepest climb and descent, degrees.
@@ -277,28 +276,28 @@ pub struct PlannedRoutes {
     pub routes: Vec<PlannedRoute>,
 }
 
-/// A route as teams and missions take it, in the coordinates of the heights.
+/// A route as teams and missions use it, in the coordinates of the heights.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PlannedRoute {
     /// Number of its pair, from 0.
     pub index: usize,
-    /// The smoothed path with heights, m; empty where none was found.
+    /// The smoothed path with heights, m; empty if none was found.
     pub points_m: Vec<[f64; 3]>,
-    /// The path as the search found it, m.
+    /// The path found by the search, before smoothing, m.
     pub searched_m: Vec<[f64; 3]>,
 }
 
 /// The routes that an item planned.
 ///
 /// # Errors
-/// When the item is no parent, or its file cannot be read.
+/// When the item is not a parent, or its file cannot be read.
 pub fn read(work: &Work<'_>, item: &ItemRef) -> Result<PlannedRoutes, JobError> {
     let path = work.parent(item, ROUTES)?;
     let bytes = std::fs::read(&path).map_err(|e| JobError::at(&path, e))?;
     serde_json::from_slice(&bytes).map_err(JobError::new)
 }
 
-/// Name of a route: that of its search and its number.
+/// Id of a route: the id of its search and its number.
 pub fn route_id(search: &str, index: usize) -> String {
     format!("{search}-{:04}", index + 1)
 }
@@ -315,7 +314,7 @@ impl RouteJob {
         }
     }
 
-    /// Pairs that are stated are the same wherever their coordinates are; drawn ones where the draw is.
+    /// Given pairs are identified by terrain and coordinates, drawn pairs by their draw.
     fn pair_id(&self, pair: &Pair, index: usize) -> String {
         match &self.search.pairs {
             Pairs::Given([[x0, y0], [x1, y1]]) => format!("{}:{x0},{y0}:{x1},{y1}", self.terrain),
@@ -379,7 +378,7 @@ impl RouteJob {
         format!("route/{}/{}.geojson", self.terrain, self.search.id)
     }
 
-    /// Writes the routes as GeoJSON in the coordinates of the terrain's own file; nothing where there are none.
+    /// Writes the routes as GeoJSON in the coordinates of the terrain's own file, if there are any.
     fn write_lines(
         &self,
         work: &Work<'_>,
@@ -406,7 +405,7 @@ impl RouteJob {
         Ok(Some(Product::released(LINES, self.release_path(), None)))
     }
 
-    /// Writes the cells that obstacles block; nothing where there are none.
+    /// Writes the cells blocked by obstacles, if there are any.
     fn write_blocked(&self, work: &Work<'_>, site: &Site, read: &dem::Dem) -> Result<Option<Product>, JobError> {
         let Some(blocked) = site.blocked_cells() else { return Ok(None) };
         dem::write_classes(&work.output(BLOCKED), &blocked, &read.info.crs).map_err(JobError::io)?;
@@ -497,9 +496,9 @@ impl Job for RouteJob {
     }
 }
 
-/// The sentence on pairs without a route.
+/// A note on pairs without a route.
 fn notes(rows: &[RouteRow]) -> Vec<String> {
     let without = rows.iter().filter(|row| row.outcome != "found").count();
-    let note = format!("{without} of {} pairs of start and goal have no route within the limits", rows.len());
+    let note = format!("{without} of {} start-goal pairs have no route within the limits", rows.len());
     (without > 0).then_some(note).into_iter().collect()
 }

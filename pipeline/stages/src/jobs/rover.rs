@@ -1,4 +1,4 @@
-//! Stage `rover`: rovers that find their own way on each terrain.
+//! Stage `rover`: drives rovers, which find their own way with limited sensing, on each terrain.
 
 use super::rover_designs;
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
@@ -28,18 +28,18 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "rover";
-/// Distance between samples when none is given, m.
+/// Default distance between samples, m.
 const SAMPLE_M: f64 = 0.5;
-/// Rovers that are recorded when no number is given: one of each terrain.
+/// Default number of rovers recorded on each terrain.
 const RECORD: u32 = 1;
-/// Memory of a recorded cycle, with its messages, bytes.
+/// Memory of a recorded cycle including its messages, bytes.
 const BYTES_PER_RECORDED_CYCLE: u64 = 6000;
-/// Rules of the two navigators, which the planner does not have.
+/// Steering rules of the two reactive navigators, which the planner does not have.
 const RULES: [&str; 7] =
     ["bearing_tolerance_rad", "turn_noise_rad", "pass_m", "commit_m", "commit_growth", "commit_max_m", "progress_m"];
-/// Rough time of a cycle, s.
+/// Approximate time of a cycle, s.
 const SECONDS_PER_CYCLE: f64 = 1.1e-4;
-/// Rough time of a square metre of a planetary world that a rover which knows the whole map is led over, s.
+/// Approximate time per square metre of a planetary world to find the path of a rover that knows the complete map, s.
 const SECONDS_PER_KNOWN_M2: f64 = 8e-4;
 
 /// The navigators.
@@ -51,23 +51,23 @@ pub fn kinds() -> Vec<Kind> {
     vec![
         kind(
             Navigator::SOJOURNER,
-            "20 ranges and a tilt: turns away from hazards, passes them, turns back to the goal",
+            "20 ranges and a tilt sensor: turns away from hazards, passes them and turns back to the goal",
             "JPL synthetic terrain environment, section 3; Mishkin et al. (1998)",
         ),
         kind(
             Navigator::SCHOPPERS,
-            "four rectangles ahead, safe or unsafe by perfect sensing: keeps what is straight ahead safe",
+            "four rectangles ahead, classified as safe or unsafe by perfect sensing: keeps the path straight ahead safe",
             "JPL synthetic terrain environment, section 4",
         ),
         kind(
             Navigator::PLANNER,
-            "D* Lite over what the sensor of one of the two others has shown: to compare them with",
+            "D* Lite on the map seen so far by the sensor of either of the other two: a baseline for them",
             "Koenig and Likhachev (2002); the rest is our choice",
         ),
     ]
 }
 
-/// Parameters of a navigator and of its trial, side by side; `None` for an unknown one.
+/// Parameters of a navigator and of its trial in one schema; `None` if the navigator is unknown.
 fn schema(kind: &str) -> Option<Value> {
     match kind {
         Navigator::SOJOURNER => Some(keys::schema_of_both::<SojournerParameters, RoverParameters>()),
@@ -77,7 +77,7 @@ fn schema(kind: &str) -> Option<Value> {
     }
 }
 
-/// Parameters of the planner: those of bodies and sensors of both navigators, without their rules.
+/// Parameters of the planner: the body and sensor parameters of both navigators, without their rules.
 fn planner_schema() -> Value {
     let mut schema = keys::schema_of_both::<SojournerParameters, RoverParameters>();
     let [mut others, own] = [schema_of::<SchoppersParameters>(), schema_of::<PlannerMap>()];
@@ -105,7 +105,7 @@ fn planner_schema() -> Value {
     schema
 }
 
-/// Every parameter of a navigator, as a study names it; of the planner without the rules of the one whose sensor it has.
+/// Every parameter of a navigator under its name in the study. For the planner, the rules of the navigator whose sensor it uses are left out.
 pub fn parameters(navigator: &Navigator) -> Value {
     let mut all = json!(navigator);
     if let (Navigator::Planner(_), Some(map)) = (navigator, all.as_object_mut()) {
@@ -114,7 +114,7 @@ pub fn parameters(navigator: &Navigator) -> Value {
     all
 }
 
-/// Refuses keys of the navigators that a planner does not have: rules, and what belongs to the other sensor.
+/// Refuses navigator keys that do not apply to a planner: rules, and parameters of the other sensor.
 fn check_planner_keys(params: &Value) -> Result<(), ParameterError> {
     let [rays, rectangles] = [schema_of::<SojournerParameters>(), schema_of::<SchoppersParameters>()]
         .map(|schema| keys::properties(&schema));
@@ -125,12 +125,11 @@ fn check_planner_keys(params: &Value) -> Result<(), ParameterError> {
     };
     for key in params.as_object().into_iter().flat_map(|map| map.keys()) {
         if RULES.contains(&key.as_str()) {
-            let message = "is a rule of the navigators to compare with; `planner` has none, it searches its way";
+            let message = "is a rule of the reactive navigators; `planner` has none, it searches for its path";
             return Err(ParameterError::new(key, message));
         }
         if other.contains(key) && !own.contains(key) {
-            let message =
-                format!("is a parameter of `{kind}`, which a `planner` with sensor = \"{sensor}\" does not have");
+            let message = format!("is a parameter of `{kind}`; a `planner` with sensor = \"{sensor}\" does not use it");
             return Err(ParameterError::new(key, message));
         }
     }
@@ -154,7 +153,7 @@ fn read_planner(params: &Value) -> Result<(Navigator, RoverParameters), Paramete
 /// A navigator and its trial, checked.
 ///
 /// # Errors
-/// A wrong value; an unknown kind must have been refused.
+/// A value out of range. The caller must already have refused unknown kinds.
 pub fn prepare(kind: &str, params: &Value) -> Result<(Navigator, RoverParameters), ParameterError> {
     let (navigator, trial) = match kind {
         Navigator::SOJOURNER => keys::read_both(params).map(|(own, trial)| (Navigator::Sojourner(own), trial)),
@@ -167,7 +166,7 @@ pub fn prepare(kind: &str, params: &Value) -> Result<(Navigator, RoverParameters
     Ok((navigator, trial))
 }
 
-/// Who drives: the same on every terrain.
+/// A navigator and its settings, the same on every terrain.
 struct Trial {
     /// Id; rovers are named `<id>-0001`.
     id: String,
@@ -176,13 +175,13 @@ struct Trial {
     navigator: Navigator,
     parameters: RoverParameters,
     sample_m: f64,
-    /// Rovers that are recorded, the first ones.
+    /// Number of rovers recorded, counted from the first.
     record: usize,
     head: StudyHead,
 }
 
 struct RoverJob {
-    /// The same on every terrain, of which there may be many.
+    /// Shared by all terrains, of which there may be many.
     trial: Arc<Trial>,
     terrain: String,
     field: Heightfield,
@@ -192,7 +191,7 @@ struct RoverJob {
 /// Adds the items of `[[rover]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -201,7 +200,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let (envelope, params): (RoverItem, Value) = entry.read()?;
     let Some(schema) = schema(&envelope.kind) else { return Err(unknown(entry, &envelope.kind).into()) };
     let check_keys = |params: &Value| -> Result<(), BuildError> {
-        // First, since it knows why the keys of the navigators are none of a planner's.
+        // Checked first because its message explains why a planner does not accept keys of the other navigators.
         if envelope.kind == Navigator::PLANNER {
             check_planner_keys(params).map_err(|e| entry.refuse(e))?;
         }
@@ -226,12 +225,12 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
 
 fn unknown(entry: &Entry<'_>, kind: &str) -> StudyError {
     let known: Vec<String> = kinds().iter().map(|k| format!("`{}`", k.kind)).collect();
-    entry.error("kind", format!("`{kind}` is not a navigator; the known ones are {}", known.join(", ")))
+    entry.error("kind", format!("`{kind}` is not a navigator; known navigators: {}", known.join(", ")))
 }
 
 fn terrains(builder: &Builder<'_>, entry: &Entry<'_>, named: &[String]) -> Result<BTreeSet<String>, StudyError> {
     if named.is_empty() {
-        return Err(entry.error("terrains", "`terrains` is empty; it names the terrains to drive on"));
+        return Err(entry.error("terrains", "`terrains` is empty; name the terrains to drive on"));
     }
     let mut ids = BTreeSet::new();
     for (k, id) in named.iter().enumerate() {
@@ -257,22 +256,22 @@ fn add_one(
     builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
 }
 
-/// Streams of starts and noise on a terrain. Named by the table, not by the swept part, so that every value of a sweep and every perturbed
-/// design has the same ones.
+/// Streams of starts and noise on a terrain. They are named after the table without its swept part, so that every value of a sweep and
+/// every perturbed design shares them.
 pub fn streams(builder: &Builder<'_>, envelope: &RoverItem, terrain: &str, field: &Heightfield) -> Streams {
     let shared = field.replicate.filter(|_| builder.is_paired() && field.geometry.is_some());
     let word = shared.map_or_else(|| terrain.to_owned(), common);
     builder.streams(STAGE, &format!("{}@{word}", envelope.id), envelope.seed, shared.unwrap_or(0))
 }
 
-/// Rough cost of the rovers of a trial on one terrain.
+/// Approximate cost of the rovers of a trial on one terrain.
 pub fn estimate(parameters: &RoverParameters) -> Estimate {
-    // A way twice as long as the straight one, 10 cycles a metre.
+    // Assumes a path twice as long as the straight line, at 10 cycles per metre.
     let cycles = 20.0 * parameters.straight_m() * f64::from(parameters.rovers);
     Estimate { seconds: SECONDS_PER_CYCLE * cycles, bytes: 40.0 * cycles / 10.0 }
 }
 
-/// One rover: its row and its samples, and its recording, which is on disk.
+/// The results of one rover: its row, its samples, and its recording, which is already on disk.
 struct Driven {
     row: RoverRow,
     samples: Vec<RoverSampleRow>,
@@ -308,7 +307,7 @@ impl RoverJob {
         }
         let note = rovers::note(&drive, &task);
         let recording = recorder.map(|recorder| recorder.finish(&drive, tracked.states, note.as_deref()));
-        // A rover that ends before its first look has nothing to show.
+        // A rover that ends before its first cycle leaves nothing to record.
         let recording = recording.filter(|recording| !recording.cycles.is_empty());
         let mut row = RoverRow {
             terrain_id: self.terrain.clone(),
@@ -356,7 +355,7 @@ impl RoverJob {
         Ok(Driven { row, samples, products })
     }
 
-    /// Writes a recording, and where it is into the row.
+    /// Writes a recording and stores its path in the row.
     fn write_recording(
         &self,
         work: &Work<'_>,
@@ -397,7 +396,7 @@ impl RoverJob {
         Ok(products)
     }
 
-    /// Records that a viewer of one file needs to know where it came from.
+    /// Metadata that states the origin of a recording that is read on its own.
     fn metadata(&self, row: &RoverRow, heights_sha256: &str) -> BTreeMap<String, BTreeMap<String, String>> {
         let head = &self.trial.head;
         let study = [("name", head.name.clone()), ("seed", head.seed.to_string()), ("license", head.license.clone())];
@@ -429,14 +428,14 @@ impl RoverJob {
     }
 }
 
-/// Sentences on rovers that did not arrive.
+/// Notes on rovers that did not reach their goal.
 fn notes(rows: &[Driven]) -> Vec<String> {
     let endings = [
         ("lost", "stopped where they wrongly believed the goal to be"),
-        ("no_way", "found no way on"),
+        ("no_way", "found no way forward"),
         ("distance_limit", "reached the distance limit"),
         ("cycle_limit", "reached the cycle limit"),
-        ("off_ground", "came to the end of the known ground"),
+        ("off_ground", "reached the edge of the known ground"),
     ];
     let note = |(name, words): (&str, &str)| {
         let count = rows.iter().filter(|d| d.row.outcome == name).count();
@@ -461,7 +460,7 @@ impl Job for RoverJob {
                 let head = &self.trial.head;
                 json!({ "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns, "mcap": head.mcap })
             }),
-            // The world goes on beyond the heights of the item.
+            // The world extends beyond the heights of the item.
             "world": [*self.field.parameters, json!(self.field.stream())],
         })
     }
@@ -483,7 +482,7 @@ impl Job for RoverJob {
 
     fn estimate(&self) -> Estimate {
         let driven = estimate(&self.trial.parameters);
-        // The world is made around all starts and goals.
+        // The world is generated around all starts and goals.
         let side_m = 2.0 * self.trial.parameters.straight_m();
         let is_world = self.field.kind == sastrugi_terrain::planetary::KIND;
         let known = if is_world { SECONDS_PER_KNOWN_M2 * side_m * side_m } else { 0.0 };

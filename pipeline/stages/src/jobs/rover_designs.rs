@@ -1,4 +1,4 @@
-//! Stage `rover_designs`: the perturbed designs of a rover stage, one item for each trajectory and terrain.
+//! Stage `rover_designs`: drives the perturbed designs of a rover stage, one item per trajectory and terrain.
 
 use super::perturbation::{Design, Perturbation};
 use super::rover::{self, prepare};
@@ -22,7 +22,7 @@ use std::sync::Arc;
 /// Name of the stage.
 pub const STAGE: &str = "rover_designs";
 
-/// What is tried: the same on every terrain.
+/// A trial and its perturbed designs, the same on every terrain.
 pub struct Trial {
     /// Id of the rover stage.
     pub id: String,
@@ -30,7 +30,7 @@ pub struct Trial {
     pub kind: String,
     /// Swept parameters.
     pub variant: Option<String>,
-    /// The unperturbed trial, with as many rovers as a design has.
+    /// The unperturbed trial, with the number of rovers of a design.
     pub parameters: RoverParameters,
     /// The designs.
     pub perturbation: Perturbation,
@@ -40,15 +40,15 @@ struct DesignsJob {
     trial: Arc<Trial>,
     terrain: String,
     field: Heightfield,
-    /// Position of the trajectory.
+    /// Index of the trajectory.
     number: usize,
     streams: Streams,
 }
 
-/// Adds the perturbed designs of a rover stage and what becomes of them, where the study asks for them.
+/// Adds the perturbed designs of a rover stage and their effects, if the study has `perturb`.
 ///
 /// # Errors
-/// Settings that no design can be made of.
+/// Settings that yield no design.
 pub fn add(
     builder: &mut Builder<'_>,
     entry: &Entry<'_>,
@@ -57,7 +57,7 @@ pub fn add(
     terrains: &BTreeSet<String>,
 ) -> Result<(), StudyError> {
     let Some(settings) = &envelope.perturb else { return Ok(()) };
-    // Named by the table, not by the swept part: every value of a sweep has the same trajectories.
+    // Named after the table without its swept part, so that every value of a sweep has the same trajectories.
     let streams = builder.streams(STAGE, &envelope.id, envelope.seed, 0);
     let perturbation =
         Perturbation::new(&envelope.kind, &one.params, settings, &streams).map_err(|e| entry.refuse(e))?;
@@ -68,7 +68,7 @@ pub fn add(
     let mut items = Vec::new();
     for terrain in terrains {
         let Some(field) = builder.heightfields.get(terrain).cloned() else { continue };
-        for number in 0..trial.perturbation.ways.len() {
+        for number in 0..trial.perturbation.trajectories.len() {
             let item = ItemRef::new(STAGE, &format!("{}@{terrain}@{:03}", trial.id, number + 1));
             let streams = rover::streams(builder, envelope, terrain, &field);
             let (parents, stream) = (vec![field.item.clone()], Some(streams.label()));
@@ -83,7 +83,7 @@ pub fn add(
 
 impl DesignsJob {
     fn designs(&self) -> &[Design] {
-        &self.trial.perturbation.ways[self.number].designs
+        &self.trial.perturbation.trajectories[self.number].designs
     }
 
     /// Drives the rovers of all designs, design by design.
@@ -101,7 +101,7 @@ impl DesignsJob {
     /// The row of a design, from the drives of its rovers.
     fn row(&self, step: usize, design: &Design, drives: &[Drive]) -> RoverDesignRow {
         let Trial { id, variant, perturbation, .. } = &*self.trial;
-        let moved = step.checked_sub(1).map(|before| perturbation.ways[self.number].order[before]);
+        let moved = step.checked_sub(1).map(|before| perturbation.trajectories[self.number].order[before]);
         let count = |f: fn(&Drive) -> bool| drives.iter().filter(|d| f(d)).count() as i64;
         let mean = |f: fn(&Drive) -> f64| sums::mean(&drives.iter().map(f).collect::<Vec<_>>());
         RoverDesignRow {
@@ -135,7 +135,7 @@ impl Job for DesignsJob {
             "variant": joined(self.field.variant.as_deref(), self.trial.variant.as_deref()),
             "terrain": self.terrain,
             "group": self.field.group,
-            // The world goes on beyond the heights of the item.
+            // The world extends beyond the heights of the item.
             "world": [*self.field.parameters, json!(self.field.stream())],
         })
     }

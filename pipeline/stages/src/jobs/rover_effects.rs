@@ -1,4 +1,4 @@
-//! Stage `rover_effects`: which number of a navigator matters most, from the designs that were tried.
+//! Stage `rover_effects`: ranks the parameters of a navigator by their effects, estimated from the perturbed designs.
 
 use super::rover_designs::Trial;
 use crate::builder::Builder;
@@ -18,11 +18,11 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "rover_effects";
-/// Redraws behind an interval.
+/// Number of redraws for an interval.
 const REDRAWS: usize = 2000;
 /// Coverage of the intervals.
 const LEVEL: f64 = 0.95;
-/// What designs are judged by, in the order of their names.
+/// Measures by which designs are compared, sorted by name.
 const MEASURES: [Measure; 3] = [
     Measure { name: "arrival", unit: "1", of: |row| row.arrived as f64 / row.rovers as f64 },
     Measure { name: "distance_m", unit: "m", of: |row| row.distance_m },
@@ -42,21 +42,21 @@ pub struct Source {
     pub item: ItemRef,
     /// The terrain.
     pub terrain: String,
-    /// Position of the trajectory.
+    /// Index of the trajectory.
     pub number: usize,
 }
 
 struct EffectsJob {
     trial: Arc<Trial>,
-    /// Items of every group of terrains, by label and swept parameters: terrain after terrain, and of each trajectory after trajectory.
+    /// Items of every group of terrains, by label and swept parameters; sorted by terrain, then by trajectory.
     groups: BTreeMap<[String; 2], Vec<Source>>,
     streams: Streams,
 }
 
-/// Adds the item that makes effects of the designs of a rover stage.
+/// Adds the item that computes effects from the designs of a rover stage.
 ///
 /// # Errors
-/// When it cannot be placed in the graph.
+/// When it cannot be added to the graph.
 pub fn add(
     builder: &mut Builder<'_>,
     envelope: &RoverItem,
@@ -90,7 +90,7 @@ impl EffectsJob {
 
     /// A measure of every design of a group.
     fn outputs(&self, sources: &[Source], rows: &[Vec<RoverDesignRow>], measure: &Measure) -> Outputs {
-        let mut outputs: Outputs = vec![Vec::new(); self.trial.perturbation.ways.len()];
+        let mut outputs: Outputs = vec![Vec::new(); self.trial.perturbation.trajectories.len()];
         for (source, rows) in sources.iter().zip(rows) {
             outputs[source.number].push(rows.iter().map(measure.of).collect());
         }
@@ -101,10 +101,10 @@ impl EffectsJob {
     fn effects(&self, outputs: &Outputs) -> Vec<Vec<Vec<f64>>> {
         let perturbation = &self.trial.perturbation;
         let mut effects = vec![vec![Vec::new(); outputs.len()]; perturbation.perturbed.len()];
-        for (t, (way, worlds)) in perturbation.ways.iter().zip(outputs).enumerate() {
-            let points: Vec<Vec<f64>> = way.designs.iter().map(|design| design.factors.clone()).collect();
+        for (t, (trajectory, worlds)) in perturbation.trajectories.iter().zip(outputs).enumerate() {
+            let points: Vec<Vec<f64>> = trajectory.designs.iter().map(|design| design.factors.clone()).collect();
             for values in worlds {
-                let of = elementary_effects(&points, &way.order, values);
+                let of = elementary_effects(&points, &trajectory.order, values);
                 of.into_iter().enumerate().for_each(|(k, effect)| effects[k][t].push(effect));
             }
         }
@@ -114,7 +114,7 @@ impl EffectsJob {
     /// Rows of a measure of a group, by parameter.
     fn measured(&self, [group, variant]: &[String; 2], measure: &Measure, outputs: &Outputs) -> Vec<RoverEffectRow> {
         let perturbation = &self.trial.perturbation;
-        // One stream for all measures, so that they are judged on the same redraws.
+        // One stream for all measures, so that they share the same redraws.
         let mut stream = self.streams.stream(&format!("redraws {group} {variant}"));
         let found = screen(&self.effects(outputs), REDRAWS, LEVEL, &mut stream);
         let all: Vec<f64> = outputs.iter().flatten().flatten().copied().collect();
@@ -148,7 +148,7 @@ impl EffectsJob {
         perturbation.perturbed.iter().zip(&found).map(row).collect()
     }
 
-    /// What a reader of the effects must know.
+    /// Notes for readers of the effects.
     fn notes(&self) -> Vec<String> {
         let perturbation = &self.trial.perturbation;
         let mut notes: Vec<String> =
@@ -158,18 +158,18 @@ impl EffectsJob {
             let of = if variant.is_empty() { group.clone() } else { format!("{group} with {variant}") };
             if worlds < 2 {
                 notes
-                    .push(format!("effects in {of} have no intervals: they need two worlds or more, and there is one"));
+                    .push(format!("effects in {of} have no intervals: they need two worlds or more, but there is one"));
             }
         }
-        if perturbation.ways.len() < 2 {
+        if perturbation.trajectories.len() < 2 {
             notes.push("effects have neither intervals nor sigma: they need two trajectories or more".to_owned());
         }
         notes
     }
 
     fn designs(&self) -> f64 {
-        let of_way = self.trial.perturbation.perturbed.len() + 1;
-        (of_way * self.groups.values().map(Vec::len).sum::<usize>()) as f64
+        let of_trajectory = self.trial.perturbation.perturbed.len() + 1;
+        (of_trajectory * self.groups.values().map(Vec::len).sum::<usize>()) as f64
     }
 }
 
@@ -198,12 +198,12 @@ impl Job for EffectsJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // A row has the factors of all parameters as text.
+        // A row holds the factors of all parameters as text.
         (self.designs() * (300.0 + 40.0 * self.trial.perturbation.perturbed.len() as f64)) as u64
     }
 
     fn estimate(&self) -> Estimate {
-        // A nanosecond for each effect of a redraw, measured.
+        // Measured: 1 ns per effect and redraw.
         let seconds = 1e-9 * self.designs() * REDRAWS as f64 * MEASURES.len() as f64;
         Estimate { seconds, bytes: 300.0 * self.trial.perturbation.perturbed.len() as f64 }
     }

@@ -1,4 +1,4 @@
-//! Stage `scoreboard`: all methods of a texture side by side.
+//! Stage `scoreboard`: compares all synthesis methods of a texture.
 
 use super::matched::{Matched, seconds_per_operation};
 use crate::job::{Estimate, Job, JobError, Outcome, Work};
@@ -18,7 +18,7 @@ pub struct Entrant {
     pub method: String,
     /// Raw parameters.
     pub parameters: Value,
-    /// What a realisation takes, unless the method refused the parameters.
+    /// Cost of one realisation; `None` if the method refused the parameters.
     pub cost: Option<Cost>,
 }
 
@@ -26,11 +26,11 @@ pub struct Entrant {
 pub struct ScoreboardJob {
     /// Id of the texture.
     pub id: String,
-    /// What the texture matches.
+    /// The fit that the texture matches.
     pub matched: Matched,
     /// Methods.
     pub entrants: Vec<Entrant>,
-    /// Realisations of each.
+    /// Realisations of each method.
     pub realisations: u32,
     /// Random streams.
     pub streams: Streams,

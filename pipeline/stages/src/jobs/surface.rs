@@ -1,4 +1,4 @@
-//! Rows that describe a surface, whichever stage made it.
+//! Table rows that describe a surface, whichever stage produced it.
 
 use crate::job::{JobError, Outcome, Work};
 use sastrugi_numeric::Grid;
@@ -10,18 +10,18 @@ use sastrugi_roughness::{
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{HeightDistributionRow, ProfilePsdRow, PsdRow, StructureRow, SurfaceRow};
 
-/// Bins of the height distribution of a residual, as many as a heightfield's.
+/// Bins of the height distribution of a residual, the same number as for a heightfield.
 const HISTOGRAM_BINS: usize = 64;
-/// Longest lag of a residual's Hurst exponent over its window: beyond, the structure function levels off.
+/// Longest lag for the Hurst exponent of a residual, as a fraction of the window; the structure function levels off at longer lags.
 const HURST_WINDOWS: f64 = 0.25;
 
-/// A surface and where it comes from.
+/// A surface and its origin.
 pub struct Surface<'a> {
     /// Its id in the tables.
     pub id: &'a str,
-    /// Word of the table `surfaces`.
+    /// Its value of `stage` in the table `surfaces`.
     pub stage: &'a str,
-    /// The fit whose window and trimming it went through.
+    /// The fit whose window and trimming were applied to it.
     pub fit_id: Option<&'a str>,
     /// Heights, m.
     pub grid: &'a Grid,
@@ -37,7 +37,7 @@ pub struct SurfaceRows {
 }
 
 impl SurfaceRows {
-    /// What is known of a surface, as rows.
+    /// The statistics of a surface as rows.
     pub fn of(
         surface: &Surface<'_>,
         spectrum: &[SpectrumBin],
@@ -53,8 +53,8 @@ impl SurfaceRows {
         }
     }
 
-    /// What a fit leaves of a surface: the residual of its DEM, or a texture detrended and trimmed as that was. Both share the lags of the Hurst
-    /// exponent.
+    /// The rows of a residual: that of the DEM of a fit, or that of a texture detrended and trimmed in the same way. Both use the same lags
+    /// for the Hurst exponent.
     pub fn of_residual(surface: &Surface<'_>, fit: &FitFile) -> Self {
         let map = SpectralMap::of(surface.grid);
         let band = default_slope_band(&surface.grid.geometry);
@@ -67,7 +67,7 @@ impl SurfaceRows {
         Self::of(surface, &spectrum, &histogram(surface.grid, HISTOGRAM_BINS), &areal)
     }
 
-    /// Writes them as an item's.
+    /// Writes the rows as those of an item.
     ///
     /// # Errors
     /// When a file cannot be written.

@@ -1,4 +1,4 @@
-//! Stage `terrain`: one generated heightfield.
+//! Stage `terrain`: generates one terrain.
 
 use super::exports::Exports;
 use super::inputs::{Copies, Sources};
@@ -25,13 +25,13 @@ use std::sync::Arc;
 pub const STAGE: &str = "terrain";
 /// The trails of a terrain, for missions along them.
 const LINES: &str = "lines.json";
-/// The same, for the release.
+/// The same trails, for the release.
 const TRAILS: &str = "trails.geojson";
 
 struct TerrainJob {
     id: String,
     generator: Box<dyn Generator>,
-    /// What the generator takes as input.
+    /// Inputs of the generator.
     inputs: Sources,
     streams: Streams,
     png16: bool,
@@ -42,7 +42,7 @@ struct TerrainJob {
 /// Adds the items of `[[terrain]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -62,7 +62,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
         let inputs = Sources::find(builder, (entry, &item), generator.as_ref(), &mut copies)?;
         generator.check_places(&inputs.places()).map_err(|e| entry.refuse(e))?;
-        // Parameters name files as the release does, wherever they lie now.
+        // Parameters use the paths of files in the release instead of their present ones.
         let released = inputs.as_released(&one.params);
         let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
         let shared = builder.is_paired().then(|| common(one.replicate));
@@ -99,7 +99,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     Ok(())
 }
 
-/// The limit of the meshes of exports, of which there must be one.
+/// Checks the error limit of exported meshes, which needs at least one export with a mesh.
 fn check_decimation(entry: &Entry<'_>, item: &TerrainItem) -> Result<(), StudyError> {
     let Some(error_max_m) = item.export_max_error_m else { return Ok(()) };
     let key = "export_max_error_m";
@@ -107,11 +107,11 @@ fn check_decimation(entry: &Entry<'_>, item: &TerrainItem) -> Result<(), StudyEr
     if item.exports.iter().any(|&simulator| has_mesh(simulator)) {
         return Ok(());
     }
-    let message = "decimates meshes, but `exports` names no simulator that takes one: `gazebo` or `isaac`";
+    let message = "decimates meshes, but `exports` names no simulator that uses a mesh: add `gazebo` or `isaac`";
     Err(entry.refuse(ParameterError::new(key, message)))
 }
 
-/// An item's id stands for all that it expands to, and the id of each of its swept parts for the replicates.
+/// The id of an item refers to everything it expands to, and the id of each swept part to its replicates.
 fn name_families(
     builder: &mut Builder<'_>,
     entry: &Entry<'_>,
@@ -127,10 +127,10 @@ fn name_families(
     Ok(())
 }
 
-/// The trails of a terrain; none where it has none.
+/// The trails of a terrain; empty if it has none.
 ///
 /// # Errors
-/// When the item is no parent, or its file cannot be read.
+/// When the item is not a parent, or its file cannot be read.
 pub fn lines(work: &Work<'_>, item: &ItemRef) -> Result<Vec<Line>, JobError> {
     let path = work.parent(item, LINES)?;
     if !path.is_file() {
@@ -179,7 +179,7 @@ impl Job for TerrainJob {
         }
         products.extend(self.write_lines(work, &made.lines, &crs)?);
         if self.generator.kind() == planetary::KIND {
-            // Rovers drive on the world beyond the window, which is made with the same inputs.
+            // Rovers drive on the world beyond the window, which is generated from the same inputs.
             products.extend(self.inputs.keep(work)?);
         }
         let mut notes = self.generator.notes();
@@ -196,7 +196,7 @@ impl Job for TerrainJob {
 }
 
 impl TerrainJob {
-    /// Writes the trails, for missions along them and as GeoJSON; nothing where there are none.
+    /// Writes the trails, if there are any, for missions along them and as GeoJSON.
     fn write_lines(&self, work: &Work<'_>, lines: &[Line], crs: &Crs) -> Result<Vec<Product>, JobError> {
         if lines.is_empty() {
             return Ok(Vec::new());

@@ -1,4 +1,4 @@
-//! Stage `texture`: a field that matches a fit, alone or on a base heightfield.
+//! Stage `texture`: synthesises a texture that matches a fit, alone or on a base surface.
 
 use super::dem as dem_job;
 use super::fit;
@@ -28,10 +28,10 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "texture";
-/// Most realisations of a scoreboard.
+/// Maximum number of realisations of a scoreboard.
 const REALISATIONS_MAX: u32 = 1000;
 
-/// Rough time of a cell of a texture that is detrended, trimmed and described, s.
+/// Approximate time to detrend, trim and describe one cell of a texture, s.
 const SECONDS_PER_DESCRIBED_CELL: f64 = 6e-7;
 
 /// Synthesis methods.
@@ -39,27 +39,27 @@ pub fn kinds() -> Vec<Kind> {
     sastrugi_texture::kinds().into_iter().filter(|k| k.family == "texture").collect()
 }
 
-/// Factor of a texture on its base.
+/// Factor by which a texture is scaled on its base.
 #[derive(Clone)]
 enum Modulation {
     Raster(ItemRef),
     Slope(SlopeFactors),
 }
 
-/// What a texture is added to.
+/// The surface to which a texture is added.
 #[derive(Clone)]
 struct Base {
-    /// The item that makes it.
+    /// The item that produces it.
     item: ItemRef,
-    /// Its file there.
+    /// Its file in the item's folder.
     file: &'static str,
-    /// The DEM behind a background, which shares its split.
+    /// The DEM from which a background was computed; both must share a split.
     dem: Option<ItemRef>,
-    /// Its cells.
+    /// Number of cells.
     cells: u64,
-    /// Shape and place, where they are known before the run.
+    /// Shape and position, if known before the run.
     expected: Option<Geometry>,
-    /// Whether it is the DEM that the texture's fit was made from.
+    /// Whether it is the DEM to which the texture's model was fitted.
     was_fitted: bool,
 }
 
@@ -87,13 +87,13 @@ impl Base {
         [&self.item].into_iter().chain(&self.dem).cloned()
     }
 
-    /// As a recipe names it.
+    /// Its name in a recipe.
     fn name(&self) -> String {
         if self.file == HEIGHTS { self.item.to_string() } else { format!("{}: {}", self.item, self.file) }
     }
 }
 
-/// The DEM of a fit: the first of its parents.
+/// The DEM of a fit, which is the first of its parents.
 fn fitted_dem<'b>(builder: &'b Builder<'_>, fit: &ItemRef) -> Option<&'b ItemRef> {
     builder.graph.find(fit).and_then(|p| builder.graph.node(p).parents.first())
 }
@@ -111,7 +111,7 @@ struct TextureJob {
     cost: Cost,
     /// Whether it is one of several realisations.
     one_of_many: bool,
-    /// Cells of the heightfield that is written.
+    /// Number of cells of the heightfield written.
     cells: u64,
     streams: Streams,
     geotiff: GeoTiff,
@@ -120,7 +120,7 @@ struct TextureJob {
 /// Adds the items of `[[texture]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -145,7 +145,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         for method in &methods {
             let own = if side_by_side { own_parameters(&one.params, &kinds, method) } else { one.params.clone() };
             let checked = sastrugi_texture::method(method, &own).and_then(|synthesis| {
-                // Side by side, the scoreboard says which of the methods cannot make it; a filled DEM is not made of a tile.
+                // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
                 if !side_by_side && fill.is_none() {
                     check_before_run(builder, &matched, base.as_ref(), synthesis.as_ref())?;
                 }
@@ -237,7 +237,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     Ok(())
 }
 
-/// Refuses what is known not to go together before the fit is made: cells of the texture beside those of a measured covariance, or of a base.
+/// Refuses, before the fit is computed, cells of the texture that are known not to match those of a measured covariance or of the base.
 fn check_before_run(
     builder: &Builder<'_>,
     matched: &Matched,
@@ -255,7 +255,7 @@ fn check_before_run(
     }
 }
 
-/// On a measured DEM or a fit's background a texture has what its background lacks, unless the item says otherwise.
+/// On a measured DEM or the background of a fit, a texture defaults to the covariance of the residual, which such a base lacks.
 fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item: &TextureItem) -> Expanded {
     let measured = base.as_ref().is_some_and(|base| [dem_job::STAGE, fit::STAGE].contains(&base.item.stage.as_str()));
     let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && item.method == fft_ma::kind().kind;
@@ -265,7 +265,7 @@ fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item
     one
 }
 
-/// Refuses keys that do not go together.
+/// Refuses keys that cannot be combined.
 fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Result<(), StudyError> {
     ParameterError::positive("amplitude", item.amplitude).map_err(|e| entry.refuse(e))?;
     if item.amplitude != 1.0 && (item.methods.is_some() || item.fill.is_some()) {
@@ -273,16 +273,17 @@ fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Resul
         return Err(entry.error("amplitude", message));
     }
     if item.modulate.is_some() && item.onto.is_none() {
-        return Err(entry.error("modulate", "`modulate` needs `onto`, the base whose texture it changes"));
+        return Err(entry.error("modulate", "`modulate` needs `onto`, the base on which it scales the texture"));
     }
     let alone = item.onto.is_none() && item.methods.is_none() && item.method == fft_ma::kind().kind;
     if item.fill.is_some() && !alone {
-        return Err(entry.error("fill", "`fill` goes with neither `onto`, `methods` nor a method other than `fft_ma`"));
+        return Err(
+            entry.error("fill", "`fill` cannot be combined with `onto`, `methods` or a method other than `fft_ma`")
+        );
     }
     let keys = params.as_object().into_iter().flat_map(|p| p.keys()).chain(item.sweep.keys());
     if let Some(name) = keys.into_iter().find(|_| item.fill.is_some()) {
-        let message =
-            format!("`fill` takes its cells from the DEM and its covariance from the fit; `{name}` has no place");
+        let message = format!("`fill` takes its cells from the DEM and its covariance from the fit; remove `{name}`");
         return Err(entry.error(name, message));
     }
     Ok(())
@@ -326,7 +327,7 @@ fn methods(entry: &Entry<'_>, item: &TextureItem, kinds: &[Kind]) -> Result<Vec<
     }
 }
 
-/// What the item matches.
+/// The fit that the item matches.
 fn matched(builder: &Builder<'_>, entry: &Entry<'_>, item: &TextureItem) -> Result<Matched, BuildError> {
     match &item.fit {
         FitReference::Id(id) if builder.fits.contains(id) => Ok(Matched::Item(ItemRef::new(fit::STAGE, id))),
@@ -339,7 +340,7 @@ fn matched(builder: &Builder<'_>, entry: &Entry<'_>, item: &TextureItem) -> Resu
     }
 }
 
-/// JSON Schema with the parameters of several methods.
+/// JSON Schema that joins the parameters of several methods.
 fn joined_schema(kinds: &[Kind], methods: &[String]) -> Value {
     let mut joined = json!({ "properties": {}, "$defs": {} });
     for kind in kinds.iter().filter(|k| methods.iter().any(|m| m == k.kind)) {
@@ -352,7 +353,7 @@ fn joined_schema(kinds: &[Kind], methods: &[String]) -> Value {
     joined
 }
 
-/// Those of the parameters that a method has.
+/// The subset of the parameters that a method accepts.
 fn own_parameters(params: &Value, kinds: &[Kind], method: &str) -> Value {
     let known = kinds.iter().find(|k| k.kind == method).map(|k| &k.parameters["properties"]);
     let has = |key: &String| known.is_some_and(|properties| properties.get(key).is_some());
@@ -361,7 +362,7 @@ fn own_parameters(params: &Value, kinds: &[Kind], method: &str) -> Value {
     )
 }
 
-/// What the table `terrains` says of a texture.
+/// The parameters of a texture for the table `terrains`.
 fn parameters(item: &TextureItem, matched: &Matched, synthesis: &dyn Method) -> Value {
     let mut all = Map::new();
     all.insert("fit".to_owned(), matched.describe());
@@ -387,7 +388,7 @@ impl Job for TextureJob {
             "fit": self.matched.describe(),
             "onto": base,
         });
-        // Decides a note.
+        // Determines whether a note is written.
         if self.one_of_many {
             recipe["one_of_many"] = json!(true);
         }
@@ -414,13 +415,13 @@ impl Job for TextureJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // The texture, what describes it once it is detrended as the fit's residual was, and a base or a DEM to fill.
+        // The texture, the statistics of its residual (detrended like the fit's), and a base or a DEM to fill.
         self.cost.memory_bytes.max((64 << 20) + 110 * self.cells)
     }
 
     fn estimate(&self) -> Estimate {
         let cells = self.synthesis.geometry().len() as f64;
-        // What describes the residual of a texture from a fit is what describes a surface.
+        // A texture that matches a fit also gets the surface statistics of its residual.
         let described =
             if self.matched.parent().is_some() && self.fill.is_none() { SECONDS_PER_DESCRIBED_CELL } else { 0.0 };
         let seconds = 0.02
@@ -442,13 +443,13 @@ impl Job for TextureJob {
         notes.extend(synthesis.notes());
         if self.one_of_many && synthesis.parameters()["phase"] == "unit" {
             notes.push(
-                "one of several textures with unit phases, which are too alike: for their spread take phase = \"gaussian\""
+                "one of several textures with unit phases, which vary too little between realisations: use phase = \"gaussian\" for a realistic spread"
                     .to_owned(),
             );
         }
         if clip_share > 0.0 {
             notes.push(format!(
-                "{clip_share:.1e} of the spectrum was negative and set to 0; the covariance is off by at most {covariance_error_max_m2:.1e} m2"
+                "{clip_share:.1e} of the spectrum was negative and set to 0; the error of the covariance is at most {covariance_error_max_m2:.1e} m2"
             ));
         }
         if self.amplitude != 1.0 {
@@ -457,7 +458,7 @@ impl Job for TextureJob {
         if self.base.as_ref().is_some_and(|base| base.was_fitted) {
             notes.push(has_its_texture("onto = { background = \"<fit id>\" }"));
         }
-        // Compared with what was fitted, before an amplitude makes it another surface.
+        // Computed before the amplitude is applied, so that it can be compared with the residual of the fit.
         let residual = self.residual(&grid, &fit);
         let grid = scaled(grid, self.amplitude);
         let (heights, crs) = match &self.base {
@@ -477,7 +478,7 @@ impl Job for TextureJob {
 }
 
 impl TextureJob {
-    /// The texture, without its base, detrended and trimmed as the fit's residual was: what that residual is compared with.
+    /// The texture without its base, detrended and trimmed like the residual of the fit, for comparison with that residual.
     fn residual(&self, texture: &Grid, fit: &FitFile) -> Option<SurfaceRows> {
         let Matched::Item(item) = &self.matched else { return None };
         let residual = sastrugi_texture::shown::texture_residual(texture, fit)?;
@@ -495,7 +496,7 @@ impl TextureJob {
         self.released(work, &filled.grid, &dem.info.crs, notes)
     }
 
-    /// Factors of the texture on its base.
+    /// The factor of the texture at each cell of its base.
     fn factors(&self, work: &Work<'_>, base: &Grid) -> Result<Option<Grid>, JobError> {
         Ok(match &self.modulation {
             None => None,

@@ -1,4 +1,4 @@
-//! Stage `traverse`: all missions of one terrain driven and recorded.
+//! Stage `traverse`: drives and records all missions on one terrain.
 
 use super::dem as measured;
 use super::{missions, roughness, vehicle};
@@ -38,18 +38,18 @@ pub fn kinds() -> Vec<Kind> {
     vec![Kind {
         family: "traverse",
         kind: "pure_pursuit",
-        summary: "a vehicle follows each mission's line until the goal, tipping over, getting stuck, the edge, or time out",
+        summary: "a vehicle follows the line of each mission until it reaches the goal, tips over, gets stuck, leaves the terrain or runs out of time",
         source: "Majhor and Bos, sections 2.3 and 2.4; model in docs/traversal.md",
         parameters: schema(),
     }]
 }
 
-/// The parameters of the run and of the starts, side by side.
+/// The parameters of the run and of the starts in one schema.
 fn schema() -> Value {
     keys::schema_of_both::<TraverseParameters, ReplicateParameters>()
 }
 
-/// What is driven: the same on every terrain.
+/// A vehicle with its settings, the same on every terrain.
 struct Drive {
     /// Id; missions are recorded as `<id>-0001`.
     id: String,
@@ -61,23 +61,23 @@ struct Drive {
     /// Rasters of wheel friction and rolling resistance.
     rasters: [Option<ItemRef>; 2],
     head: StudyHead,
-    /// Missions on each terrain.
+    /// Number of missions on each terrain.
     count: usize,
-    /// Rough simulated time of a mission, s.
+    /// Approximate simulated time of a mission, s.
     seconds_each: f64,
 }
 
 struct TraverseJob {
-    /// The same on every terrain, of which there may be many.
+    /// Shared by all terrains, of which there may be many.
     drive: Arc<Drive>,
     terrain: String,
     group: Option<String>,
     variant: Option<String>,
     lines: Lines,
     heightfield: ItemRef,
-    /// Cells of the heightfield.
+    /// Number of cells of the heightfield.
     cells: u64,
-    /// Draws the starts beside the first.
+    /// Streams from which the starts after the first are drawn.
     streams: Streams,
 }
 
@@ -94,7 +94,7 @@ pub fn run_of(item_id: &str) -> &str {
 /// Adds the items of `[[traverse]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -117,14 +117,14 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
         let doubts = registry::doubts(&raw.vehicle, &raw.vehicle_changes);
         for doubt in doubts.into_iter().map(|doubt| format!("traverse \"{}\": {doubt}", envelope.id)) {
-            // Values of a sweep share their vehicle.
+            // The values of a sweep share one vehicle, so each doubt is listed once.
             if !builder.doubts.contains(&doubt) {
                 builder.doubts.push(doubt);
             }
         }
         if raw.goal_tolerance_m >= drawn.length_m {
             let (tolerance_m, length_m) = (raw.goal_tolerance_m, drawn.length_m);
-            let message = format!("is {tolerance_m}; it must be below the missions' length of {length_m} m");
+            let message = format!("is {tolerance_m} m; it must be below the length of the missions, {length_m} m");
             return Err(entry.refuse(ParameterError::new("goal_tolerance_m", message)).into());
         }
         let starts = ReplicateSettings::new(starts, drawn.length_m).map_err(|e| entry.refuse(e))?;
@@ -147,7 +147,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     Ok(())
 }
 
-/// The item that makes a raster of the surface.
+/// The item that produces a raster of the surface.
 fn raster(
     builder: &Builder<'_>,
     entry: &Entry<'_>,
@@ -159,8 +159,8 @@ fn raster(
     field.map(|f| Some(f.item.clone())).ok_or_else(|| unknown_id(entry, key, id, builder.heightfields.keys()))
 }
 
-/// Refuses a terrain whose cells are known to be larger than the vehicle. A measured DEM is judged when it is read: its file may
-/// state them in degrees.
+/// Refuses a terrain whose cells are known to be larger than the vehicle. A measured DEM is checked when it is read, because its file
+/// may give the cell size in degrees.
 fn check_scales(field: &Heightfield, vehicle: &Vehicle) -> Result<(), GroundError> {
     let longer = field.geometry.map(|g| g.cell[0].max(g.cell[1]));
     match longer.or(field.cell_m).filter(|_| field.item.stage != measured::STAGE) {
@@ -181,7 +181,7 @@ fn add_one(
     let Some(field) = builder.heightfields.get(&terrain) else { return Ok(()) };
     check_scales(field, &drive.vehicle)
         .map_err(|e| entry.error("missions", format!("\"{terrain}\": failed to {e}")))?;
-    // Named by the table, not by the swept part, so that every value of a sweep has the same starts.
+    // Named after the table without its swept part, so that every value of a sweep has the same starts.
     let streams = builder.streams(STAGE, &format!("{traverse}@{}", lines.word), None, 0);
     let stream = (drive.starts.count() > 1).then(|| streams.label());
     let own = [field.item.clone(), roughness::item(&terrain), lines.item.clone()];
@@ -200,16 +200,16 @@ fn add_one(
     builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
 }
 
-/// One mission driven: its rows, and its recording, which is on disk.
+/// The results of one mission: its rows, and its recording, which is already on disk.
 struct Driven {
     products: Vec<Product>,
     row: MissionRow,
-    /// One per start, where there are several.
+    /// One row per start if there are several starts, otherwise empty.
     replicates: Vec<ReplicateRow>,
     samples: Vec<SampleRow>,
 }
 
-/// What all missions of a terrain share.
+/// Data shared by all missions on a terrain.
 struct Site {
     ground: Ground,
     heights: Grid,
@@ -229,7 +229,7 @@ impl TraverseJob {
         Ok(Site { ground, heights: heights.grid, heights_sha256, classes })
     }
 
-    /// The ground with its surface, where that changes from place to place.
+    /// The ground with a map of its surface, if friction or rolling resistance vary in space.
     fn with_surface(
         &self,
         ground: Ground,
@@ -252,7 +252,7 @@ impl TraverseJob {
         Ok(ground.with_surface(surface))
     }
 
-    /// Drives a mission from all its starts; the first is recorded.
+    /// Drives a mission from all its starts and records the first.
     fn drive(
         &self,
         work: &Work<'_>,
@@ -309,7 +309,7 @@ impl TraverseJob {
         Ok(Driven { products, row, replicates, samples })
     }
 
-    /// The rows of a mission's starts, where there are several; `first` was recorded from the drawn one.
+    /// The rows of the starts of a mission, empty if there is only one. `first` is the recording from the drawn start.
     fn replicates(
         &self,
         site: &Site,
@@ -340,7 +340,7 @@ impl TraverseJob {
         self.drive.settings.parameters().differentiator
     }
 
-    /// Records that a viewer of one file needs to know where it came from.
+    /// Metadata that states the origin of a recording that is read on its own.
     fn metadata(&self, row: &MissionRow, heights_sha256: &str) -> BTreeMap<String, BTreeMap<String, String>> {
         let head = &self.drive.head;
         let study = [("name", head.name.clone()), ("seed", head.seed.to_string()), ("license", head.license.clone())];
@@ -383,7 +383,7 @@ impl TraverseJob {
     }
 }
 
-/// A raster of the surface, which must share ground with the terrain.
+/// A raster of the surface, which must overlap the terrain.
 fn read_raster(work: &Work<'_>, item: &ItemRef, terrain: &Grid) -> Result<Grid, JobError> {
     let raster = dem::read(&work.parent(item, HEIGHTS)?).map_err(input_error)?.grid;
     if terrain.geometry.overlaps(&raster.geometry) {
@@ -391,8 +391,8 @@ fn read_raster(work: &Work<'_>, item: &ItemRef, terrain: &Grid) -> Result<Grid, 
     }
     let ([x, y], [tx, ty]) = (raster.geometry.origin, terrain.geometry.origin);
     Err(JobError::input(format!(
-        "the raster {} begins at ({x:.2}, {y:.2}) m and shares no ground with the terrain, which begins at ({tx:.2}, {ty:.2}) \
-         m; it must lie in the terrain's coordinates",
+        "the raster {} with origin ({x:.2}, {y:.2}) m does not overlap the terrain, whose origin is ({tx:.2}, {ty:.2}) m; \
+         convert it to the coordinates of the terrain",
         item.id
     )))
 }
@@ -418,8 +418,8 @@ impl Job for TraverseJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, ground with its bound, classes and rasters once; samples of every mission, some 1000 bytes each with their
-        // wheels; rows of the starts.
+        // Heights, ground with its bound, classes and rasters once; the samples of every mission, about 1000 bytes each including
+        // the wheels; the rows of the starts.
         let Drive { count, seconds_each, starts, settings, .. } = &*self.drive;
         let rows = (count * starts.count()) as u64;
         let samples = *count as f64 * seconds_each * f64::from(settings.parameters().sample_rate_hz);
@@ -429,7 +429,7 @@ impl Job for TraverseJob {
     fn estimate(&self) -> Estimate {
         let driven_s = self.drive.count as f64 * self.drive.seconds_each;
         let other_starts_s = driven_s * (self.drive.starts.count() - 1) as f64;
-        // The ground and its bound are made once.
+        // The ground and its bound are computed once.
         let ground_s = 1e-7 * self.cells as f64;
         Estimate { seconds: ground_s + 2.2e-3 * driven_s + 1.2e-3 * other_starts_s, bytes: 2e4 * driven_s }
     }
@@ -441,9 +441,9 @@ impl Job for TraverseJob {
         let driven: Result<Vec<Driven>, JobError> =
             missions.par_iter().map(|mission| self.drive(work, &site, &view, mission)).collect();
         let mut driven = driven?;
-        // Ids are texts: 10000 comes before 9999.
+        // Ids sort as text: 10000 comes before 9999.
         driven.sort_by(|a, b| a.row.mission_id.cmp(&b.row.mission_id));
-        let notes = site.ground.warnings().iter().cloned().chain(nowhere_note(&driven)).collect();
+        let notes = site.ground.warnings().iter().cloned().chain(no_ground_note(&driven)).collect();
         let products = driven.iter_mut().flat_map(|d| std::mem::take(&mut d.products)).collect();
         let mut outcome = Outcome { products, notes };
         outcome.write_rows(work, self.parameters())?;
@@ -454,13 +454,13 @@ impl Job for TraverseJob {
     }
 }
 
-/// The sentence on missions that ended where they began.
-fn nowhere_note(driven: &[Driven]) -> Option<String> {
+/// A note on missions that ended where they began.
+fn no_ground_note(driven: &[Driven]) -> Option<String> {
     let nowhere = |row: &MissionRow| row.time_s == 0.0 && row.outcome == EventKind::OutOfBounds.name();
     let count = driven.iter().filter(|d| nowhere(&d.row)).count();
     (count > 0).then(|| {
         format!(
-            "{count} of {} missions start where the vehicle stands over cells without data; fill the gaps of the DEM first",
+            "{count} of {} missions start with the vehicle over cells without data; fill the gaps of the DEM first",
             driven.len()
         )
     })

@@ -1,4 +1,4 @@
-//! Stage `vehicle`: the vehicles that drive on exported terrains, as MJCF and URDF in `export/vehicle/` of the release.
+//! Stage `vehicle`: exports the vehicles that drive on exported terrains, as MJCF and URDF in `export/vehicle/` of the release.
 
 use super::exports;
 use crate::builder::Builder;
@@ -15,21 +15,21 @@ use serde_json::{Value, json};
 pub const STAGE: &str = "vehicle";
 /// Folder in the exports of the release.
 const FOLDER: &str = "vehicle/";
-/// Rough length of the files, bytes.
+/// Approximate size of the files, bytes.
 const BYTES: f64 = 2e4;
 
 struct VehicleJob {
     /// Id of the run.
     id: String,
     mechanism: Mechanism,
-    /// Everything that decides the files.
+    /// Everything that determines the files.
     recipe: Value,
 }
 
 /// Adds the vehicle of a run, with the friction of the run's surface.
 ///
 /// # Errors
-/// When the item cannot be placed in the graph: a bug.
+/// When the item cannot be added to the graph, which is a bug.
 pub fn add(
     builder: &mut Builder<'_>,
     run: &str,

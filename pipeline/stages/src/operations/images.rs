@@ -1,4 +1,4 @@
-//! Images of a surface as files: the same for studies and verbs.
+//! Renders a surface to image files. Shared by studies and verbs.
 
 use crate::job::JobError;
 use crate::operations::dem::input_error;
@@ -18,13 +18,13 @@ pub fn kind() -> Kind {
     Kind {
         family: "image",
         kind: "image",
-        summary: "image of a surface under sun and camera: albedo, 35 % Lambert and 65 % Lommel-Seeliger, cast shadows",
-        source: "JPL synthetic terrain environment; McEwen (1991); camera and noise: our choice",
+        summary: "image of a surface for a given sun and camera: albedo, 35 % Lambert and 65 % Lommel-Seeliger, cast shadows",
+        source: "JPL synthetic terrain environment; McEwen (1991); camera and noise are our choice",
         parameters: schema_of::<RenderParameters>(),
     }
 }
 
-/// A surface as it is looked at.
+/// The surface to render.
 pub struct Ground {
     /// Heights, m.
     pub heights: Grid,
@@ -38,17 +38,17 @@ pub struct Ground {
     pub albedo_name: Option<String>,
 }
 
-/// An image with what it was made from.
+/// An image with its description.
 pub struct Made {
     /// The image.
     pub rendering: Rendering,
-    /// The file beside it.
+    /// Contents of the JSON file next to it.
     pub description: ImageDescription,
-    /// Brightness that the PNG shows white.
+    /// Brightness that is white in the PNG.
     pub png_white: f64,
 }
 
-/// Where the files of an image go; what is absent is not written.
+/// Targets of the files of an image; those that are absent are not written.
 pub struct Files<'a> {
     /// The image, GeoTIFF.
     pub tif: Option<Target<'a>>,
@@ -58,18 +58,18 @@ pub struct Files<'a> {
     pub png: Option<Target<'a>>,
 }
 
-/// Reads a map beside heights.
+/// Reads a map next to the heights, if it exists.
 ///
 /// # Errors
-/// A file that is there and cannot be read.
+/// A file that exists but cannot be read.
 pub fn map(path: &Path) -> Result<Option<Grid>, JobError> {
     path.is_file().then(|| dem::read(path).map(|read| read.grid).map_err(input_error)).transpose()
 }
 
-/// Renders an image; `file` is the name that its description gives it.
+/// Renders an image; `file` is its name in the description.
 ///
 /// # Errors
-/// A camera that does not fit the surface, or sees none of it; an albedo map of other cells.
+/// A camera that does not fit the surface or sees none of it, or an albedo map with different cells.
 pub fn make(
     ground: &Ground,
     parameters: &RenderParameters,
@@ -104,7 +104,7 @@ pub fn make(
 }
 
 impl Made {
-    /// Writes its files. The image has the surface's coordinate system where it is a map.
+    /// Writes the files. An image taken from the nadir is a map and gets the coordinate system of the surface.
     ///
     /// # Errors
     /// A file that cannot be written.

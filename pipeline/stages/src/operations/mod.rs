@@ -1,4 +1,11 @@
-//! Code that several jobs, or jobs and verbs, share.
+//! Code shared by several jobs, or by jobs and verbs.
+//!
+//! | task | module |
+//! |---|---|
+//! | read and prepare a DEM | [`mod@dem`] (window, metres), [`place`] (position in its raster), [`masks`], [`coregistration`] |
+//! | generate and write surfaces | [`terrains`], [`inputs`], [`textures`], [`fits`] (file and table rows) |
+//! | render images and recover heights from them | [`images`], [`photoclinometry`] |
+//! | plan and drive | [`routes`], [`drawn`] (missions of other sections), [`rovers`], [`planner`], [`roughness`] (settings) |
 
 pub mod coregistration;
 pub mod dem;

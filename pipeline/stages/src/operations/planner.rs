@@ -1,21 +1,23 @@
-//! The planner to compare rovers with: [`Explorer`] of the room `navigation` as a [`Policy`] of the room `mobility`.
+//! The planner that serves as a baseline for rovers: [`Explorer`] of the room `navigation` as a [`Policy`] of the room `mobility`.
 //!
 //! Each cycle, in this order:
-//! 1. Within the tolerance of the goal it stops.
-//! 2. It marks what it sees on its map, at the place where it believes to be: where a ray shows a hazard the cell there, of rectangles all their
-//!    cells.
-//! 3. It plans.
-//! 4. It turns in place towards the next way point, by at most the turn of a cycle, and looks again; facing it, it drives by a step, at most
-//!    as far as the way point.
-//! 5. Without a way it forgets its map, which may be wrong, but for what it sees now, and backs up by a step; after the third time it stops.
-//! 6. Where the rover itself leans too much it backs up by a step.
+//! 1. Within the goal tolerance, the planner stops.
+//! 2. It marks what it sees on its map, relative to its believed pose: for a ray that shows a hazard, the cell at that point; for rectangles,
+//!    all their cells.
+//! 3. It plans a path.
+//! 4. It turns in place towards the next waypoint, by at most the turn of one cycle, and looks again. Once it faces the waypoint, it drives one
+//!    step, or less if the waypoint is nearer.
+//! 5. If there is no path, it clears its map, which may be wrong, keeps only what it sees now, and backs up by one step. After clearing three
+//!    times, it stops instead.
+//! 6. If the rover itself tilts too much, it backs up by one step.
 //!
-//! The map is all that it remembers. Its cells are blocked within half of the body's width of what may be a hazard; how looks that disagree are
-//! joined stands in [`sastrugi_navigation::explorer`].
+//! The map is its only memory. Cells within half the body width of a possible hazard are blocked. [`sastrugi_navigation::explorer`] describes
+//! how contradictory observations are combined.
 //!
-//! What it sees brings it to an end: between two of the three times that it forgets, knowledge of a cell rises three times at most, and cells are
-//! limited. Once nothing is new the plan stays, each cycle turns or drives along it, and it leads to the goal. Ground on which it leans too much
-//! is on no map: there, and with errors of its place, the limits of distance and cycles end it.
+//! Termination: between two clearings, of which there are at most three, the knowledge of a cell can rise at most three times, and the number of
+//! cells is limited. Once nothing new is seen, the plan no longer changes, each cycle turns or drives along it, and it leads to the goal. Ground
+//! on which the rover tilts too much is not on the map. On such ground, and with errors in the believed pose, the distance and cycle limits end
+//! the drive.
 
 use sastrugi_mobility::rover::{Command, PlannerParameters, Policy, RoverParameters, Situation, Stop, View};
 use sastrugi_navigation::explorer::{CELLS_MAX, Explorer, ExplorerSettings, Sight};
@@ -23,9 +25,9 @@ use sastrugi_schemas::ParameterError;
 
 /// Memory of a cell of its map, bytes.
 const BYTES_PER_CELL: u64 = 50;
-/// Error of the bearing to a way point that is corrected with a drive, rad: at most a hundredth of a step to the side.
+/// Largest bearing error to a waypoint that is corrected while driving, rad; it moves the rover sideways by at most a hundredth of a step.
 const FACING_RAD: f64 = 0.01;
-/// How often it forgets its map.
+/// Number of times the planner may clear its map.
 const FORGETS: u32 = 3;
 
 /// Memory of the map of one rover, bytes.
@@ -33,23 +35,23 @@ pub fn memory_bytes() -> u64 {
     CELLS_MAX as u64 * BYTES_PER_CELL
 }
 
-/// A planner at the start.
+/// A new planner.
 pub fn policy(parameters: &PlannerParameters) -> Box<dyn Policy> {
     Box::new(Planner::new(parameters))
 }
 
-/// Refuses a map that a trial would need too many cells for.
+/// Checks that the map of a trial does not need too many cells.
 ///
 /// # Errors
-/// That one.
+/// A map with too many cells.
 pub fn check(parameters: &PlannerParameters, trial: &RoverParameters) -> Result<(), ParameterError> {
-    // A start and its goal may lie in any direction: along a diagonal the map is largest.
+    // The direction from start to goal is arbitrary; the map is largest along a diagonal.
     let (along_m, settings) = (std::f64::consts::FRAC_1_SQRT_2 * trial.straight_m(), settings(parameters));
     let largest = settings.geometry([0.0; 2], [along_m; 2], settings.beyond_m);
     largest.map(drop).map_err(|e| ParameterError::new("map_cell_m", e.message))
 }
 
-/// Numbers of the body that a plan depends on.
+/// The settings of the map and of the body that affect a plan.
 fn settings(parameters: &PlannerParameters) -> ExplorerSettings {
     let task = parameters.task(&RoverParameters::default());
     let cell_m = parameters.map.map_cell_m;
@@ -61,7 +63,7 @@ fn settings(parameters: &PlannerParameters) -> ExplorerSettings {
     }
 }
 
-/// The planner, and what it remembers.
+/// The planner and its memory.
 struct Planner {
     settings: ExplorerSettings,
     turn_rad: f64,
@@ -100,7 +102,7 @@ impl Planner {
         let View { areas, rays, .. } = situation.view;
         let places_m = rays.iter().filter(|ray| ray.hazard).map(|ray| situation.pose.to_ground(ray.place_m));
         places_m.for_each(|at_m| explorer.see_hazard_at(at_m));
-        // Rays tell of places: a strip is a hazard as a whole, wherever in it the rock stands, and safe though rays pass beside most of it.
+        // Rays locate hazards. A strip does not: it is a hazard wherever in it the rock is, and safe even if its rays miss most of it.
         for area in areas.iter().filter(|_| rays.is_empty()) {
             let sight = if area.hazard { Sight::Hazard } else { Sight::Safe };
             explorer.see(&area.corners_m.map(|corner| situation.pose.to_ground(corner)), sight);
@@ -112,7 +114,7 @@ impl Planner {
         Command::drive(-self.step_m)
     }
 
-    /// Starts afresh with what it sees, or stops.
+    /// Clears the map except for what the rover sees now, or stops.
     fn begin_again(&mut self, situation: &Situation<'_>) -> Command {
         if self.forgotten >= FORGETS {
             return self.stop(Stop::NoWay);
@@ -124,7 +126,7 @@ impl Planner {
         self.back_up("forget")
     }
 
-    /// Turns to the next way point, or drives towards it.
+    /// Turns to the next waypoint, or drives towards it.
     fn follow(&mut self, situation: &Situation<'_>, next_m: [f64; 2]) -> Command {
         let error_rad = situation.pose.bearing_error_rad(next_m);
         if error_rad.abs() > FACING_RAD {
@@ -163,5 +165,83 @@ impl Policy for Planner {
 
     fn plan(&self) -> &[[f64; 2]] {
         &self.plan_m
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_mobility::rover::draws::CycleDraws;
+    use sastrugi_mobility::rover::{Area, PlannerEyes, PlannerMap, Pose, SchoppersParameters};
+    use sastrugi_numeric::{Counter, Streams};
+
+    /// Turns of 10 degrees, steps of 0.1 m, a goal tolerance of 0.5 m.
+    fn planner() -> Planner {
+        let eyes = PlannerEyes::Rectangles(SchoppersParameters::default());
+        Planner::new(&PlannerParameters { eyes, map: PlannerMap::default(), mind: policy })
+    }
+
+    fn open() -> View {
+        View { areas: Vec::new(), rays: Vec::new(), tilted: false }
+    }
+
+    /// What the planner decides at the origin.
+    fn decide(planner: &mut Planner, heading_rad: f64, goal_m: [f64; 2], view: &View) -> Command {
+        let draws = CycleDraws::new(Counter::new(&mut Streams::for_seed(1, "planner-test").stream("noise")), 0);
+        planner.decide(&Situation { pose: Pose { position_m: [0.0; 2], heading_rad }, goal_m, view, draws })
+    }
+
+    /// Left is positive; one cycle turns by at most 10 degrees.
+    #[test]
+    fn val_it_turns_to_the_goal() {
+        let turn_rad = 10.0_f64.to_radians();
+        let mut left = planner();
+        assert_eq!(decide(&mut left, 0.0, [0.0, 10.0], &open()), Command::turn(turn_rad));
+        assert_eq!(left.state(), "turn");
+        let mut right = planner();
+        assert_eq!(decide(&mut right, 0.0, [0.0, -10.0], &open()), Command::turn(-turn_rad));
+    }
+
+    /// Once it faces the next waypoint, it drives one step.
+    #[test]
+    fn val_it_drives_towards_what_it_faces() {
+        let mut planner = planner();
+        decide(&mut planner, 0.0, [6.0, 8.0], &open());
+        let [x, y] = planner.plan()[1];
+        let command = decide(&mut planner, libm::atan2(y, x), [6.0, 8.0], &open());
+        assert!((command.drive_m - 0.1).abs() < 1e-12 && command.turn_rad.abs() < 1e-9, "{command:?}");
+        assert_eq!((planner.state(), planner.plan().last()), ("drive", Some(&[6.0, 8.0])));
+    }
+
+    /// Within the goal tolerance it stops, even if it tilts; elsewhere it backs up from where it tilts.
+    #[test]
+    fn val_it_stops_at_the_goal_and_backs_up_from_tilt() {
+        let tilted = View { tilted: true, ..open() };
+        let mut planner = planner();
+        assert_eq!(decide(&mut planner, 0.0, [10.0, 0.0], &tilted), Command::drive(-0.1));
+        assert_eq!(planner.state(), "back up");
+        assert_eq!(decide(&mut planner, 0.0, [0.3, 0.3], &tilted), Command::stop(Stop::AtGoal));
+        assert!(planner.plan().is_empty());
+    }
+
+    /// Enclosed by hazards, it clears its map three times and backs up each time; then it stops.
+    #[test]
+    fn val_it_gives_up_when_enclosed() {
+        let area = |[near, far]: [f64; 2], [right, left]: [f64; 2]| Area {
+            corners_m: [[near, right], [near, left], [far, left], [far, right]],
+            hazard: true,
+        };
+        let areas = vec![
+            area([1.0, 2.0], [-2.0, 2.0]),
+            area([-2.0, -1.0], [-2.0, 2.0]),
+            area([-2.0, 2.0], [1.0, 2.0]),
+            area([-2.0, 2.0], [-2.0, -1.0]),
+        ];
+        let (mut planner, enclosed) = (planner(), View { areas, ..open() });
+        for _ in 0..3 {
+            assert_eq!(decide(&mut planner, 0.0, [10.0, 0.0], &enclosed), Command::drive(-0.1));
+            assert_eq!(planner.state(), "forget");
+        }
+        assert_eq!(decide(&mut planner, 0.0, [10.0, 0.0], &enclosed), Command::stop(Stop::NoWay));
     }
 }

@@ -1,4 +1,4 @@
-//! Settings of `[roughness]` as the kernel takes them.
+//! Converts the section `[roughness]` to settings of the kernel.
 
 use crate::job::JobError;
 use sastrugi_roughness::{ClassThresholds, DescribeSettings};

@@ -1,4 +1,4 @@
-//! Ground prepared for routes: the same for studies, verbs and missions.
+//! Prepares ground for route planning. Shared by studies, verbs and missions.
 
 use crate::job::JobError;
 use sastrugi_mobility::vehicle::{SlopeAbility, SurfaceParameters, Vehicle};
@@ -13,16 +13,16 @@ use sastrugi_roughness::{ClassThresholds, Detrended, Detrender, WaveBand, classi
 use sastrugi_schemas::ParameterError;
 use std::fmt::Display;
 
-/// What routes are planned by, besides the heights.
+/// Inputs of route planning besides the heights.
 #[derive(Clone, Debug, Default)]
 pub struct Given {
-    /// Vehicle whose limits of slope, energy and band of wavelengths count.
+    /// Vehicle that sets slope limits, energy and the wavelength band.
     pub vehicle: Option<Vehicle>,
     /// Obstacles as polygons, in the coordinates of the heights, m.
     pub polygons: Vec<Polygon>,
     /// Obstacles as cells of the heights.
     pub blocked: Option<Grid<bool>>,
-    /// Factors of the cost, in the coordinates of the heights.
+    /// Cost factors, in the coordinates of the heights.
     pub factors: Option<Grid>,
     /// Thresholds of the roughness classes.
     pub thresholds: ClassThresholds,
@@ -40,7 +40,7 @@ impl Given {
     }
 }
 
-/// Ground that routes can be planned on.
+/// Ground prepared for route planning.
 #[derive(Debug)]
 pub struct Site {
     map: TravelMap,
@@ -50,12 +50,12 @@ pub struct Site {
     rings: Vec<Vec<[f64; 2]>>,
 }
 
-/// What a search came to.
+/// Result of a search.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Outcome {
     /// A route.
     Found(Route),
-    /// No path joins start and goal.
+    /// No path connects start and goal.
     NoPath,
     /// An anytime search used up its expansions before it found a path.
     Budget,
@@ -71,7 +71,7 @@ impl Outcome {
         }
     }
 
-    /// The route, where there is one.
+    /// The route, if one was found.
     pub fn route(&self) -> Option<&Route> {
         match self {
             Self::Found(route) => Some(route),
@@ -84,14 +84,14 @@ impl Site {
     /// Prepares heights in m.
     ///
     /// # Errors
-    /// Heights that no route can be planned on, or what is given does not suit them.
+    /// Heights on which no route can be planned, or inputs that do not match them.
     pub fn new(heights: &Grid, parameters: &RouteParameters, given: &Given) -> Result<Self, JobError> {
         let step = coarsening(heights, parameters)?;
         let coarse = |grid: &Grid| if step > 1 { resample::block_means(grid, step) } else { grid.clone() };
         let ability = given.vehicle.as_ref().map(|v| SlopeAbility::of(v, &SurfaceParameters::default()));
         let limits_deg = ability.map_or(RouteParameters::WITHOUT_VEHICLE_DEG, |a| [a.up_deg, a.down_deg]);
         let limits = parameters.limits(limits_deg).map_err(refused)?;
-        // Of the precision that the ground is stored with, for teams.
+        // Rounded to the precision with which the ground is stored for teams.
         let planned_on = coarse(heights).map(|z| f64::from(z as f32));
         let mut map = TravelMap::new(planned_on, limits).map_err(failed)?;
         for polygon in &given.polygons {
@@ -115,7 +115,7 @@ impl Site {
         Ok(Self { map, costs, clearance, settings, rings })
     }
 
-    /// Map, costs and room for a team.
+    /// Map, costs and clearance for a team.
     pub fn ground(&self) -> Ground<'_> {
         Ground { map: &self.map, costs: &self.costs, clearance: self.clearance.as_ref() }
     }
@@ -130,10 +130,10 @@ impl Site {
         &self.rings
     }
 
-    /// Plans a route for each pair of start and goal; one alone, with both as vertices of its roadmap.
+    /// Plans a route for each pair of start and goal. A single pair is added to the vertices of its roadmap.
     ///
     /// # Errors
-    /// Starts and goals that are blocked or the same.
+    /// Starts and goals that are blocked or identical.
     pub fn plan(&self, pairs: &[Pair]) -> Result<Vec<Outcome>, JobError> {
         let cell = |node: Node| self.map.place(node);
         if let [pair] = pairs {
@@ -147,7 +147,7 @@ impl Site {
     /// The pair of nodes nearest to two points in the coordinates of the heights, m.
     ///
     /// # Errors
-    /// A point that is not on the map or cannot be entered, or both in one cell.
+    /// A point that is not on the map or cannot be entered, or both points in the same cell.
     pub fn pair(&self, [start_m, goal_m]: [[f64; 2]; 2]) -> Result<Pair, JobError> {
         let pair = Pair { start: self.node("start", start_m)?, goal: self.node("goal", goal_m)?, draws: 1 };
         if pair.start != pair.goal {
@@ -166,7 +166,7 @@ impl Site {
             let ([x0, y0], [width, height]) = (g.origin, g.size());
             let (x1, y1) = (x0 + width, y0 + height);
             JobError::input(format!(
-                "the {name} ({x}, {y}) lies outside of the terrain, which covers x from {x0} to {x1} and y from {y0} to {y1} m"
+                "the {name} ({x}, {y}) lies outside the terrain, which covers x from {x0} to {x1} and y from {y0} to {y1} m"
             ))
         };
         let (row, col) = g.cell_at(x, y).ok_or_else(outside)?;
@@ -187,7 +187,7 @@ impl Site {
         nodes.iter().map(point).collect()
     }
 
-    /// The heights, without data where a cell cannot be entered.
+    /// The heights, with no data in cells that cannot be entered.
     pub fn open_ground(&self) -> Grid {
         let mut heights = self.map.heights().clone();
         let blocked = heights.values.iter_mut().zip(0..).filter(|(_, node)| self.map.is_blocked(*node));
@@ -195,8 +195,8 @@ impl Site {
         heights
     }
 
-    /// Cells that cannot be entered though they have a height: 1, others 0; `None` where there are none. The geometry is that of the ground
-    /// planned on.
+    /// 1 in cells that have a height but cannot be entered, 0 in others; `None` if there are no such cells. The geometry is that of the
+    /// planning ground.
     pub fn blocked_cells(&self) -> Option<Grid<u8>> {
         let heights = self.map.heights();
         let nodes = heights.values.iter().zip(0..);
@@ -204,7 +204,7 @@ impl Site {
         values.contains(&1).then_some(Grid { geometry: heights.geometry, values })
     }
 
-    /// Cells that may be entered.
+    /// Number of cells that can be entered.
     pub fn free_cells(&self) -> usize {
         (0..self.map.len() as Node).filter(|node| !self.map.is_blocked(*node)).count()
     }
@@ -219,7 +219,15 @@ fn outcome(found: Result<Route, RouteError>) -> Result<Outcome, JobError> {
     }
 }
 
-/// Distance from the first point to each, in plan, m.
+/// Horizontal distance along the line from the first point to each point, m.
+///
+/// ```
+/// use sastrugi_stages::operations::routes::distances_m;
+///
+/// // Heights do not count.
+/// let line = [[0.0, 0.0, 7.0], [3.0, 4.0, 9.0], [3.0, 16.0, 0.0]];
+/// assert_eq!(distances_m(&line), [0.0, 5.0, 17.0]);
+/// ```
 pub fn distances_m(points: &[[f64; 3]]) -> Vec<f64> {
     let mut distance_m = 0.0;
     let mut last = points.first();
@@ -234,7 +242,7 @@ pub fn distances_m(points: &[[f64; 3]]) -> Vec<f64> {
     all
 }
 
-/// Cells of the heights along a side of a cell that is planned on.
+/// Width of a planning cell in cells of the heights.
 fn coarsening(heights: &Grid, parameters: &RouteParameters) -> Result<usize, JobError> {
     let Some(plan_cell_m) = parameters.plan_cell_m else { return Ok(1) };
     let g = &heights.geometry;
@@ -243,14 +251,14 @@ fn coarsening(heights: &Grid, parameters: &RouteParameters) -> Result<usize, Job
     let side = g.rows.min(g.cols) as f64;
     if step * 2.0 > side {
         return Err(JobError::input(format!(
-            "`plan_cell_m` of {plan_cell_m} m leaves fewer than two cells of the terrain's {} x {} cells of {dx} x {dy} m",
+            "`plan_cell_m` of {plan_cell_m} m leaves fewer than two planning cells along a side of the terrain, which has {} x {} cells of {dx} x {dy} m",
             g.rows, g.cols
         )));
     }
     Ok(step as usize)
 }
 
-/// Factor of the cost of each cell of the heights, where the cost has one.
+/// Cost factor of each cell of the heights; `None` if the cost has none.
 fn factors(heights: &Grid, parameters: &RouteParameters, given: &Given) -> Result<Option<Grid>, JobError> {
     Ok(match parameters.cost {
         Cost::Slope | Cost::Energy => None,
@@ -270,7 +278,7 @@ fn factors(heights: &Grid, parameters: &RouteParameters, given: &Given) -> Resul
     })
 }
 
-/// RMS around each cell in the band of wavelengths that shakes the vehicle, m.
+/// RMS height around each cell in the band of wavelengths that excites the vehicle, m.
 fn band_rms(heights: &Grid, given: &Given) -> Result<Grid, JobError> {
     let vehicle = given.vehicle.as_ref().ok_or_else(|| JobError::new("`cost = \"band_rms\"` needs a `vehicle`"))?;
     let band = WaveBand::of_vehicle(vehicle.wheelbase_m(), vehicle.parameters().wheels.radius_m).map_err(failed)?;
@@ -281,17 +289,19 @@ fn band_rms(heights: &Grid, given: &Given) -> Result<Grid, JobError> {
     Ok(Detrended::of(heights, &band, Detrender::Band).rms_map())
 }
 
-/// A raster at the cells of the heights; NaN where it has no data.
+/// A raster resampled to the cells of the heights; NaN where it has no data.
 fn on_cells_of(heights: &Grid, raster: &Grid) -> Result<Grid, JobError> {
     let g = heights.geometry;
     if !g.overlaps(&raster.geometry) {
-        return Err(JobError::input("`cost_raster` shares no ground with the terrain; it must lie in its coordinates"));
+        return Err(JobError::input(
+            "`cost_raster` does not overlap the terrain; convert it to the coordinates of the terrain",
+        ));
     }
     let value = |row: usize, col: usize| raster.height(g.x(col), g.y(row)).unwrap_or(f64::NAN);
     Ok(Grid::new(g, (0..g.rows).flat_map(|r| (0..g.cols).map(move |c| (r, c))).map(|(r, c)| value(r, c)).collect()))
 }
 
-/// Blocks the cells without a factor.
+/// Blocks the cells without a cost factor.
 fn block_unknown(map: &mut TravelMap, factors: Grid) -> Vec<f64> {
     let unknown = factors.values.iter().zip(0..).filter(|(factor, _)| factor.is_nan());
     unknown.for_each(|(_, node)| map.block(node));
@@ -304,4 +314,68 @@ fn refused(error: ParameterError) -> JobError {
 
 fn failed(error: impl Display) -> JobError {
     JobError::input(format!("failed to {error}"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::Geometry;
+
+    fn heights() -> Grid {
+        Grid::filled(Geometry { rows: 10, cols: 20, cell: [0.5, 0.25], origin: [100.0, 50.0] }, 0.0)
+    }
+
+    /// Distances grow along the line, back and forth; a line without points has none.
+    #[test]
+    fn val_distances_along_a_line() {
+        let line = [[1.0, 1.0, 0.0], [4.0, 5.0, 9.0], [4.0, 5.0, 0.0], [1.0, 1.0, 5.0]];
+        assert_eq!(distances_m(&line), [0.0, 5.0, 5.0, 10.0]);
+        assert!(distances_m(&[]).is_empty());
+    }
+
+    /// The wider side of a cell, here 0.5 m, is compared with the planning cell, and two planning cells must fit along the shorter side.
+    #[test]
+    fn val_planning_cells_are_whole_numbers_of_cells() {
+        let of = |plan_cell_m: Option<f64>| {
+            let parameters = RouteParameters { plan_cell_m, ..RouteParameters::default() };
+            coarsening(&heights(), &parameters).map_err(|e| e.message)
+        };
+        let steps = [None, Some(0.1), Some(0.6), Some(1.3), Some(2.5)].map(|cell| of(cell).unwrap());
+        assert_eq!(steps, [1, 1, 1, 3, 5]);
+        let error = of(Some(3.0)).unwrap_err();
+        assert!(error.starts_with("`plan_cell_m` of 3 m leaves fewer than two planning cells"), "{error}");
+    }
+
+    /// A plane stays a plane on other cells; beyond the raster, there are no factors.
+    #[test]
+    fn val_rasters_are_resampled_to_the_heights() {
+        let plane = |x: f64, y: f64| 2.0 * x - 3.0 * y;
+        // It covers the western half of the heights.
+        let g = Geometry { rows: 6, cols: 6, cell: [1.0, 1.0], origin: [99.0, 48.0] };
+        let raster = Grid::new(g, (0..36).map(|k| plane(g.x(k % 6), g.y(k / 6))).collect());
+        let found = on_cells_of(&heights(), &raster).unwrap();
+        let h = found.geometry;
+        assert_eq!(h, heights().geometry);
+        for (row, col) in (0..h.rows).flat_map(|row| (0..h.cols).map(move |col| (row, col))) {
+            let (x, y) = (h.x(col), h.y(row));
+            let (value, inside) = (found.at(row, col), x <= 104.5);
+            assert_eq!(value.is_finite(), inside, "{row} {col}");
+            assert!(!inside || (value - plane(x, y)).abs() < 1e-9, "{row} {col}: {value}");
+        }
+        let elsewhere = Grid::filled(Geometry::square(3, 3, 1.0), 1.0);
+        assert!(on_cells_of(&heights(), &elsewhere).unwrap_err().message.contains("does not overlap the terrain"));
+    }
+
+    /// Obstacles add up; no more cells change nothing.
+    #[test]
+    fn val_blocked_cells_add_up() {
+        let cells = |marked: [bool; 4]| Some(Grid::new(Geometry::square(2, 2, 1.0), marked.to_vec()));
+        let mut given = Given::default();
+        given.add_blocked(None);
+        assert_eq!(given.blocked, None);
+        given.add_blocked(cells([true, false, false, false]));
+        given.add_blocked(cells([false, false, true, false]));
+        given.add_blocked(None);
+        assert_eq!(given.blocked, cells([true, false, true, false]));
+    }
 }

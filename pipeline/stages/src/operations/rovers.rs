@@ -1,4 +1,4 @@
-//! Ground for rovers, and words about their drives: the same for studies and verbs.
+//! Ground for rovers, and notes on their drives. Shared by studies and verbs.
 
 use crate::builder::Heightfield;
 use crate::job::JobError;
@@ -17,29 +17,29 @@ use sastrugi_store::mcap::{ROCK, SAND};
 use sastrugi_terrain::planetary::{self, Clearing, GROUND_BYTES_PER_TILE, Planetary, RawPlanetary, WorldGround};
 use std::path::Path;
 
-/// Tiles of a world that are kept: 400 squares of 5 m at samples of 2 cm, 0.24 GB.
+/// Number of tiles of a world kept in memory: 400 squares of 5 m sampled at 2 cm take 0.24 GB.
 const TILES: usize = 400;
-/// How far the map of an oracle reaches beyond all starts and goals, m.
+/// Margin of the map of an oracle beyond all starts and goals, m.
 const BEYOND_M: f64 = 10.0;
-/// Limit of slopes of a map whose steep cells are blocked, deg.
+/// Slope limit of a flat map on which steep cells are blocked already, deg.
 const LEVEL_DEG: f64 = 45.0;
-/// Maps of a terrain beside its heights.
+/// Maps of a terrain next to its heights.
 const CLASS: &str = "class.tif";
 const ALBEDO: &str = "albedo.tif";
 
 /// Ground to drive on.
 pub enum Grounds {
-    /// A whole world, made around the rovers.
+    /// An unbounded world, generated around the rovers.
     World(Box<WorldGround>),
     /// The cells of a heightfield.
     Grid(GroundGrid),
 }
 
 impl Grounds {
-    /// Whether rovers can be asked to drive there.
+    /// Checks that rovers can drive on this heightfield.
     ///
     /// # Errors
-    /// A distance of samples that the world does not have.
+    /// A sample spacing that the world does not support.
     pub fn check(field: &Heightfield, parameters: &RoverParameters) -> Result<(), ParameterError> {
         match planetary(field)? {
             Some(world) => world.check_samples(parameters.cell_m),
@@ -53,22 +53,22 @@ impl Grounds {
     /// The first of them.
     fn check_places(&self, starts: &[Start]) -> Result<(), JobError> {
         match self {
-            Self::World(world) => places_on(&world.view(), starts, ""),
-            Self::Grid(grid) => places_on(grid, starts, &reach(&grid.heights.geometry)),
+            Self::World(world) => check_ground(&world.view(), starts, ""),
+            Self::Grid(grid) => check_ground(grid, starts, &extent(&grid.heights.geometry)),
         }
     }
 
-    /// The ground of a terrain, and the starts of a trial on it; `heights` is its file, beside which its maps lie.
+    /// The ground of a terrain, and the starts of a trial on it; `heights` is the path of its heights, next to which its maps are.
     ///
     /// # Errors
-    /// Files that cannot be read, starts or goals off the ground.
+    /// Files that cannot be read, or starts or goals off the ground.
     pub fn new(
         field: &Heightfield,
         heights: &Path,
         parameters: &RoverParameters,
         streams: &Streams,
     ) -> Result<(Self, Vec<Start>), JobError> {
-        let starts = anywhere(parameters, streams);
+        let starts = unchecked_starts(parameters, streams);
         let grounds = Self::around(field, heights, parameters, &starts)?;
         let starts = match &grounds {
             Self::World(_) => starts,
@@ -88,7 +88,7 @@ impl Grounds {
             let clearing = |centre_m: [f64; 2]| Clearing { centre_m, radius_m: parameters.clear_m };
             let places = starts.iter().map(|s| s.start_m).chain(starts.iter().map(|s| s.goal_m));
             let mut clearings: Vec<Clearing> = places.map(clearing).collect();
-            // Rovers of a circle have one goal.
+            // Rovers that start on a circle share one goal.
             clearings.dedup();
             let world = world.with_inputs(&read_kept(heights, &world)?).map_err(JobError::new)?;
             let ground = world.ground(streams, parameters.cell_m, &clearings, TILES).map_err(JobError::new)?;
@@ -97,8 +97,8 @@ impl Grounds {
         let heights_m = dem::read(heights).map_err(input_error)?.grid.to_f32();
         if let Some(step_m) = height_step_m(&heights_m.values).filter(|step_m| *step_m > HEIGHT_STEP_MAX_M) {
             return Err(JobError::input(format!(
-                "heights come in steps of {:.1} mm, which rovers would take for rocks; they need steps of at most {:.0} mm: \
-                 floating-point heights, or less relief in one file; terraces made on purpose need fewer than 8 levels",
+                "heights come in steps of {:.1} mm, which rovers would mistake for rocks; steps must be at most {:.0} mm: use \
+                 floating-point heights or less relief per file (intended terraces must have fewer than 8 levels)",
                 1e3 * step_m,
                 1e3 * HEIGHT_STEP_MAX_M
             )));
@@ -118,12 +118,12 @@ impl Grounds {
     }
 }
 
-/// The way of a rover that knows the whole map.
+/// The path of a rover that knows the complete map.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Oracle {
     /// Its length, m.
     Found(f64),
-    /// There is none, on the map around all starts and goals.
+    /// The map around all starts and goals has no such path.
     None,
 }
 
@@ -136,7 +136,7 @@ impl Oracle {
         }
     }
 
-    /// Length; NaN where there is no way.
+    /// Length, m; NaN if there is no path.
     pub fn length_m(&self) -> f64 {
         match self {
             Self::Found(length_m) => *length_m,
@@ -145,11 +145,11 @@ impl Oracle {
     }
 }
 
-/// For each start the shortest way around rocks above the clearance and steep sand ([`Task::obstacle_limits`]): lines at any angle over a map
-/// of 0.1 m cells, which reaches beyond all starts and goals.
+/// For each start, the shortest path around rocks higher than the clearance and around steep sand ([`Task::obstacle_limits`]): lines at any
+/// angle on a map of 0.1 m cells that extends beyond all starts and goals.
 ///
 /// # Errors
-/// A map that cannot be planned on.
+/// A map on which no path can be planned.
 pub fn oracles(grounds: &Grounds, task: &Task, starts: &[Start]) -> Result<Vec<Oracle>, JobError> {
     let places = || starts.iter().flat_map(|s| [s.start_m, s.goal_m]);
     let end = |axis: usize, sign: f64| places().map(|at| sign * at[axis]).fold(f64::NEG_INFINITY, f64::max) + BEYOND_M;
@@ -179,7 +179,7 @@ pub fn oracles(grounds: &Grounds, task: &Task, starts: &[Start]) -> Result<Vec<O
     starts.par_iter().map(one).collect()
 }
 
-/// The world of a planetary terrain.
+/// The world of a planetary terrain; `None` for other terrains.
 fn planetary(field: &Heightfield) -> Result<Option<Planetary>, ParameterError> {
     if field.kind != planetary::KIND {
         return Ok(None);
@@ -188,7 +188,7 @@ fn planetary(field: &Heightfield) -> Result<Option<Planetary>, ParameterError> {
     Planetary::try_from(raw).map(Some)
 }
 
-/// Rock and sand by the codes of recordings.
+/// Rock and sand as the class codes of recordings.
 pub fn ground_codes(around: &Surroundings) -> Grid<u8> {
     let code = |class: &Option<GroundClass>| match class {
         Some(GroundClass::Sand) => SAND,
@@ -198,48 +198,48 @@ pub fn ground_codes(around: &Surroundings) -> Grid<u8> {
     Grid { geometry: around.classes.geometry, values: around.classes.values.iter().map(code).collect() }
 }
 
-/// Starts without a look at the ground.
-fn anywhere(parameters: &RoverParameters, streams: &Streams) -> Vec<Start> {
+/// Starts drawn without checking for ground.
+fn unchecked_starts(parameters: &RoverParameters, streams: &Streams) -> Vec<Start> {
     parameters.starts(streams, |_| true)
 }
 
-/// A sentence on starts that were drawn again, for want of ground.
+/// A note on starts that were redrawn because they or their goals had no ground.
 pub fn redrawn(parameters: &RoverParameters, streams: &Streams, starts: &[Start]) -> Option<String> {
-    let count = anywhere(parameters, streams).iter().zip(starts).filter(|(first, kept)| first != kept).count();
+    let count = unchecked_starts(parameters, streams).iter().zip(starts).filter(|(first, kept)| first != kept).count();
     (count > 0)
-        .then(|| format!("{count} of {} starts were drawn again: they or their goals had no ground", starts.len()))
+        .then(|| format!("{count} of {} starts were redrawn because they or their goals had no ground", starts.len()))
 }
 
-/// Words on where a terrain lies.
-fn reach(g: &Geometry) -> String {
+/// Text on the extent of a terrain.
+fn extent(g: &Geometry) -> String {
     let [[west, south], [width, height]] = [g.origin, g.size()];
     let (east, north) = (west + width, south + height);
-    format!(" (it reaches from x = {west:.3} to {east:.3} and y = {south:.3} to {north:.3} m)")
+    format!(" (it extends from x = {west:.3} to {east:.3} m and from y = {south:.3} to {north:.3} m)")
 }
 
 /// Refuses starts and goals without ground.
-fn places_on(ground: &impl Ground, starts: &[Start], reach: &str) -> Result<(), JobError> {
+fn check_ground(ground: &impl Ground, starts: &[Start], extent: &str) -> Result<(), JobError> {
     for (what, [x, y]) in starts.iter().flat_map(|s| [("start", s.start_m), ("goal", s.goal_m)]) {
         ground.at(x, y).map_err(|nowhere| {
-            let advice = "choose another centre, or a smaller `radius_m` or `distance_m`";
-            JobError::input(format!("a {what} lies off the terrain: {nowhere}{reach}; {advice}"))
+            let advice = "choose another centre or a smaller `radius_m` or `distance_m`";
+            JobError::input(format!("a {what} lies off the terrain: {nowhere}{extent}; {advice}"))
         })?;
     }
     Ok(())
 }
 
-/// Why a rover went no farther, in words.
+/// A note on why a rover did not reach its goal.
 pub fn note(drive: &Drive, task: &Task) -> Option<String> {
     let Drive { residual_m, .. } = drive;
     match drive.ending {
         Ending::Reached => None,
-        Ending::Lost => Some(format!("believed to be at the goal, which was {residual_m:.2} m away")),
-        Ending::NoWay => Some("found no way to the goal".to_owned()),
+        Ending::Lost => Some(format!("stopped where it believed the goal to be, {residual_m:.2} m from it")),
+        Ending::NoWay => Some("found no path to the goal".to_owned()),
         Ending::DistanceLimit => {
-            Some(format!("drove {} m, the limit, and was {residual_m:.2} m from the goal", task.distance_limit_m))
+            Some(format!("reached the distance limit of {} m, {residual_m:.2} m from the goal", task.distance_limit_m))
         }
         Ending::CycleLimit => {
-            Some(format!("took {} cycles, the limit, and was {residual_m:.2} m from the goal", task.cycle_limit))
+            Some(format!("reached the limit of {} cycles, {residual_m:.2} m from the goal", task.cycle_limit))
         }
         Ending::OffGround(nowhere) => Some(nowhere.to_string()),
     }

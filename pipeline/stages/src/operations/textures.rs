@@ -1,39 +1,39 @@
-//! A texture laid onto its base, and what is said of it.
+//! Adds a texture to its base, and notes on the result.
 
 use crate::job::JobError;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
 
-/// A texture with its heights multiplied.
+/// A texture with its heights multiplied by a factor.
 pub fn scaled(texture: Grid, factor: f64) -> Grid {
     if factor == 1.0 { texture } else { texture.map(|height| factor * height) }
 }
 
-/// Said of holes that are filled by an empirical fit.
+/// A note on holes filled with an empirical fit.
 pub fn fill_note(fit: &FitFile) -> Option<String> {
     let model = &fit.map.as_ref()?.model;
     let text = "the fit is empirical; holes are filled with the fitted model";
     Some(format!("{text} ({model}), not with the measured covariance"))
 }
 
-/// Said where a texture is added to the DEM that its fit was made from; `background` says where to find that DEM without its
+/// A note on a texture added to the DEM to which its model was fitted; `background` states where to find that DEM without its
 /// texture.
 pub fn has_its_texture(background: &str) -> String {
     format!(
-        "the base is the DEM that was fitted and still has its own texture; add the texture to the background of the fit \
-         ({background}; in a release fit/<id>.background.tif)"
+        "the base is the fitted DEM, which still has its own texture; add the texture to the background of the fit instead \
+         ({background}; in a release, fit/<id>.background.tif)"
     )
 }
 
-/// Base plus texture; a texture that does not repeat without seams must cover the base.
+/// Adds a texture to a base. A texture that does not repeat without seams must cover the base.
 ///
 /// # Errors
-/// Cell sizes that differ, or a base larger than such a texture.
+/// Different cell sizes, or a base larger than such a texture.
 pub fn lay_onto(base: &Grid, texture: &Grid, periodic: bool, factors: Option<&Grid>) -> Result<Grid, JobError> {
     let larger = base.rows() > texture.rows() || base.cols() > texture.cols();
     if larger && !periodic {
         return Err(JobError::new(format!(
-            "the base of {} x {} cells is larger than the texture of {} x {}, which does not repeat without seams; make the \
+            "the base of {} x {} cells is larger than the texture of {} x {} cells, which does not repeat without seams; make the \
              texture larger or periodic",
             base.rows(),
             base.cols(),

@@ -1,7 +1,7 @@
-//! From results to a sealed release: artifacts, tables, documents, report, checksums, one rename.
+//! Assembles results into a sealed release: artifacts, tables, documents, report, checksums, and a final rename.
 //!
-//! Records are read one at a time, parents first, and tables are written in row groups: of what an item made, only the manifest's
-//! lines on its files and the keys of its rows stay in memory.
+//! Records are read one at a time, parents first, and tables are written in row groups. Of each item, only the manifest entries of its
+//! files and the keys of its rows stay in memory.
 
 use super::cache::{Record, StoredFile, load_record};
 use super::damage::damaged;
@@ -20,26 +20,26 @@ use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
-/// What goes into a release.
+/// Contents of a release.
 pub struct Contents<'a> {
     /// The study.
     pub study: &'a Study,
-    /// Its text as it is released.
+    /// Its text in the release.
     pub text: &'a str,
-    /// Which terrains are for training, validation and test.
+    /// Assignment of terrains to train, validation and test.
     pub splits: &'a Splits,
     /// Folders of the results, parents before children.
     pub results: Vec<PathBuf>,
     /// Items without a result.
     pub failures: &'a [Failure],
-    /// Whether a release of the same study may be replaced by this one where it has fewer failed items.
+    /// Whether a release of the same study may be replaced even if it has fewer failed items than this one.
     pub replace: bool,
 }
 
 /// Assembles and seals a release.
 ///
 /// # Errors
-/// A destination that is not ours or holds more of the study, results that cannot be read, or a file system that refuses.
+/// A destination that is not a sastrugi release or has fewer failed items of the same study, results that cannot be read, or an I/O error.
 pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
     let mut sources = Sources::of(contents.study)?;
     let _lock = DestinationLock::take(dest)?;
@@ -63,8 +63,8 @@ pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -
     builder.seal(dest).map_err(Error::from)
 }
 
-/// One writer per destination: a lock file beside it, removed when the writer ends. The operating system frees the lock of
-/// a killed one.
+/// Ensures that only one process writes to a destination. The lock file next to it is removed when the writer ends; the operating system
+/// releases the lock of a killed one.
 pub struct DestinationLock {
     path: PathBuf,
     _file: File,
@@ -74,7 +74,7 @@ impl DestinationLock {
     /// Takes the lock of a destination.
     ///
     /// # Errors
-    /// [`Error::Retry`] while another process writes there.
+    /// [`Error::Retry`] while another process writes to it.
     pub fn take(dest: &Path) -> Result<Self, Error> {
         let path = release::beside(dest, "lock");
         if let Some(folder) = path.parent().filter(|f| !f.as_os_str().is_empty()) {
@@ -89,7 +89,7 @@ impl DestinationLock {
 
 impl Drop for DestinationLock {
     fn drop(&mut self) {
-        // A lock file that stays is harmless: what counts is the lock.
+        // A leftover lock file is harmless: only the lock matters.
         let _ = std::fs::remove_file(&self.path);
     }
 }
@@ -107,7 +107,7 @@ impl Contents<'_> {
     }
 }
 
-/// What the release of a study says of itself; `text` is the study as it is released.
+/// The head of a release; `text` is the study in its released form.
 pub fn head(study: &Study, text: &str) -> Head {
     Head {
         name: study.head.name.clone(),
@@ -121,7 +121,7 @@ pub fn head(study: &Study, text: &str) -> Head {
 /// The error for a run that would replace one of the same study with fewer failed items.
 pub fn fewer_items(dest: &Path, before: usize, now: usize) -> Error {
     Error::Failed(format!(
-        "{}: not replaced: it has {before} failed items of this study and this run has {now}; add --replace to replace it anyway",
+        "{}: not replaced, because it has {before} failed items and this run of the same study has {now}; use --replace to replace it anyway",
         dest.display()
     ))
 }
@@ -129,10 +129,10 @@ pub fn fewer_items(dest: &Path, before: usize, now: usize) -> Error {
 /// The record of a result.
 pub(super) fn record(folder: &Path) -> Result<Record, Error> {
     load_record(folder)
-        .ok_or_else(|| Error::Failed(format!("{}: the result was changed while it was used", folder.display())))
+        .ok_or_else(|| Error::Failed(format!("{}: the result changed while it was in use", folder.display())))
 }
 
-/// What the manifest says of the files that an item brings into the release.
+/// The manifest entries of the files that an item adds to the release.
 pub fn artifacts(record: &Record, sources: &Sources) -> Vec<Artifact> {
     let artifact = |file: &StoredFile| {
         let origin = Origin {
@@ -150,14 +150,14 @@ pub fn artifacts(record: &Record, sources: &Sources) -> Vec<Artifact> {
     record.files.iter().filter_map(artifact).collect()
 }
 
-/// What a reader must know of an item.
+/// The notes of an item, for the manifest.
 pub fn notes_of(record: &Record) -> Vec<ItemNote> {
     let ItemRef { stage, id } = &record.item;
     let note = |note: &String| ItemNote { stage: stage.clone(), item: id.clone(), note: note.clone() };
     record.notes.iter().map(note).collect()
 }
 
-/// Copies the files of all results, reading each record once; gives the fragments of the tables.
+/// Copies the files of all results, reading each record once. Returns the fragments of the tables.
 fn add_results(
     builder: &mut ReleaseBuilder,
     contents: &Contents<'_>,
@@ -252,5 +252,17 @@ mod tests {
         drop(first);
         drop(DestinationLock::take(&dest).unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn val_files_of_all_folders_are_listed_in_order() {
+        let root = tempfile::tempdir().unwrap();
+        for path in ["report/b.html", "report/a/d.svg", "report/a/c.svg", "tables/x.parquet"] {
+            let path = root.path().join(path);
+            std::fs::create_dir_all(path.parent().unwrap()).unwrap();
+            std::fs::write(path, b"x").unwrap();
+        }
+        let found = files_below(root.path(), Path::new("report")).unwrap();
+        assert_eq!(found, ["report/a/c.svg", "report/a/d.svg", "report/b.html"]);
     }
 }

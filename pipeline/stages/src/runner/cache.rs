@@ -1,8 +1,8 @@
-//! The work area: finished items by key, each in a folder that appears whole or not at all.
+//! The work area: finished items by key, each in a folder that appears complete or not at all.
 //!
-//! `items/<stage>/<id>/<key>/` holds an item's files and `record.json`. A job writes into a folder with a name that no
-//! reader takes for a result; every file is flushed as it is written, the record comes last, then the folder, and one
-//! rename makes it a result.
+//! `items/<stage>/<id>/<key>/` holds the files of an item and `record.json`. A job writes into a folder whose name marks it as
+//! unfinished. Every file is flushed as it is written, the record last, then the folder; a single rename then turns the folder
+//! into a result.
 
 use super::graph::{Graph, Ingredients};
 use super::lock;
@@ -20,12 +20,13 @@ const RECORD: &str = "record.json";
 const FAILURE: &str = "failure.json";
 /// File that marks a work area.
 const MARK: &str = "CACHEDIR.TAG";
-/// Its text: backups leave such folders out (Cache Directory Tagging Specification).
+/// Its text; backup programs skip folders marked like this (Cache Directory Tagging Specification). Work areas are recognised by the exact
+/// text, so it must not change.
 const MARK_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n# Work area of sastrugi: finished items of a study. It can be removed; \
     a run then makes them again.\n";
 /// Hexadecimal digits of a key.
 const KEY_DIGITS: usize = 32;
-/// Start of the name of a folder that a job writes into.
+/// Prefix of the name of a folder that a job writes into.
 const UNFINISHED: &str = "unfinished-";
 
 /// A finished item.
@@ -35,11 +36,11 @@ pub struct Record {
     pub item: ItemRef,
     /// Its key.
     pub key: String,
-    /// What the key is made of.
+    /// The inputs of its key.
     pub ingredients: Ingredients,
     /// Its files.
     pub files: Vec<StoredFile>,
-    /// Sentences that a reader must know.
+    /// Its notes.
     pub notes: Vec<String>,
 }
 
@@ -53,10 +54,10 @@ struct Failed {
 /// A file of a finished item.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct StoredFile {
-    /// What it is.
+    /// The product stored in it.
     #[serde(flatten)]
     pub product: Product,
-    /// Length, bytes.
+    /// Size, bytes.
     pub bytes: u64,
     /// SHA-256 of the bytes.
     pub sha256: String,
@@ -68,20 +69,20 @@ pub enum CacheError {
     /// Another run holds it.
     #[error("another run is using {0}; wait for it or choose another folder with --work")]
     Busy(PathBuf),
-    /// The folder holds something else.
-    #[error("{0}: not a sastrugi work area, and not empty; choose another folder with --work")]
+    /// The folder contains other files.
+    #[error("{0} is neither empty nor a sastrugi work area; choose another folder with --work")]
     NotOurs(PathBuf),
-    /// A symbolic link where the work area has folders of its own.
+    /// A symbolic link in place of a folder of the work area.
     #[error("{0} is a symbolic link, which a work area cannot contain; remove it or choose another folder with --work")]
     Link(PathBuf),
-    /// The file system refused.
+    /// An I/O error.
     #[error("{action} {path}: {source}")]
     Io {
-        /// What was tried.
+        /// The action that failed.
         action: &'static str,
-        /// Where.
+        /// The path.
         path: PathBuf,
-        /// Why not.
+        /// The cause.
         source: io::Error,
     },
 }
@@ -98,10 +99,10 @@ pub struct Cache {
 }
 
 impl Cache {
-    /// Opens or makes a work area, takes its lock, and clears what killed runs left unfinished.
+    /// Opens or creates a work area, takes its lock, and removes unfinished results of killed runs.
     ///
     /// # Errors
-    /// When the folder holds anything but a work area, another run holds it, or the file system refuses.
+    /// When the folder contains anything other than a work area, another run holds its lock, or an I/O error occurs.
     pub fn open(folder: &Path) -> Result<Self, CacheError> {
         mark(folder)?;
         let path = folder.join("lock");
@@ -114,7 +115,7 @@ impl Cache {
         Ok(cache)
     }
 
-    /// A work area to look at, whoever is writing to it; nothing in it changes.
+    /// Opens a work area read-only, without taking its lock.
     pub fn look(folder: &Path) -> Self {
         Self { folder: folder.to_owned(), _lock: None }
     }
@@ -133,17 +134,17 @@ impl Cache {
         self.item_folder(item).join(key)
     }
 
-    /// The record of a result, if it is there and its files have their lengths.
+    /// The record of a result, if it exists and its files have the recorded sizes.
     pub fn load(&self, item: &ItemRef, key: &str) -> Option<Record> {
         load_record(&self.result_folder(item, key))
     }
 
-    /// True when [`Self::load`] finds a result.
+    /// True if [`Self::load`] finds a result.
     pub fn holds(&self, item: &ItemRef, key: &str) -> bool {
         self.load(item, key).is_some()
     }
 
-    /// True when the item was tried before, with whatever key.
+    /// True if the item was tried before, with any key.
     pub fn knows(&self, item: &ItemRef) -> bool {
         self.item_folder(item).exists()
     }
@@ -156,16 +157,16 @@ impl Cache {
         folders.iter().find_map(|folder| load_record(folder)).map(|record| record.ingredients)
     }
 
-    /// Why an item failed when it was last tried with this key.
+    /// The message with which an item last failed, if it was tried with this key.
     pub fn failure(&self, item: &ItemRef, key: &str) -> Option<String> {
         let failed: Failed = read_json(&self.item_folder(item).join(FAILURE))?;
         (failed.key == key).then_some(failed.message)
     }
 
-    /// Keeps the reason of a failure for the next plan.
+    /// Stores the message of a failure for the next plan.
     ///
     /// # Errors
-    /// When the file system refuses.
+    /// I/O errors.
     pub fn keep_failure(&self, item: &ItemRef, key: &str, message: &str) -> Result<(), CacheError> {
         let path = self.item_folder(item).join(FAILURE);
         let failed = Failed { key: key.to_owned(), message: message.to_owned() };
@@ -173,23 +174,23 @@ impl Cache {
         atomic::write(&path, &text).map_err(io_error("cannot write", &path))
     }
 
-    /// A fresh folder for a job to write into.
+    /// Creates an empty folder for a job to write into.
     ///
     /// # Errors
-    /// When the file system refuses.
+    /// I/O errors.
     pub fn begin(&self, item: &ItemRef, key: &str) -> Result<PathBuf, CacheError> {
         let folder = self.item_folder(item).join(format!("{UNFINISHED}{key}"));
         if folder.exists() {
             fs::remove_dir_all(&folder).map_err(io_error("cannot clear", &folder))?;
         }
-        fs::create_dir_all(&folder).map_err(io_error("cannot make", &folder))?;
+        fs::create_dir_all(&folder).map_err(io_error("cannot create", &folder))?;
         Ok(folder)
     }
 
-    /// Makes a job's folder a result.
+    /// Turns the folder of a job into a result.
     ///
     /// # Errors
-    /// When a product is missing, or the file system refuses.
+    /// When a product is missing, or an I/O error occurs.
     pub fn finish(
         &self,
         graph: &Graph,
@@ -216,10 +217,10 @@ impl Cache {
         Ok(record)
     }
 
-    /// Drops every result that no item of the graph has.
+    /// Removes every result that does not belong to an item of the graph. Returns their number.
     ///
     /// # Errors
-    /// When the file system refuses.
+    /// I/O errors.
     pub fn drop_orphans(&self, graph: &Graph) -> Result<usize, CacheError> {
         let keys: std::collections::BTreeSet<PathBuf> =
             (0..graph.len()).map(|p| self.result_folder(&graph.node(p).item, graph.key(p))).collect();
@@ -250,9 +251,9 @@ impl Cache {
     }
 }
 
-/// Makes a folder a work area. Only in such folders anything is ever removed.
+/// Marks a folder as a work area. Files are only ever removed from marked folders.
 fn mark(folder: &Path) -> Result<(), CacheError> {
-    fs::create_dir_all(folder).map_err(io_error("cannot make the work area", folder))?;
+    fs::create_dir_all(folder).map_err(io_error("cannot create the work area", folder))?;
     let path = folder.join(MARK);
     match fs::read(&path) {
         Ok(text) if text == MARK_TEXT.as_bytes() => return Ok(()),
@@ -261,20 +262,20 @@ fn mark(folder: &Path) -> Result<(), CacheError> {
         Err(e) => return Err(io_error("cannot read", &path)(e)),
     }
     let entries = fs::read_dir(folder).map_err(io_error("cannot list", folder))?;
-    // Another run may be marking it.
+    // Another run may be marking the folder at the same time.
     if entries.flatten().any(|entry| !atomic::is_temporary(&entry.file_name())) && !path.exists() {
         return Err(CacheError::NotOurs(folder.to_owned()));
     }
     atomic::write(&path, MARK_TEXT.as_bytes()).map_err(io_error("cannot write", &path))
 }
 
-/// True for the name of a result's folder, or of one that a job writes into.
+/// True for the name of a folder with a result, finished or unfinished.
 fn is_result(name: &str) -> bool {
     let key = name.strip_prefix(UNFINISHED).unwrap_or(name);
     key.len() == KEY_DIGITS && key.bytes().all(|b| b.is_ascii_hexdigit())
 }
 
-/// Folders below a folder, sorted; none when it is not there. Links are not followed: what they lead to is not ours.
+/// Subfolders of a folder, sorted; empty if the folder does not exist. Links are refused, because their targets are not part of the work area.
 fn children(folder: &Path) -> Result<Vec<PathBuf>, CacheError> {
     if fs::symlink_metadata(folder).is_ok_and(|there| there.is_symlink()) {
         return Err(CacheError::Link(folder.to_owned()));
@@ -298,23 +299,23 @@ fn children(folder: &Path) -> Result<Vec<PathBuf>, CacheError> {
     Ok(paths)
 }
 
-/// The record in a result's folder, if it is whole and the files have their lengths.
+/// The record in the folder of a result, if it is complete and the files have the recorded sizes.
 pub fn load_record(folder: &Path) -> Option<Record> {
     let record: Record = read_json(&folder.join(RECORD))?;
-    are_whole(folder, &record.files).then_some(record)
+    are_complete(folder, &record.files).then_some(record)
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Option<T> {
     serde_json::from_slice(&fs::read(path).ok()?).ok()
 }
 
-/// True when all files are there, in the folder itself, with their lengths.
-fn are_whole(folder: &Path, files: &[StoredFile]) -> bool {
-    let whole = |f: &StoredFile| {
+/// True if all files are in the folder itself and have the recorded sizes.
+fn are_complete(folder: &Path, files: &[StoredFile]) -> bool {
+    let complete = |f: &StoredFile| {
         let found = || fs::symlink_metadata(folder.join(&f.product.file));
         check_path(&f.product.file).is_ok() && found().is_ok_and(|m| m.is_file() && m.len() == f.bytes)
     };
-    files.iter().all(whole)
+    files.iter().all(complete)
 }
 
 fn stored(folder: &Path, product: Product) -> Result<StoredFile, CacheError> {

@@ -1,4 +1,4 @@
-//! Runs the items of a graph: as many at once as there are workers and memory for, parents first, each at most once.
+//! Runs the items of a graph, parents first and each at most once, in parallel as far as workers and memory allow.
 
 use super::cache::Cache;
 use super::graph::Graph;
@@ -12,14 +12,14 @@ use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
 use std::time::Instant;
 
-/// Limits of a run. None of them changes a byte of the result.
+/// Limits of a run. They never change a byte of the result.
 #[derive(Clone, Copy, Debug)]
 pub struct Limits {
-    /// Items at once.
+    /// Maximum number of items running at the same time.
     pub workers: usize,
-    /// Sum of the working memory of the items at once, bytes.
+    /// Maximum total working memory of the items running at the same time, bytes.
     pub memory_bytes: u64,
-    /// Whether an item that needs more by itself may run alone; else nothing is run.
+    /// Whether an item that exceeds the memory limit by itself may run alone; otherwise nothing is run.
     pub beyond: bool,
 }
 
@@ -28,26 +28,26 @@ pub struct Limits {
 pub struct Failure {
     /// The item.
     pub item: ItemRef,
-    /// Why.
+    /// Why it failed.
     pub message: String,
-    /// The cause lies in input data.
+    /// Whether the cause is in the input data.
     pub unusable_input: bool,
-    /// The parent without a result that kept this item from being tried.
+    /// The failed parent because of which this item was skipped.
     pub skipped_for: Option<ItemRef>,
     /// Its recipe.
     pub parameters: Value,
 }
 
-/// Why a run ended before its end: an item met an error of the machine.
+/// A run stopped early because an item met an error of the machine.
 #[derive(Debug)]
 pub struct Stopped {
     /// The item.
     pub item: ItemRef,
-    /// What happened.
+    /// The error.
     pub error: JobError,
 }
 
-/// What a run came to.
+/// Outcome of a run.
 #[derive(Debug, Default)]
 pub struct Execution {
     /// Positions with a result, sorted.
@@ -78,12 +78,12 @@ struct Run<'a> {
     changed: Condvar,
 }
 
-/// Brings the `needed` items (parents included) to results.
+/// Computes results for the `needed` items, which must include their parents.
 ///
-/// A process may be ended at any moment: an item that has not finished leaves no result.
+/// The process may be killed at any moment: an unfinished item leaves no result.
 ///
 /// # Errors
-/// The first error of the machine. Items that were running are finished; no other is begun.
+/// The first error of the machine. Items already running are finished; no others are started.
 pub fn execute(
     graph: &Graph,
     cache: &Cache,
@@ -159,7 +159,7 @@ impl Run<'_> {
         }
     }
 
-    /// The next item that may start; `None` when nothing will ever be.
+    /// Waits for the next item that may start; `None` when no more will.
     fn take(&self) -> Option<usize> {
         let mut state = self.lock();
         loop {
@@ -196,11 +196,11 @@ impl Run<'_> {
             })
             .collect();
         let work = Work { folder: Draft(&folder), parents: &parents };
-        // A panic is a bug; it must cost one item, not the run.
+        // A panic is a bug; it must fail one item, not the run.
         let outcome = catch_unwind(AssertUnwindSafe(|| node.job.run(&work)))
             .unwrap_or_else(|panic| Err(JobError::new(format!("internal error: {}", panic_text(&*panic)))));
         let outcome = outcome.inspect_err(|error| {
-            // The reason for the failure matters more than what stays behind: the next run clears it and finds out again.
+            // Errors of the clean-up are ignored, because the reason of the failure matters more: the next run clears the folder and retries.
             let _ = std::fs::remove_dir_all(&folder);
             if !matches!(error.cause, Cause::Machine(_)) {
                 let _ = self.cache.keep_failure(&node.item, key, &error.message);
@@ -262,7 +262,7 @@ impl Run<'_> {
             let node = self.graph.node(child);
             let failure = Failure {
                 item: node.item.clone(),
-                message: format!("not tried, because {cause} failed"),
+                message: format!("skipped, because {cause} failed"),
                 unusable_input: false,
                 skipped_for: Some(cause.clone()),
                 parameters: node.job.recipe(),

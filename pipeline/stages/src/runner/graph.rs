@@ -1,4 +1,4 @@
-//! The graph of items: what depends on what, and the key of each.
+//! The graph of items: their dependencies and keys.
 
 use crate::job::{ItemRef, Job};
 use crate::revision::revision;
@@ -7,30 +7,30 @@ use serde_json::Value;
 use std::collections::BTreeMap;
 use std::path::PathBuf;
 
-/// One item of a study with all that decides its bytes.
+/// One item of a study with everything that determines its bytes.
 pub struct Node {
     /// Its name.
     pub item: ItemRef,
-    /// Items whose artifacts it reads; they stand before it in the graph.
+    /// Items whose artifacts it reads; they come before it in the graph.
     pub parents: Vec<ItemRef>,
     /// Files from outside.
     pub inputs: Vec<InputFile>,
-    /// Words of its random streams, when it draws.
+    /// Label of its random streams, if it draws random numbers.
     pub stream: Option<String>,
-    /// What it does.
+    /// The computation.
     pub job: Box<dyn Job>,
 }
 
 /// A file from outside and the hash of its bytes.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct InputFile {
-    /// Where it is.
+    /// Its path.
     pub path: PathBuf,
     /// SHA-256 of its bytes.
     pub sha256: String,
 }
 
-/// What a key is made of; kept with every result, so that a plan can say why an item is stale.
+/// The inputs of a key; stored with every result, so that a plan can state why an item is stale.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Ingredients {
     /// The job's recipe.
@@ -38,29 +38,29 @@ pub struct Ingredients {
     /// How the job packs its result.
     #[serde(default)]
     pub packing: Value,
-    /// Words of the random streams.
+    /// Label of the random streams.
     pub stream: Option<String>,
     /// SHA-256 of the input files, in order.
     pub inputs: Vec<String>,
-    /// Keys of the parents, however they are packed.
+    /// Keys of the parents, independent of their packing.
     pub parents: BTreeMap<String, String>,
     /// Revision of the code.
     pub revision: String,
 }
 
-/// All items of a study, parents before children. Ingredients are made anew when they are asked for: those of many items
-/// would need far more memory than all else that is known of them.
+/// All items of a study, parents before children. Ingredients are recomputed on every request, because storing those of many items
+/// would take far more memory than the rest of the graph.
 #[derive(Default)]
 pub struct Graph {
     nodes: Vec<Node>,
     keys: Vec<String>,
-    /// Keys of what results hold, where they are packed in another way than the usual one.
+    /// Keys that ignore the packing, for items that do not use the default packing.
     unpacked_keys: BTreeMap<usize, String>,
     index: BTreeMap<ItemRef, usize>,
 }
 
 impl Graph {
-    /// Adds an item; its parents must be there. False when the name is taken or a parent is missing.
+    /// Adds an item after its parents. Returns false if the name is taken or a parent is missing.
     #[must_use]
     pub fn add(&mut self, node: Node) -> bool {
         if self.index.contains_key(&node.item) {
@@ -85,7 +85,7 @@ impl Graph {
         self.nodes.len()
     }
 
-    /// True without items.
+    /// True if there are no items.
     pub fn is_empty(&self) -> bool {
         self.nodes.is_empty()
     }
@@ -110,7 +110,7 @@ impl Graph {
         &self.keys[position]
     }
 
-    /// What the key at a position is made of.
+    /// The ingredients of the key at a position.
     pub fn ingredients(&self, position: usize) -> Ingredients {
         self.ingredients_of(&self.nodes[position])
     }
@@ -128,7 +128,7 @@ impl Graph {
         }
     }
 
-    /// Key of what the result of the item at a position holds, however it is packed.
+    /// Key of the item at a position, independent of its packing.
     fn unpacked_key(&self, position: usize) -> &str {
         self.unpacked_keys.get(&position).unwrap_or(&self.keys[position])
     }
@@ -138,7 +138,7 @@ impl Graph {
         self.nodes[position].parents.iter().filter_map(|p| self.find(p))
     }
 
-    /// The chosen items and all that they need, parents before children.
+    /// The chosen items and all their ancestors, parents before children.
     pub fn closure(&self, chosen: impl IntoIterator<Item = usize>) -> Vec<usize> {
         let mut needed = vec![false; self.len()];
         chosen.into_iter().for_each(|p| needed[p] = true);

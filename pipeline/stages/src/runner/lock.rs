@@ -1,13 +1,13 @@
-//! Locks of the operating system, held through a file: a killed process never blocks the next one.
+//! File locks of the operating system, which are released when a process is killed.
 
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::Path;
 
-/// Takes the lock; `None` while another process holds it. The file is made where there is none, and its content stays.
+/// Takes the lock; `None` while another process holds it. The file is created if it does not exist; its content is kept.
 ///
 /// # Errors
-/// The path leads to anything but a plain file, a symbolic link included; the file system refuses.
+/// The path is not a regular file (symbolic links are refused too), or an I/O error.
 pub fn take(path: &Path) -> io::Result<Option<File>> {
     match fs::symlink_metadata(path) {
         Ok(there) if !there.is_file() => {

@@ -1,4 +1,4 @@
-//! What a run would do, and why.
+//! The plan of a run: the items that it would compute, and why.
 
 use super::cache::Cache;
 use super::graph::{Graph, Ingredients};
@@ -10,30 +10,30 @@ use serde_json::Value;
 pub struct Stale {
     /// Stage and id.
     pub item: String,
-    /// Why.
+    /// Why it is stale.
     pub reason: String,
     /// Estimated time on one core, s.
     pub seconds: f64,
-    /// Estimated bytes.
+    /// Estimated size of its files, bytes.
     pub bytes: f64,
-    /// Peak working memory, bytes; seldom below the true one.
+    /// Peak working memory, bytes; rarely underestimated.
     pub memory_bytes: u64,
 }
 
-/// What a run would do.
+/// The plan of a run.
 #[derive(Clone, Debug, Default, PartialEq, Serialize)]
 pub struct PlanSummary {
-    /// Items of the study, or of a part of it with those that they need.
+    /// Items of the study, or the selected items with their ancestors.
     pub items: usize,
     /// Items with a result.
     pub ready: usize,
     /// Items to compute.
     pub stale: Vec<Stale>,
-    /// What makes no sense in the study though it is allowed, a sentence each.
+    /// Settings of the study that are allowed but make no sense, one sentence each.
     pub doubts: Vec<String>,
 }
 
-/// Compares items of a graph with a work area; in an empty one everything is new.
+/// Compares the items of a graph with a work area; if that is empty, all items are new.
 pub fn plan(graph: &Graph, needed: &[usize], cache: &Cache) -> PlanSummary {
     let mut stale = Vec::new();
     for &position in needed {
@@ -50,7 +50,7 @@ pub fn plan(graph: &Graph, needed: &[usize], cache: &Cache) -> PlanSummary {
     PlanSummary { items: needed.len(), ready: needed.len() - stale.len(), stale, doubts: Vec::new() }
 }
 
-/// Why an item that was tried before has no result.
+/// The reason why an item that was tried before has no current result.
 fn reason(graph: &Graph, cache: &Cache, position: usize) -> String {
     let item = &graph.node(position).item;
     if let Some(message) = cache.failure(item, graph.key(position)) {
@@ -62,7 +62,7 @@ fn reason(graph: &Graph, cache: &Cache, position: usize) -> String {
     }
 }
 
-/// What changed between two lists of ingredients, in words.
+/// Describes the differences between two sets of ingredients.
 fn difference(old: &Ingredients, new: &Ingredients) -> String {
     let mut reasons = Vec::new();
     if old.recipe != new.recipe {
@@ -71,23 +71,23 @@ fn difference(old: &Ingredients, new: &Ingredients) -> String {
         reasons.push(format!("changed: {}", changes.join(", ")));
     }
     if old.packing != new.packing {
-        reasons.push("its raster is packed in another way, or has another file beside it".to_owned());
+        reasons.push("repacked: compression or accompanying files changed".to_owned());
     }
     if old.stream != new.stream {
         reasons.push("the seed or the id changed".to_owned());
     }
     if old.inputs != new.inputs {
-        reasons.push("the input file changed".to_owned());
+        reasons.push("an input file changed".to_owned());
     }
     let parents = new.parents.iter().filter(|(name, key)| old.parents.get(*name) != Some(key));
     let parents: Vec<&str> = parents.map(|(name, _)| name.as_str()).collect();
     if !parents.is_empty() {
-        reasons.push(format!("made from {}, which changed", parents.join(", ")));
+        reasons.push(format!("depends on {}, which changed", parents.join(", ")));
     }
     if old.revision != new.revision {
-        reasons.push("its code changed".to_owned());
+        reasons.push("the code of this stage changed".to_owned());
     }
-    if reasons.is_empty() { "its result is incomplete".to_owned() } else { reasons.join("; ") }
+    if reasons.is_empty() { "the result is incomplete".to_owned() } else { reasons.join("; ") }
 }
 
 /// Paths whose values differ, `path old -> new`.
@@ -136,6 +136,24 @@ mod tests {
         new.recipe = old.recipe.clone();
         new.parents.insert("dem/a".to_owned(), "k2".to_owned());
         new.revision = "s".to_owned();
-        assert_eq!(difference(&old, &new), "made from dem/a, which changed; its code changed");
+        assert_eq!(difference(&old, &new), "depends on dem/a, which changed; the code of this stage changed");
+        let whole = Ingredients {
+            packing: json!("cog"),
+            stream: Some("seed/1".to_owned()),
+            inputs: vec!["ab".to_owned()],
+            ..old.clone()
+        };
+        let expected =
+            "repacked: compression or accompanying files changed; the seed or the id changed; an input file changed";
+        assert_eq!(difference(&old, &whole), expected);
+        assert_eq!(difference(&old, &old), "the result is incomplete");
+    }
+
+    /// Keys that came or went are named like those that changed.
+    #[test]
+    fn val_changed_values() {
+        let old = ingredients(json!({"kind": "waves", "params": {"d": 2.3, "gone": true}}));
+        let new = ingredients(json!({"kind": "waves", "params": {"d": 2.3, "list": [1, 2]}}));
+        assert_eq!(difference(&old, &new), "changed: params.gone true -> null, params.list null -> [1,2]");
     }
 }

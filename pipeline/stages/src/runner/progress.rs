@@ -1,26 +1,26 @@
-//! What a run tells while it goes on. The runner prints nothing itself.
+//! Progress reports of a run. The runner itself prints nothing.
 
 use crate::job::ItemRef;
 
 /// Listener of a run; called from several threads.
 pub trait Progress: Sync {
-    /// `total` items are needed, `ready` of them are there already; `seconds` is the estimated work of the rest on one core.
+    /// `total` items are needed and `ready` of them exist already; `seconds` is the estimated time of the rest on one core, s.
     fn begin(&self, total: usize, ready: usize, seconds: f64) {
         let _ = (total, ready, seconds);
     }
-    /// An item ended; `seconds` is its share of the estimate.
+    /// An item ended; `seconds` is its share of the estimated time, s.
     fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {
         let _ = (item, end, seconds);
     }
-    /// So many bytes of one long work are done; called with 0 when it begins.
+    /// `done` of `total` bytes of one long operation are copied; called with 0 when it begins.
     fn copied(&self, done: u64, total: u64) {
         let _ = (done, total);
     }
-    /// A phase after the items began: assembling, report, checksums.
+    /// A phase after the items has begun: assembling, report, checksums.
     fn phase(&self, text: &str) {
         let _ = text;
     }
-    /// A part of a phase, of interest while it goes on.
+    /// A step of a phase, of interest only while it runs.
     fn step(&self, text: &str) {
         let _ = text;
     }
@@ -29,15 +29,15 @@ pub trait Progress: Sync {
 /// How an item ended.
 #[derive(Clone, Debug, PartialEq)]
 pub enum End {
-    /// Done, with sentences that a reader must know.
+    /// Done, with its notes.
     Done(Vec<String>),
-    /// No result, and why.
+    /// Failed, with the reason.
     Failed(String),
-    /// Not tried, because this parent has no result.
+    /// Skipped, because this parent has no result.
     Skipped(ItemRef),
 }
 
-/// Tells nothing.
+/// Reports nothing.
 pub struct Silent;
 
 impl Progress for Silent {}

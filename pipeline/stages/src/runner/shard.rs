@@ -1,7 +1,7 @@
-//! Shards: one run in N parts on N machines, and joining them again.
+//! Shards: a run split into N parts on N machines, and the merge of the parts.
 //!
-//! An item belongs to shard `1 + (key modulo N)`. A shard computes the parents that its items need, whether they are its
-//! own or not, and keeps its own items only.
+//! An item belongs to shard `1 + (key modulo N)`. A shard computes its own items and all their parents, but keeps only its own
+//! items.
 
 use super::assemble::{DestinationLock, fewer_items};
 use super::cache::{Cache, Record, StoredFile, load_record};
@@ -20,10 +20,22 @@ use std::path::{Path, PathBuf};
 
 const DESCRIPTION: &str = sastrugi_store::release::SHARD;
 const STUDY: &str = "study.toml";
-/// Most parts of a run.
+/// Maximum number of parts of a run.
 const PARTS_MAX: u32 = 100_000;
 
 /// Part `index` of `count`, counted from 1.
+///
+/// ```
+/// use sastrugi_stages::runner::shard::Part;
+///
+/// let part = Part::parse("2/3")?;
+/// assert_eq!((part.index, part.count), (2, 3));
+/// // Every key belongs to one of the three parts.
+/// let key = "0123456789abcdef0123456789abcdef";
+/// assert_eq!((1..=3).filter(|&index| Part { index, count: 3 }.owns(key)).count(), 1);
+/// assert!(Part::parse("4/3").is_err());
+/// # Ok::<(), sastrugi_stages::Error>(())
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
 pub struct Part {
     /// This part.
@@ -40,29 +52,29 @@ impl Part {
     pub fn parse(text: &str) -> Result<Self, Error> {
         let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match numbers {
-            Some((index, count)) if (Self { index, count }).is_one() => Ok(Self { index, count }),
-            _ => Err(Error::Usage(format!("`--shard {text}`: it takes I/N with 1 <= I <= N, as 1/3"))),
+            Some((index, count)) if (Self { index, count }).is_valid() => Ok(Self { index, count }),
+            _ => Err(Error::Usage(format!("`--shard {text}`: expected I/N with 1 <= I <= N, such as 1/3"))),
         }
     }
 
-    /// True for a part that there can be.
-    fn is_one(self) -> bool {
+    /// True if the numbers are in range.
+    fn is_valid(self) -> bool {
         1 <= self.index && self.index <= self.count && self.count <= PARTS_MAX
     }
 
-    /// True for a key of this part.
+    /// True if a key belongs to this part.
     pub fn owns(self, key: &str) -> bool {
         self.owner(key) == Some(self.index)
     }
 
-    /// The part, of as many as there are, that a key belongs to.
+    /// Number of the part that owns a key, from 1.
     fn owner(self, key: &str) -> Option<u32> {
         let n = u64::from_str_radix(key.get(..15)?, 16).ok()?;
         Some((n % u64::from(self.count)) as u32 + 1)
     }
 }
 
-/// What a shard's folder says of itself.
+/// Description of a shard, stored in its folder.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 struct Description {
     part: Part,
@@ -72,7 +84,7 @@ struct Description {
     items: Vec<(ItemRef, String)>,
     /// Own items without a result.
     failures: Vec<Failure>,
-    /// Which terrains are for training, validation and test; the same in all shards.
+    /// Assignment of terrains to train, validation and test; the same in all shards.
     #[serde(default)]
     splits: Splits,
 }
@@ -82,10 +94,10 @@ pub fn all_items(graph: &Graph) -> Vec<(ItemRef, String)> {
     (0..graph.len()).map(|p| (graph.node(p).item.clone(), graph.key(p).to_owned())).collect()
 }
 
-/// Writes a shard's folder: whole or not at all.
+/// Writes the folder of a shard, completely or not at all.
 ///
 /// # Errors
-/// A folder that is not empty and no shard, or a file system that refuses.
+/// A folder that is neither empty nor a shard, or an I/O error.
 pub fn write(
     target: &Path,
     loaded: &Loaded,
@@ -126,12 +138,12 @@ pub fn write(
 }
 
 impl Description {
-    /// Whether it can be believed: its part is one, and its items lie in its folder.
+    /// Checks that the part is valid and that all items stay inside the folder.
     fn check(&self) -> Result<(), String> {
         let Part { index, count } = self.part;
-        if !self.part.is_one() {
+        if !self.part.is_valid() {
             return Err(format!(
-                "it is part {index} of {count}; a part is 1 to the number of parts, {PARTS_MAX} at most"
+                "part {index} of {count} is invalid; parts count from 1, and there are at most {PARTS_MAX}"
             ));
         }
         self.items.iter().try_for_each(|(item, _)| {
@@ -140,18 +152,18 @@ impl Description {
         })
     }
 
-    /// Whether it is of the same part of the same study, with fewer failed items.
+    /// True if it is the same part of the same study with fewer failed items.
     fn holds_more_than(&self, other: &Self) -> bool {
         let same = self.study_sha256 == other.study_sha256 && self.part == other.part;
         same && self.failures.len() < other.failures.len()
     }
 }
 
-/// The shard that is there already.
+/// The shard that already exists at the target.
 fn occupant(target: &Path) -> Result<Option<Description>, Error> {
     if fs::read_dir(target).is_ok_and(|mut d| d.next().is_some()) {
         let refused =
-            || format!("{}: not a sastrugi shard, and not empty; choose another folder with -o", target.display());
+            || format!("{} is neither empty nor a sastrugi shard; choose another folder with -o", target.display());
         return read(target).map(Some).map_err(|_| Error::Usage(refused()));
     }
     Ok(None)
@@ -173,30 +185,33 @@ fn copy_result(record: &Record, from: &Path, to: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// Shards joined: the study, and where each item's result is.
+/// Merged shards: the study, and the folder of each result.
 pub struct Joined {
-    /// The study's text.
+    /// Text of the study.
     pub study: String,
     /// Folders of the results, parents before children.
     pub results: Vec<PathBuf>,
     /// Items without a result.
     pub failures: Vec<Failure>,
-    /// Which terrains are for training, validation and test.
+    /// Assignment of terrains to train, validation and test.
     pub splits: Splits,
 }
 
-/// Joins the shards of one study.
+/// Merges the shards of one study.
 ///
 /// # Errors
-/// Folders that are no shards, shards of different studies or programs, missing, repeated or incomplete ones, all listed.
+/// Folders that are not shards; shards of different studies or programs; missing, repeated or incomplete shards. All are listed.
 pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     let shards = folders.iter().map(|f| read(f)).collect::<Result<Vec<_>, Error>>()?;
     check_set(folders, &shards)?;
-    let Some(first) = shards.first() else { return Err(Error::Usage("no shards are named".to_owned())) };
+    let Some(first) = shards.first() else { return Err(Error::Usage("no shards given".to_owned())) };
     let study = sastrugi_store::file::read_text(&folders[0].join(STUDY))
         .map_err(|e| Error::Input(format!("{}: {e}", folders[0].display())))?;
     if sastrugi_store::digest::of_text(&study) != first.study_sha256 {
-        return Err(Error::Input(format!("{}: its study.toml was changed", folders[0].display())));
+        return Err(Error::Input(format!(
+            "{}: study.toml was changed after the shard was written",
+            folders[0].display()
+        )));
     }
     let failures: BTreeMap<ItemRef, Failure> =
         shards.iter().flat_map(|s| &s.failures).map(|f| (f.item.clone(), f.clone())).collect();
@@ -214,7 +229,7 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     Ok(Joined { study, results, failures: failures.into_values().collect(), splits: first.splits.clone() })
 }
 
-/// True when every file has the bytes that it was made with.
+/// True if every file still has its recorded hash.
 fn is_intact(record: &Record, folder: &Path) -> bool {
     let same =
         |f: &StoredFile| digest::of_file(&folder.join(&f.product.file)).is_ok_and(|(_, sha256)| sha256 == f.sha256);
@@ -224,7 +239,7 @@ fn is_intact(record: &Record, folder: &Path) -> bool {
 fn read(folder: &Path) -> Result<Description, Error> {
     let path = folder.join(DESCRIPTION);
     let bytes = sastrugi_store::file::read(&path)
-        .map_err(|_| Error::Input(format!("{}: no shard (it has no {DESCRIPTION})", folder.display())))?;
+        .map_err(|_| Error::Input(format!("{} is not a shard: it has no {DESCRIPTION}", folder.display())))?;
     let description: Description =
         serde_json::from_slice(&bytes).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
     description.check().map_err(|reason| Error::Input(format!("{}: {reason}", path.display())))?;
@@ -239,13 +254,13 @@ fn check_set(folders: &[PathBuf], shards: &[Description]) -> Result<(), Error> {
         let name = folder.display();
         if shard.study_sha256 != first.study_sha256 || shard.items != first.items {
             problems.push(format!(
-                "{name} is of another study (or another revision of the program) than {}",
+                "{name} is from another study, or another revision of the program, than {}",
                 folders[0].display()
             ));
         } else if shard.program != first.program || shard.part.count != first.part.count {
             problems.push(format!(
-                "{name} is one of {} shards by {}, not of {}",
-                shard.part.count, shard.program, first.part.count
+                "{name} is one of {} shards by {}; expected one of {} by {}",
+                shard.part.count, shard.program, first.part.count, first.program
             ));
         } else if let Some(other) = seen.insert(shard.part.index, folder) {
             problems.push(format!("{name} and {} are both shard {}", other.display(), shard.part.index));
@@ -266,17 +281,101 @@ mod tests {
     #[test]
     fn val_parts() {
         assert_eq!(Part::parse("2/3").unwrap(), Part { index: 2, count: 3 });
-        for wrong in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2", "1/100001"] {
-            assert!(Part::parse(wrong).is_err(), "{wrong}");
+        assert_eq!(Part::parse("100000/100000").unwrap(), Part { index: 100_000, count: 100_000 });
+        for wrong in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2", "1/100001", "1/2/3", ""] {
+            let error = Part::parse(wrong).unwrap_err();
+            assert!(matches!(error, Error::Usage(_)), "{wrong}");
+            let expected = format!("`--shard {wrong}`: expected I/N with 1 <= I <= N, such as 1/3");
+            assert_eq!(error.to_string(), expected);
         }
     }
 
+    /// The owner is the remainder of the first 15 digits, so it does not depend on the rest of the key: 0xa = 10 = 7 + 3.
+    #[test]
+    fn val_owners_of_keys() {
+        let owner = |key: &str, count: u32| Part { index: 1, count }.owner(key);
+        assert_eq!(owner("00000000000000a00000000000000000", 7), Some(4));
+        assert_eq!(owner("00000000000000affffffffffffffff0", 7), Some(4));
+        assert_eq!(owner("fffffffffffffff00000000000000000", 1), Some(1));
+        assert_eq!((owner("00000000000000", 7), owner("no key, but long enough", 7)), (None, None));
+    }
+
+    /// Among 700 keys, each of seven parts owns some, and every key has one owner.
     #[test]
     fn prop_every_key_has_one_owner() {
-        for n in 1..50u64 {
-            let key = format!("{:032x}", u128::from(n * 0x9e37_79b9_7f4a_7c15) << 64);
-            let owners = (1..=7).filter(|&index| Part { index, count: 7 }.owns(&key)).count();
-            assert_eq!(owners, 1);
+        let mut owned = [0; 7];
+        for n in 1..=700_u64 {
+            let key = format!("{:032x}", u128::from(n.wrapping_mul(0x9e37_79b9_7f4a_7c15)) << 64);
+            let owners: Vec<u32> = (1..=7).filter(|&index| Part { index, count: 7 }.owns(&key)).collect();
+            assert_eq!(owners.len(), 1, "{key}");
+            owned[owners[0] as usize - 1] += 1;
         }
+        assert!(owned.iter().all(|count| *count > 0), "{owned:?}");
+    }
+
+    fn description(index: u32, count: u32) -> Description {
+        Description {
+            part: Part { index, count },
+            program: "sastrugi".to_owned(),
+            study_sha256: "ab".to_owned(),
+            items: vec![(ItemRef::new("terrain", "a"), "0".repeat(32))],
+            failures: Vec::new(),
+            splits: Splits::new(),
+        }
+    }
+
+    fn failure() -> Failure {
+        Failure {
+            item: ItemRef::new("terrain", "a"),
+            message: "failed".to_owned(),
+            unusable_input: false,
+            skipped_for: None,
+            parameters: serde_json::Value::Null,
+        }
+    }
+
+    /// All parts of one study by one program, in any order.
+    #[test]
+    fn val_only_complete_sets_are_merged() {
+        let folders = ["one", "two", "three"].map(PathBuf::from);
+        let check = |shards: &[Description]| {
+            check_set(&folders[..shards.len()], shards).map_err(|e| e.to_string()).err().unwrap_or_default()
+        };
+        assert_eq!(check(&[description(3, 3), description(1, 3), description(2, 3)]), "");
+        assert_eq!(check(&[description(1, 3), description(3, 3)]), "shard 2 of 3 is missing");
+        assert_eq!(check(&[description(1, 3)]), "shard 2, 3 of 3 is missing");
+        assert_eq!(check(&[description(1, 2), description(1, 2)]), "two and one are both shard 1");
+        let counted = "two is one of 3 shards by sastrugi; expected one of 2 by sastrugi";
+        assert_eq!(check(&[description(1, 2), description(2, 3)]), counted);
+        let other = Description { study_sha256: "cd".to_owned(), ..description(2, 2) };
+        let items = Description { items: Vec::new(), ..description(2, 2) };
+        for stranger in [other, items] {
+            let error = check(&[description(1, 2), stranger]);
+            assert_eq!(error, "two is from another study, or another revision of the program, than one");
+        }
+    }
+
+    /// Descriptions come from outside: they must not name places beyond the folder of the shard.
+    #[test]
+    fn val_hostile_descriptions_are_refused() {
+        assert_eq!(description(2, 3).check(), Ok(()));
+        for (index, count) in [(0, 3), (4, 3), (1, 100_001)] {
+            let error = description(index, count).check().unwrap_err();
+            assert!(error.starts_with(&format!("part {index} of {count} is invalid")), "{error}");
+        }
+        for id in ["../a", "a/../../b", "", ".hidden"] {
+            let items = vec![(ItemRef::new("terrain", id), "0".repeat(32))];
+            assert!(Description { items, ..description(1, 1) }.check().is_err(), "{id}");
+        }
+    }
+
+    /// A shard is not replaced by the same one with more failed items.
+    #[test]
+    fn val_a_shard_that_holds_more() {
+        let (complete, lacking) = (description(1, 2), Description { failures: vec![failure()], ..description(1, 2) });
+        assert!(complete.holds_more_than(&lacking));
+        assert!(!lacking.holds_more_than(&complete) && !complete.holds_more_than(&complete));
+        let other = Description { study_sha256: "cd".to_owned(), ..description(1, 2) };
+        assert!(!other.holds_more_than(&lacking) && !description(2, 2).holds_more_than(&lacking));
     }
 }

@@ -1,8 +1,8 @@
-//! The tables of a release: the rows that items left, merged by key, whichever stage made them.
+//! The tables of a release: the rows written by all items, merged by key.
 //!
-//! Each item writes one sorted file of rows for a table, its fragment. Fragments with disjoint ranges of keys are copied one after the
-//! other, a batch at a time; overlapping ones are loaded together and sorted. Fragments with the same rows (the parameters of one run on
-//! many terrains) count once. Where the study splits its terrains, tables that name the part of each row have a file for each part.
+//! For each table, an item writes its rows to one sorted file, its fragment. Fragments with disjoint key ranges are copied one after the
+//! other, a batch at a time; overlapping fragments are loaded together and sorted. Fragments with identical rows (the parameters of one run on
+//! many terrains) are kept once. If the study splits its terrains, tables with a column for the split have one file per split.
 
 use super::cache::Record;
 use super::damage::damaged;
@@ -22,20 +22,20 @@ use std::sync::Arc;
 
 /// The fragments of all items.
 #[derive(Default)]
-pub struct Fragments(BTreeMap<&'static str, OfTable>);
+pub struct Fragments(BTreeMap<&'static str, TableFragments>);
 
 /// The fragments of one table.
 #[derive(Default)]
-struct OfTable {
+struct TableFragments {
     stages: BTreeSet<String>,
-    /// Parents of items that release no other file; the manifest names them with the table.
+    /// Parents of items that release no other file; the manifest lists them with the table.
     parents: BTreeSet<String>,
-    fragments: Vec<Found>,
+    fragments: Vec<LocatedFragment>,
 }
 
-/// A fragment and where it is.
-struct Found {
-    result: Arc<Made>,
+/// A fragment and its location.
+struct LocatedFragment {
+    result: Arc<ItemResult>,
     file: String,
     /// Hash of the file: equal rows have equal bytes.
     sha256: String,
@@ -43,26 +43,26 @@ struct Found {
     ends: [Vec<Cell>; 2],
 }
 
-/// A file of a table: the fragments that its rows come from.
-struct OfFile {
-    fragments: Arc<Vec<Found>>,
-    /// The part whose rows it takes alone.
+/// A file of a table: the fragments from which its rows come.
+struct TableFile {
+    fragments: Arc<Vec<LocatedFragment>>,
+    /// The split to which its rows are restricted.
     part: Option<&'static str>,
 }
 
-/// A result.
-struct Made {
+/// A result of an item in the work area.
+struct ItemResult {
     folder: PathBuf,
     item: ItemRef,
 }
 
 impl Fragments {
-    /// Takes the fragments of an item, whose result is in `folder`.
+    /// Adds the fragments of an item, whose result is in `folder`.
     ///
     /// # Errors
-    /// Rows of a table that is not known, or of more than one file of a table.
+    /// Rows of an unknown table, or rows that belong to more than one file of a table.
     pub fn add(&mut self, record: &Record, folder: &Path) -> Result<(), Error> {
-        let result = Arc::new(Made { folder: folder.to_owned(), item: record.item.clone() });
+        let result = Arc::new(ItemResult { folder: folder.to_owned(), item: record.item.clone() });
         let releases_no_file = record.files.iter().all(|file| file.product.release_path.is_none());
         for file in &record.files {
             let Some(rows) = &file.product.fragment else { continue };
@@ -72,7 +72,7 @@ impl Fragments {
             if releases_no_file {
                 of_table.parents.extend(record.ingredients.parents.keys().cloned());
             }
-            of_table.fragments.push(Found {
+            of_table.fragments.push(LocatedFragment {
                 result: Arc::clone(&result),
                 file: file.product.file.clone(),
                 sha256: file.sha256.clone(),
@@ -85,7 +85,7 @@ impl Fragments {
     /// Writes all tables, several files at a time.
     ///
     /// # Errors
-    /// Fragments that cannot be read or contradict each other; a file that cannot be written.
+    /// Fragments that cannot be read or that contradict each other, or a file that cannot be written.
     pub fn write(mut self, builder: &mut ReleaseBuilder, splits: &Splits) -> Result<(), Error> {
         let mut parts = Vec::new();
         let mut files = BTreeMap::new();
@@ -104,7 +104,7 @@ impl Fragments {
     }
 }
 
-impl OfTable {
+impl TableFragments {
     fn origin(&self) -> Origin {
         let stages: Vec<&str> = self.stages.iter().map(String::as_str).collect();
         let parents = self.parents.iter().cloned().collect();
@@ -112,24 +112,25 @@ impl OfTable {
     }
 
     /// The files of the table by name.
-    fn files(self, table: &Table, splits: &Splits) -> Vec<(String, OfFile)> {
+    fn files(self, table: &Table, splits: &Splits) -> Vec<(String, TableFile)> {
         let named = splits::files(table, splits);
-        let file = |(name, fragments): (String, Vec<Found>)| {
+        let file = |(name, fragments): (String, Vec<LocatedFragment>)| {
             let fragments = Arc::new(fragments);
-            let whole = named.is_empty().then(|| (name, OfFile { fragments: Arc::clone(&fragments), part: None }));
-            let of_part =
-                |part: &'static str| (part.to_owned(), OfFile { fragments: Arc::clone(&fragments), part: Some(part) });
+            let whole = named.is_empty().then(|| (name, TableFile { fragments: Arc::clone(&fragments), part: None }));
+            let of_part = |part: &'static str| {
+                (part.to_owned(), TableFile { fragments: Arc::clone(&fragments), part: Some(part) })
+            };
             whole.into_iter().chain(named.iter().copied().map(of_part)).collect::<Vec<_>>()
         };
         self.parts(table).into_iter().flat_map(file).collect()
     }
 
-    /// The fragments of the table, or of each terrain's file, sorted by their keys, each once.
-    fn parts(mut self, table: &Table) -> BTreeMap<String, Vec<Found>> {
-        self.fragments.sort_by(Found::compare);
+    /// The distinct fragments of the table, or of the file of each terrain, sorted by their keys.
+    fn parts(mut self, table: &Table) -> BTreeMap<String, Vec<LocatedFragment>> {
+        self.fragments.sort_by(LocatedFragment::compare);
         self.fragments.dedup_by(|a, b| a.compare(b) == Ordering::Equal);
         let column = table.file_per.and_then(|key| table.position(key));
-        let mut parts: BTreeMap<String, Vec<Found>> = BTreeMap::new();
+        let mut parts: BTreeMap<String, Vec<LocatedFragment>> = BTreeMap::new();
         for fragment in self.fragments {
             let name = match column.and_then(|column| fragment.ends[0].get(column)) {
                 Some(Cell::Text(value)) => value.clone(),
@@ -144,30 +145,30 @@ impl OfTable {
 /// The table of a fragment.
 ///
 /// # Errors
-/// A table that is not known, keys that are not the table's, or rows of more than one file of a table.
+/// An unknown table, keys that do not match the table, or rows that belong to more than one file of a table.
 pub fn table_of(item: &ItemRef, rows: &Fragment) -> Result<&'static Table, Error> {
     let name = &rows.table;
     let Some(table) = tables::by_name(name) else {
-        return Err(Error::Failed(format!("{item} left rows of an unknown table `{name}`")));
+        return Err(Error::Failed(format!("{item} wrote rows of an unknown table `{name}`")));
     };
     let column = table.file_per.and_then(|key| table.position(key));
     let one_file = column.is_none_or(|column| rows.ends[0].get(column) == rows.ends[1].get(column));
     if rows.ends.iter().all(|end| end.len() == table.key_count()) && one_file {
         return Ok(table);
     }
-    Err(Error::Failed(format!("{item} left rows of the table `{name}` whose keys do not fit it")))
+    Err(Error::Failed(format!("{item} wrote rows of the table `{name}` with keys that do not match it")))
 }
 
-impl Found {
-    /// Orders by keys; equal are fragments with the same rows.
+impl LocatedFragment {
+    /// Orders by keys; fragments with identical rows are equal.
     fn compare(&self, other: &Self) -> Ordering {
         let of_end = |end: usize| compare_keys(&self.ends[end], &other.ends[end]);
         of_end(0).then_with(|| of_end(1)).then_with(|| self.sha256.cmp(&other.sha256))
     }
 
-    /// The rows; a file that is not what it was when it was made is an error.
+    /// The rows. A file that changed after it was written is an error.
     fn rows(&self, table: &Table) -> Result<TableReader, Error> {
-        let Made { folder, item } = &*self.result;
+        let ItemResult { folder, item } = &*self.result;
         let path = folder.join(&self.file);
         let (_, sha256) = digest::of_file(&path).map_err(|e| Error::at(&path, e))?;
         match sha256 == self.sha256 {
@@ -178,7 +179,7 @@ impl Found {
 }
 
 /// Writes the rows of a file, whose fragments are sorted by their first keys.
-fn merge(table: &Table, file: &OfFile, splits: &Splits, writer: &mut PartWriter<'_>) -> Result<(), Error> {
+fn merge(table: &Table, file: &TableFile, splits: &Splits, writer: &mut PartWriter<'_>) -> Result<(), Error> {
     let mut push = |mut cells: Vec<Cell>| {
         splits::fill(table, &mut cells, splits);
         match file.part.is_none_or(|part| splits::is_in_file(table, &cells, part)) {
@@ -198,8 +199,8 @@ fn merge(table: &Table, file: &OfFile, splits: &Splits, writer: &mut PartWriter<
     Ok(())
 }
 
-/// How many fragments from the first on overlap.
-fn overlapping(fragments: &[Found]) -> usize {
+/// Number of fragments, from the first, that overlap without a gap.
+fn overlapping(fragments: &[LocatedFragment]) -> usize {
     let mut last = &fragments[0].ends[1];
     let mut count = 1;
     while let Some(next) = fragments.get(count).filter(|next| compare_keys(&next.ends[0], last) != Ordering::Greater) {
@@ -211,8 +212,8 @@ fn overlapping(fragments: &[Found]) -> usize {
     count
 }
 
-/// The rows of fragments together, sorted by key. Rows that are there twice are kept once. (Every table has keys.)
-fn sorted_rows(table: &Table, fragments: &[Found]) -> Result<Vec<Vec<Cell>>, Error> {
+/// The rows of several fragments, sorted by key. Duplicate rows are kept once. (Every table has keys.)
+fn sorted_rows(table: &Table, fragments: &[LocatedFragment]) -> Result<Vec<Vec<Cell>>, Error> {
     let mut rows = Vec::new();
     for fragment in fragments {
         for row in fragment.rows(table)? {
@@ -229,7 +230,7 @@ fn sorted_rows(table: &Table, fragments: &[Found]) -> Result<Vec<Vec<Cell>>, Err
     let mut items = [pair[0].1.to_string(), pair[1].1.to_string()];
     items.sort();
     let (key, items) = (serde_json::json!(pair[0].0[..keys]), items.join(" and "));
-    Err(Error::Failed(format!("table {}: different rows of the key {key}, from {items}", table.name)))
+    Err(Error::Failed(format!("table {}: conflicting rows for the key {key}, from {items}", table.name)))
 }
 
 #[cfg(test)]
@@ -243,7 +244,7 @@ mod tests {
     use sastrugi_store::parquet::write_table;
     use sastrugi_store::release::{Head, Release};
 
-    /// A work area and a release of it.
+    /// A work area and a release assembled from it.
     struct Area {
         folder: tempfile::TempDir,
         fragments: Fragments,
@@ -255,7 +256,7 @@ mod tests {
             Self { folder: tempfile::tempdir().unwrap(), fragments: Fragments::default(), items: 0 }
         }
 
-        /// An item of `stage` that leaves these rows, and another file in the release if it `releases`.
+        /// Adds an item of `stage` that writes these rows, and another file of the release if `releases` is true.
         fn leave<R: Row>(&mut self, stage: &str, rows: Vec<R>, releases: bool) {
             self.items += 1;
             let folder: PathBuf = self.folder.path().join(self.items.to_string());
@@ -319,7 +320,7 @@ mod tests {
     #[test]
     fn val_fragments_are_merged_by_key() {
         let mut area = Area::new();
-        // Interleaved with two others, which begin and end before and behind each other.
+        // The first three fragments overlap: their key ranges start and end in different orders.
         area.leave("fit", vec![curve("a", 1, 5), curve("b", 1, 0)], true);
         area.leave("fit", vec![curve("a", 1, 6), curve("a", 2, 0)], true);
         area.leave("fit", vec![curve("a", 1, 0), curve("c", 0, 0)], true);
@@ -331,11 +332,11 @@ mod tests {
     }
 
     #[test]
-    fn val_equal_rows_count_once_and_others_contradict() {
+    fn val_equal_rows_are_kept_once_and_conflicting_rows_are_refused() {
         let mut area = Area::new();
         let of_run = |value: &str| vec![parameter("run", "mass_kg", value), parameter("run", "speed_m_s", "1.0")];
         (0..3).for_each(|_| area.leave("traverse", of_run("50.0"), true));
-        // Overlapping fragments may share rows as well.
+        // Overlapping fragments may also share rows.
         area.leave("traverse", vec![parameter("run", "speed_m_s", "1.0"), parameter("walk", "mass_kg", "3.0")], true);
         let rows: Vec<ParameterRow> = area.release().unwrap().rows().unwrap();
         assert_eq!(rows, [of_run("50.0"), vec![parameter("walk", "mass_kg", "3.0")]].concat());
@@ -347,7 +348,7 @@ mod tests {
     }
 
     #[test]
-    fn val_a_table_names_its_stages_and_what_no_other_file_names() {
+    fn val_a_table_lists_its_stages_and_the_parents_no_other_file_lists() {
         let mut area = Area::new();
         area.leave("texture", vec![curve("a", 1, 0)], true);
         area.leave("fit", vec![curve("b", 1, 0)], true);
@@ -375,7 +376,7 @@ mod tests {
         R::from_cells(R::TABLE.columns.iter().map(cell).collect()).unwrap()
     }
 
-    /// Samples have a file for each terrain; terrains get their part of the split.
+    /// Samples have one file per terrain; terrains get their split.
     #[test]
     fn val_files_by_key_and_splits_are_filled() {
         let mut area = Area::new();
@@ -409,9 +410,9 @@ mod tests {
         assert_eq!(names("terrains"), ["part-other.parquet", "part-test.parquet"]);
     }
 
-    /// A file that changed since it was made is dropped with its item's result, so that the next run makes it again.
+    /// A file that changed after it was written is removed with the result of its item, so that the next run recomputes it.
     #[test]
-    fn val_a_changed_fragment_is_dropped() {
+    fn val_a_changed_fragment_is_removed() {
         let mut area = Area::new();
         area.leave("fit", vec![curve("a", 1, 0)], true);
         let path = area.folder.path().join("1/rows.parquet");
@@ -424,16 +425,16 @@ mod tests {
     }
 
     #[test]
-    fn val_rows_that_fit_no_table_are_refused() {
+    fn val_rows_that_match_no_table_are_refused() {
         let item = ItemRef::new("fit", "a");
         let text = |words: &[&str]| words.iter().map(|w| Cell::Text((*w).to_owned())).collect::<Vec<_>>();
         let refused = |table: &str, first: &[&str], last: &[&str]| {
             let rows = Fragment { table: table.to_owned(), ends: [text(first), text(last)] };
             table_of(&item, &rows).err().map(|e| e.to_string()).unwrap_or_default()
         };
-        assert!(refused("crests", &["a"], &["b"]).contains("fit/a left rows of an unknown table `crests`"));
-        assert!(refused("fits", &["a", "b"], &["b", "c"]).contains("do not fit it"));
-        assert!(refused("samples", &["a", "m", "0"], &["b", "m", "0"]).contains("do not fit it"));
+        assert!(refused("crests", &["a"], &["b"]).contains("fit/a wrote rows of an unknown table `crests`"));
+        assert!(refused("fits", &["a", "b"], &["b", "c"]).contains("do not match it"));
+        assert!(refused("samples", &["a", "m", "0"], &["b", "m", "0"]).contains("do not match it"));
         assert_eq!(refused("fits", &["a"], &["b"]), "");
     }
 }

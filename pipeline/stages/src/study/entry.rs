@@ -1,4 +1,4 @@
-//! One item table of a section: envelope and kernel parameters taken apart, replicates and sweeps spelled out.
+//! One item table of a section: separates envelope and kernel parameters, and expands replicates and sweeps.
 
 use super::keys::{self, UnknownKey};
 use super::text::{Refusals, StudyError, StudyText};
@@ -10,7 +10,7 @@ use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
 
-/// Most items of a study, and so of one table: what is known of each before the run stays in memory, about 3 KiB.
+/// Maximum number of items in a study, and so in one table: each takes about 3 KiB of memory before the run.
 pub const ITEMS_MAX: usize = 400_000;
 
 /// One item table.
@@ -22,16 +22,16 @@ pub struct Entry<'a> {
     text: &'a StudyText,
 }
 
-/// One item that a table stands for.
+/// One item that a table expands to.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Expanded {
     /// Full id.
     pub id: String,
-    /// Its id without the number of the replicate.
+    /// Its id without the replicate number.
     pub part: String,
     /// Position among the replicates, from 0.
     pub replicate: u64,
-    /// The swept parameters with their values, if there are any.
+    /// The swept parameters with their values, if any.
     pub sweep: Option<String>,
     /// Kernel parameters.
     pub params: Value,
@@ -43,15 +43,15 @@ impl<'a> Entry<'a> {
         Self { section, index, table, text }
     }
 
-    /// Its place among the tables of its section, from 0.
+    /// Its index among the tables of its section, from 0.
     pub fn index(&self) -> usize {
         self.index
     }
 
-    /// Takes the envelope and the kernel's parameters apart.
+    /// Separates the envelope from the kernel's parameters.
     ///
     /// # Errors
-    /// Envelope keys of the wrong type, and an id that is not well formed.
+    /// Envelope keys of the wrong type, and an ill-formed id.
     pub fn read<E: DeserializeOwned + JsonSchema>(&self) -> Result<(E, Value), Refusals> {
         let names = keys::properties(&schema_of::<E>());
         let (envelope, params): (Map<_, _>, Map<_, _>) =
@@ -68,7 +68,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// A refusal; where a required key is missing and another stands for it, that of the other.
+    /// The error of a table; if a required key is missing because it was given under another name, the error is that of the other name.
     fn refuse_missing(&self, error: ParameterError, names: &[String], params: &Map<String, Value>) -> StudyError {
         let mut others = params.keys().map(|key| UnknownKey { path: vec![key.clone()], known: names.to_vec() });
         match others.find(|other| other.nearest().is_some_and(|key| error.is_missing(key))) {
@@ -77,7 +77,7 @@ impl<'a> Entry<'a> {
         }
     }
 
-    /// Refuses parameter keys that the schema does not have; `E` is the envelope, whose keys are suggested too.
+    /// Refuses parameter keys that are not in the schema; `E` is the envelope, whose keys are suggested too.
     ///
     /// # Errors
     /// The unknown keys.
@@ -90,7 +90,7 @@ impl<'a> Entry<'a> {
         Refusals::none(unknown.iter().map(|key| unknown_key(self.text, &self.path(), key)).collect())
     }
 
-    /// Spells out sweeps and replicates.
+    /// Expands sweeps and replicates.
     ///
     /// # Errors
     /// A count of 0 or too large, an empty sweep, or a swept parameter that is also set.
@@ -107,7 +107,9 @@ impl<'a> Entry<'a> {
         let total =
             sweep.values().fold(count.unwrap_or(1) as usize, |total, values| total.saturating_mul(values.len()));
         if total > ITEMS_MAX {
-            return Err(self.error("count", format!("expands to {total} items; the limit is {ITEMS_MAX}")));
+            return Err(
+                self.error("count", format!("`count` and sweeps expand to {total} items; the limit is {ITEMS_MAX}"))
+            );
         }
         let plain =
             Expanded { id: id.to_owned(), part: id.to_owned(), replicate: 0, sweep: None, params: params.clone() };
@@ -132,12 +134,14 @@ impl<'a> Entry<'a> {
                 let word = id_word(value).ok_or_else(|| {
                     self.error(
                         "sweep",
-                        format!("the sweep of `{parameter}` holds {value}; it takes numbers, words, true and false"),
+                        format!(
+                            "the sweep of `{parameter}` contains {value}; values must be numbers, words, true or false"
+                        ),
                     )
                 })?;
                 let mut params = item.params.clone();
                 if !set_at(&mut params, parameter, value.clone()) {
-                    return Err(self.error("sweep", format!("`{parameter}` is swept and set as well")));
+                    return Err(self.error("sweep", format!("`{parameter}` is both swept and set")));
                 }
                 let label =
                     format!("{parameter} = {}", value.as_str().map_or_else(|| value.to_string(), str::to_owned));
@@ -149,29 +153,29 @@ impl<'a> Entry<'a> {
         Ok(swept)
     }
 
-    /// An error about a key of this table (dotted path), or about the table where the key is not written.
+    /// An error at a key of this table (dotted path), or at the table if the key is not written.
     pub fn error(&self, key: &str, message: impl Into<String>) -> StudyError {
         let path = self.path_of_dotted(key);
         let id = self.id().map_or_else(|| format!("number {}", self.index + 1), |id| format!("\"{id}\""));
         StudyError::at(self.text.span(&path, false), format!("{} {id}: {}", self.section, message.into()))
     }
 
-    /// A kernel's refusal, with its place.
+    /// A kernel's error, with its place.
     pub fn refuse(&self, error: ParameterError) -> StudyError {
         self.error(&error.key, error.to_string())
     }
 
-    /// Its id, where it has one that is text.
+    /// Its id, if it has one that is text.
     pub fn id(&self) -> Option<&'a str> {
         self.table.get("id").and_then(Value::as_str)
     }
 
-    /// Path of one of this table's keys in the study.
+    /// Path of a key of this table in the study.
     pub fn path_of(&self, key: &str) -> Vec<String> {
         self.path().into_iter().chain([key.to_owned()]).collect()
     }
 
-    /// The same of a dotted key.
+    /// The same for a dotted key.
     pub fn path_of_dotted(&self, key: &str) -> Vec<String> {
         self.path().into_iter().chain(segments(key).map(str::to_owned)).collect()
     }
@@ -181,13 +185,13 @@ impl<'a> Entry<'a> {
     }
 }
 
-/// Labels of sweeps side by side.
+/// Joins the labels of two sweeps.
 pub fn joined(first: Option<&str>, second: Option<&str>) -> Option<String> {
     let labels: Vec<&str> = first.into_iter().chain(second).collect();
     (!labels.is_empty()).then(|| labels.join(", "))
 }
 
-/// For a schema without properties every key is unknown.
+/// All keys, as unknown: for a schema without properties.
 fn any_keys(params: &Value, schema: &Value) -> Vec<UnknownKey> {
     if !keys::properties(schema).is_empty() {
         return Vec::new();
@@ -203,7 +207,7 @@ fn replicates(item: Expanded, count: Option<u32>) -> Vec<Expanded> {
         .collect()
 }
 
-/// A value as part of an id: lower case, other signs as `-`.
+/// A value as part of an id: lower case, with other characters as `-`.
 fn id_word(value: &Value) -> Option<String> {
     let text = match value {
         Value::String(s) => s.to_lowercase(),
@@ -214,7 +218,7 @@ fn id_word(value: &Value) -> Option<String> {
     Some(text.chars().map(plain).collect())
 }
 
-/// Sets a dotted parameter; false when it is set already or its parent is no table.
+/// Sets a dotted parameter; false if it is set already or its parent is not a table.
 fn set_at(params: &mut Value, dotted: &str, value: Value) -> bool {
     let mut at = params;
     let mut words = dotted.split('.').peekable();
@@ -265,10 +269,11 @@ mod tests {
         assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 0\n").contains("1 or more"));
         assert!(message("[[terrain]]\nid = \"A\"\nkind = \"k\"\n").contains("a-z"));
         assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\nsweep.d = []\n").contains("no values"));
-        assert!(message("[[terrain]]\nid = \"a\"\nkind = \"k\"\nd = 1\nsweep.d = [1]\n").contains("set as well"));
-        assert!(message("[[terrain]]\nkind = \"k\"\n").contains("missing field `id`"));
         assert!(
-            message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 4000000000\nsweep.d = [1,2]\n").contains("the limit is")
+            message("[[terrain]]\nid = \"a\"\nkind = \"k\"\nd = 1\nsweep.d = [1]\n").contains("both swept and set")
         );
+        assert!(message("[[terrain]]\nkind = \"k\"\n").contains("missing field `id`"));
+        let many = message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 4000000000\nsweep.d = [1,2]\n");
+        assert!(many.contains("expand to 8000000000 items; the limit is 400000"), "{many}");
     }
 }

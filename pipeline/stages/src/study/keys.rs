@@ -1,4 +1,4 @@
-//! Unknown keys: found against the JSON Schema of a parameter type, before anything reads the values.
+//! Detection of unknown keys with the JSON Schema of a parameter type, before values are read.
 
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
@@ -6,12 +6,12 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 
-/// A key that no parameter has.
+/// An unknown key.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct UnknownKey {
-    /// Path of the key, from the checked value down.
+    /// Path of the key within the checked value.
     pub path: Vec<String>,
-    /// Keys that would be right there, in the schema's order.
+    /// Known keys at that place, in the schema's order.
     pub known: Vec<String>,
 }
 
@@ -21,7 +21,7 @@ impl UnknownKey {
         self.path.last().map_or("", String::as_str)
     }
 
-    /// The known key that is meant, as far as can be told: the product's word for the same thing, or the nearest in spelling.
+    /// The known key that was probably meant: a synonym, or the nearest in spelling.
     pub fn nearest(&self) -> Option<&str> {
         let known = || self.known.iter().map(String::as_str);
         let synonym = SYNONYMS.iter().find(|(words, key)| words.contains(&self.key()) && known().any(|k| k == *key));
@@ -29,7 +29,7 @@ impl UnknownKey {
     }
 }
 
-/// Words that people try, and the key that they mean.
+/// Synonyms that users may try, and the key they mean.
 const SYNONYMS: [(&[&str], &str); 21] = [
     (&["author", "authors", "people"], "creators"),
     (&["institution", "institutions", "affiliation"], "organizations"),
@@ -54,7 +54,15 @@ const SYNONYMS: [(&[&str], &str); 21] = [
     (&["terrain", "surface", "surfaces"], "terrains"),
 ];
 
-/// The candidate nearest to `word` in spelling, if it is near at all (Jaro and Winkler's similarity above 0.75).
+/// The candidate nearest to `word` in spelling, if it is close enough (Jaro-Winkler similarity above 0.75).
+///
+/// ```
+/// use sastrugi_stages::study::keys::nearest;
+///
+/// let kinds = ["multifractal", "spheroids", "gap"];
+/// assert_eq!(nearest("multifactal", kinds.into_iter()), Some("multifractal"));
+/// assert_eq!(nearest("xyz", kinds.into_iter()), None);
+/// ```
 pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .map(|c| (strsim::jaro_winkler(word, c), c))
@@ -63,12 +71,12 @@ pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Opt
         .map(|(_, c)| c)
 }
 
-/// Names of the properties that a schema describes.
+/// Names of the properties in a schema.
 pub fn properties(schema: &Value) -> Vec<String> {
     objects(schema, schema).iter().flat_map(|o| o.keys().cloned()).collect()
 }
 
-/// Schema of the parameters of two kernels that stand side by side in one table.
+/// Combined schema of the parameters of two kernels in one table.
 pub fn schema_of_both<A: JsonSchema, B: JsonSchema>() -> Value {
     let (mut schema, second) = (schema_of::<A>(), schema_of::<B>());
     for part in ["properties", "$defs"] {
@@ -81,10 +89,10 @@ pub fn schema_of_both<A: JsonSchema, B: JsonSchema>() -> Value {
     schema
 }
 
-/// Reads the parameters of two kernels that stand side by side in one table.
+/// Reads the parameters of two kernels from one table.
 ///
 /// # Errors
-/// The first wrong value.
+/// The first invalid value.
 pub fn read_both<A, B>(params: &Value) -> Result<(A, B), ParameterError>
 where
     A: DeserializeOwned,
@@ -97,6 +105,16 @@ where
 }
 
 /// The unknown keys of `value`, depth first.
+///
+/// ```
+/// use sastrugi_schemas::{kind::schema_of, study::RoughnessSection};
+/// use sastrugi_stages::study::keys::find_unknown;
+/// use serde_json::json;
+///
+/// let schema = schema_of::<RoughnessSection>();
+/// let unknown = find_unknown(&json!({ "low_max": 0.3, "semi_maxx": 0.8 }), &schema);
+/// assert_eq!((unknown.len(), unknown[0].key(), unknown[0].nearest()), (1, "semi_maxx", Some("semi_max")));
+/// ```
 pub fn find_unknown(value: &Value, schema: &Value) -> Vec<UnknownKey> {
     let mut found = Vec::new();
     search(value, schema, schema, &mut Vec::new(), &mut found);
@@ -144,12 +162,12 @@ fn below(path: &mut Vec<String>, segment: String, f: impl FnOnce(&mut Vec<String
     path.pop();
 }
 
-/// The `properties` of a schema and of everything it refers to or chooses from.
+/// The `properties` of a schema and of all its references and alternatives.
 fn objects<'a>(schema: &'a Value, root: &'a Value) -> Vec<&'a Map<String, Value>> {
     alternatives(schema, root).into_iter().filter_map(|s| s.get("properties")?.as_object()).collect()
 }
 
-/// The schema itself, with references followed and choices opened.
+/// The schema with references resolved and alternatives expanded.
 fn alternatives<'a>(schema: &'a Value, root: &'a Value) -> Vec<&'a Value> {
     if let Some(target) = schema.get("$ref").and_then(Value::as_str).and_then(|r| r.strip_prefix('#')) {
         return root.pointer(target).map_or_else(Vec::new, |s| alternatives(s, root));

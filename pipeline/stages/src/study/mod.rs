@@ -1,4 +1,4 @@
-//! A study: its text, its head, and the tables of its sections.
+//! Studies: text, head, and the tables of the sections.
 
 pub mod entry;
 pub mod keys;
@@ -17,39 +17,39 @@ use std::collections::BTreeSet;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// What the message on a section that no study has begins with.
+/// Start of the message on an unknown section.
 pub const UNKNOWN_SECTION: &str = "unknown section";
 
-/// A study as read: the head checked, the items still tables.
+/// A study after reading: the head is checked, the items are still tables.
 pub struct Study {
     /// `[study]`.
     pub head: StudyHead,
     /// `[roughness]`.
     pub roughness: RoughnessSection,
-    /// Folder that relative paths start from.
+    /// Base folder of relative paths.
     pub folder: PathBuf,
     text: StudyText,
     root: Map<String, Value>,
 }
 
 impl Study {
-    /// Reads a study from its text; `folder` is where relative paths start.
+    /// Reads a study from its text; relative paths start from `folder`.
     ///
     /// # Errors
-    /// All that is wrong outside of the items, with its place.
+    /// All errors outside the items, with their places.
     pub fn parse(raw: &str, folder: &Path, sections: &[&'static str]) -> Result<Self, Refusals> {
         let (study, errors) = Self::read(raw, folder, sections)?;
         Refusals::none(errors).map(|()| study)
     }
 
-    /// The same, with what is wrong outside of the items beside a study whose items can be checked as well.
+    /// The same, but returns the errors outside the items along with the study, so that its items can be checked as well.
     ///
     /// # Errors
-    /// A text that is not TOML.
+    /// A text that is not valid TOML.
     pub fn read(raw: &str, folder: &Path, sections: &[&'static str]) -> Result<(Self, Vec<StudyError>), StudyError> {
         let text = StudyText::parse(raw)?;
         let Value::Object(root) = text.to_json()? else {
-            return Err(StudyError::at(None, "a study is a table of sections"));
+            return Err(StudyError::at(None, "a study must be a table of sections"));
         };
         let mut errors = Vec::new();
         let head = read_head(&root, &text, &mut errors);
@@ -68,13 +68,13 @@ impl Study {
         let Some(value) = self.root.get(section) else { return Ok(Vec::new()) };
         let tables = value.as_array().map(|list| list.iter().map(Value::as_object).collect::<Option<Vec<_>>>());
         let Some(Some(tables)) = tables else {
-            let message = format!("`{section}` is written as [[{section}]], once for each item");
+            let message = format!("`{section}` must be written as [[{section}]], one table per item");
             return Err(StudyError::at(self.text.span(&[section.to_owned()], true), message));
         };
         Ok(tables.into_iter().enumerate().map(|(index, table)| Entry::new(section, index, table, &self.text)).collect())
     }
 
-    /// Bytes of the value at a path (array positions as numbers) in the study's text; `None` when it is not there.
+    /// Byte range of the value at a path (array positions as numbers) in the study's text; `None` if it does not exist.
     pub fn span_of(&self, path: &[String]) -> Option<Range<usize>> {
         self.text.exact_span(path)
     }
@@ -84,7 +84,7 @@ impl Study {
         let names: Vec<&str> = known().collect();
         let unknown = self.root.keys().filter(|k| !known().any(|s| s == *k));
         let refuse = |unknown: &String| {
-            let message = format!("{UNKNOWN_SECTION} `{unknown}`; a study has {}", names.join(", "));
+            let message = format!("{UNKNOWN_SECTION} `{unknown}`; known: {}", names.join(", "));
             let help = keys::nearest(unknown, known()).map(|n| format!("did you mean `{n}`?"));
             StudyError::at(self.text.span(std::slice::from_ref(unknown), true), message).with_help(help)
         };
@@ -92,10 +92,10 @@ impl Study {
     }
 }
 
-/// The head; where it cannot be read, one that does for checking the items.
+/// Reads the head; if that fails, returns a partial head with which the items can be checked.
 fn read_head(root: &Map<String, Value>, text: &StudyText, errors: &mut Vec<StudyError>) -> StudyHead {
     if !root.contains_key("study") {
-        errors.push(StudyError::at(None, "the section [study] is missing; it holds at least name, seed and date"));
+        errors.push(StudyError::at(None, "missing section [study]; it must contain at least name, seed and date"));
     }
     let Some(mut head) = read_section::<StudyHead>(root, text, "study", errors) else { return readable_head(root) };
     if head.title.is_empty() {
@@ -120,7 +120,7 @@ fn read_head(root: &Map<String, Value>, text: &StudyText, errors: &mut Vec<Study
     head
 }
 
-/// A head with every key that can be read, for checking what depends on it; its errors are told.
+/// A head with all readable keys, for checking what depends on it; its errors have been reported.
 fn readable_head(root: &Map<String, Value>) -> StudyHead {
     let keys = root.get("study").and_then(Value::as_object).into_iter().flatten();
     keys.fold(StudyHead::default(), |head, (key, value)| {
@@ -132,7 +132,7 @@ fn readable_head(root: &Map<String, Value>) -> StudyHead {
     })
 }
 
-/// Reads a section that is one table, if it is there and right.
+/// Reads a section that is a single table, if it is present and valid.
 fn read_section<T>(
     root: &Map<String, Value>,
     text: &StudyText,
@@ -148,7 +148,7 @@ where
         errors.push(unknown_key(text, &[section.to_owned()], key));
         remove(&mut value, &key.path);
     }
-    // A required key under another name is not missing as well.
+    // A required key given under another name is not reported as missing too.
     let is_told = |e: &ParameterError| unknown.iter().filter_map(UnknownKey::nearest).any(|key| e.is_missing(key));
     match read_all(value) {
         Ok(read) => Some(read),
@@ -164,7 +164,7 @@ fn section_error(text: &StudyText, section: &str, error: ParameterError) -> Stud
     StudyError::at(text.span(&path, false), format!("[{section}] {error}"))
 }
 
-/// The words of a dotted path; array positions stand alone.
+/// The segments of a dotted path; array positions are separate segments.
 fn segments(key: &str) -> impl Iterator<Item = &str> {
     key.split(['.', '[', ']']).filter(|s| !s.is_empty())
 }
@@ -191,7 +191,7 @@ pub fn check_roughness(section: &RoughnessSection) -> Result<(), ParameterError>
     ParameterError::not_negative("closing_radius_m", section.closing_radius_m)?;
     section.band_window_m.map_or(Ok(0.0), |w| ParameterError::positive("band_window_m", w))?;
     if section.semi_max <= section.low_max {
-        let message = format!("is {}; it must be above low_max = {}", section.semi_max, section.low_max);
+        let message = format!("must be above low_max = {}, got {}", section.low_max, section.semi_max);
         return Err(ParameterError::new("semi_max", message));
     }
     Ok(())
@@ -204,11 +204,11 @@ fn check_id(key: &str, id: &str) -> Result<(), ParameterError> {
     if right {
         return Ok(());
     }
-    let rule = "it must be 1 to 64 of a-z, 0-9, `.` and `-`, and start with a letter or digit";
-    Err(ParameterError::new(key, format!("is \"{id}\"; {rule}")))
+    let rule = "must be 1 to 64 characters of a-z, 0-9, `.` and `-`, starting with a letter or digit";
+    Err(ParameterError::new(key, format!("{rule}, got \"{id}\"")))
 }
 
-/// Dates are days that the Gregorian calendar has.
+/// Dates must be valid days of the Gregorian calendar.
 fn check_date(date: &str) -> Result<(), ParameterError> {
     let part = |range: std::ops::Range<usize>| date.get(range)?.parse::<u32>().ok();
     let shape = date.len() == 10
@@ -226,7 +226,7 @@ fn check_date(date: &str) -> Result<(), ParameterError> {
     if shape && day_exists().is_some() {
         return Ok(());
     }
-    Err(ParameterError::new("date", format!("is \"{date}\"; it must be a day, YYYY-MM-DD")))
+    Err(ParameterError::new("date", format!("must be a date, YYYY-MM-DD, got \"{date}\"")))
 }
 
 fn check_license(license: &str) -> Result<(), ParameterError> {
@@ -242,15 +242,15 @@ fn check_split(split: Option<Shares>) -> Result<(), ParameterError> {
         Some(Shares::Two(two)) => format!("{two:?}"),
         _ => format!("{shares:?}"),
     };
-    let refuse = |rule: &str| Err(ParameterError::new("split", format!("is {written}; {rule}")));
+    let refuse = |rule: &str| Err(ParameterError::new("split", format!("{rule}, got {written}")));
     if !shares.iter().all(|share| (0.0..=1.0).contains(share)) {
-        return refuse("shares are 0 to 1");
+        return refuse("must be shares from 0 to 1");
     }
     if (shares.iter().sum::<f64>() - 1.0).abs() > 1e-9 {
-        return refuse("its shares must add up to 1, as [0.7, 0.15, 0.15] does");
+        return refuse("must add up to 1 (such as [0.7, 0.15, 0.15])");
     }
     if shares.iter().filter(|share| **share > 0.0).count() < 2 {
-        return refuse("at least two shares must be above 0");
+        return refuse("must have at least two shares above 0");
     }
     Ok(())
 }
@@ -258,7 +258,7 @@ fn check_split(split: Option<Shares>) -> Result<(), ParameterError> {
 fn check_version(version: Option<&str>) -> Result<(), ParameterError> {
     match version {
         Some(v) if v.trim().is_empty() => {
-            Err(ParameterError::new("version", "is empty; it is a text such as \"1.0.0\""))
+            Err(ParameterError::new("version", "is empty; it must be a text such as \"1.0.0\""))
         }
         _ => Ok(()),
     }
@@ -271,34 +271,36 @@ fn check_url(url: Option<&str>) -> Result<(), ParameterError> {
     };
     match url {
         Some(url) if !right(url) => {
-            Err(ParameterError::new("url", format!("is \"{url}\"; it must be an address, https://...")))
+            Err(ParameterError::new("url", format!("must be an address, https://..., got \"{url}\"")))
         }
         _ => Ok(()),
     }
 }
 
-/// Recordings count seconds in 32 bits, ROS 2 with a sign.
+/// Recordings store seconds in 32 bits, signed in ROS 2.
 fn check_epoch(head: &StudyHead) -> Result<(), ParameterError> {
     let (last_s, year) = match head.mcap {
         McapFlavour::Viewer => (u64::from(u32::MAX), 2106),
         McapFlavour::Ros2 => (i32::MAX as u64, 2038),
     };
-    // A year is left for the missions.
+    // Leave a year for the missions.
     if head.epoch_ns / 1_000_000_000 + 366 * 86_400 <= last_s {
         return Ok(());
     }
-    let rule = format!("such recordings end in {year}; it must lie a year before, in ns since 1970-01-01");
+    let rule = format!(
+        "time stamps of these recordings end in {year}, so it must be a year earlier or more, in ns since 1970-01-01"
+    );
     Err(ParameterError::new("epoch_ns", format!("is {}; {rule}", head.epoch_ns)))
 }
 
-/// Creators have names, and each is named once.
+/// Creators must have names, without repetition.
 fn check_creators(head: &StudyHead) -> Result<(), ParameterError> {
     let plain = |name: &str| name.split(',').map(str::trim).collect::<Vec<_>>().join(", ").to_lowercase();
     let names: Vec<String> = head.creators.iter().map(|creator| plain(creator.name())).collect();
     for (k, name) in names.iter().enumerate() {
         let wrong = match () {
-            () if name.trim_matches([',', ' ']).is_empty() => "is empty; a creator has a name",
-            () if names[..k].contains(name) => "names a creator twice",
+            () if name.trim_matches([',', ' ']).is_empty() => "is empty; a creator needs a name",
+            () if names[..k].contains(name) => "lists a creator twice",
             () => continue,
         };
         return Err(ParameterError::new(format!("creators.{k}"), wrong.to_owned()));
@@ -306,7 +308,7 @@ fn check_creators(head: &StudyHead) -> Result<(), ParameterError> {
     Ok(())
 }
 
-/// Organisations are among the creators.
+/// Organisations must be among the creators.
 fn check_organizations(head: &StudyHead) -> Result<(), ParameterError> {
     let is_creator = |name: &str| head.creators.iter().any(|creator| creator.name() == name);
     match head.organizations.iter().find(|name| !is_creator(name)) {
@@ -317,13 +319,13 @@ fn check_organizations(head: &StudyHead) -> Result<(), ParameterError> {
     }
 }
 
-/// ORCID iDs are right, of people, and each of one of them; affiliations are not empty.
+/// ORCID iDs must be valid, belong to people, and be unique; affiliations must not be empty.
 fn check_orcids(head: &StudyHead) -> Result<(), ParameterError> {
     let mut seen = BTreeSet::new();
     for (k, creator) in head.creators.iter().enumerate() {
         let refuse = |key: &str, why: String| Err(ParameterError::new(format!("creators.{k}.{key}"), why));
         if creator.affiliation().is_some_and(|affiliation| affiliation.trim().is_empty()) {
-            return refuse("affiliation", "is empty; leave it out, or name an organisation".to_owned());
+            return refuse("affiliation", "is empty; omit it, or name an organisation".to_owned());
         }
         let Some(orcid) = creator.orcid() else { continue };
         if let Err(wrong) = orcid::check(orcid) {
@@ -336,13 +338,13 @@ fn check_orcids(head: &StudyHead) -> Result<(), ParameterError> {
             );
         }
         if !seen.insert(orcid) {
-            return refuse("orcid", format!("is \"{orcid}\", which another creator has too"));
+            return refuse("orcid", format!("is \"{orcid}\", the same as that of another creator"));
         }
     }
     Ok(())
 }
 
-/// Words of a list are not empty, and each is there once.
+/// Words of a list must not be empty or repeated.
 fn check_words(key: &str, words: &[String]) -> Result<(), ParameterError> {
     for (k, word) in words.iter().enumerate() {
         let wrong = match () {
@@ -355,7 +357,7 @@ fn check_words(key: &str, words: &[String]) -> Result<(), ParameterError> {
     Ok(())
 }
 
-/// DOIs are `10.`, four to nine digits, at most one more part of digits, `/`, and a suffix (the pattern of the Citation File Format).
+/// DOIs must be `10.`, four to nine digits, optionally one more group of digits, `/`, and a suffix (pattern of the Citation File Format).
 fn check_doi(doi: Option<&str>) -> Result<(), ParameterError> {
     let right = |doi: &str| {
         let (registrant, suffix) = doi.strip_prefix("10.")?.split_once('/')?;
@@ -367,8 +369,8 @@ fn check_doi(doi: Option<&str>) -> Result<(), ParameterError> {
     };
     match doi {
         Some(doi) if right(doi).is_none() => {
-            let rule = "it must be a plain DOI such as 10.5281/zenodo.1234567, without https://doi.org/";
-            Err(ParameterError::new("doi", format!("is \"{doi}\"; {rule}")))
+            let rule = "must be a plain DOI such as 10.5281/zenodo.1234567, without https://doi.org/";
+            Err(ParameterError::new("doi", format!("{rule}, got \"{doi}\"")))
         }
         _ => Ok(()),
     }

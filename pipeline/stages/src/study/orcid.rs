@@ -1,10 +1,10 @@
-//! ORCID iDs: sixteen characters in groups of four, the last of them a checksum (ISO 7064, MOD 11-2), as
-//! <https://support.orcid.org/hc/en-us/articles/360006897674> describes it.
+//! Checks ORCID iDs: sixteen characters in groups of four, the last one a checksum (ISO 7064, MOD 11-2), as described in
+//! <https://support.orcid.org/hc/en-us/articles/360006897674>.
 
 /// Refuses what is not an ORCID iD.
 ///
 /// # Errors
-/// What is wrong with it, after the word "is".
+/// The problem, as the end of a sentence "... is ".
 pub fn check(orcid: &str) -> Result<(), String> {
     let form = "it must be a plain ORCID iD such as 0000-0002-1825-0097, without https://orcid.org/";
     let Some((digits, last)) = parts(orcid) else { return Err(format!("\"{orcid}\"; {form}")) };
@@ -40,7 +40,7 @@ fn check_character(digits: &[u32]) -> char {
 mod tests {
     use super::*;
 
-    /// Examples of ORCID's own pages (Josiah Carberry, Stephen Hawking, Laure Haak), and what they are not.
+    /// Examples from ORCID's own pages (Josiah Carberry, Stephen Hawking, Laure Haak), and invalid variants.
     #[test]
     fn val_checksums_are_those_of_orcid() {
         for right in ["0000-0002-1825-0097", "0000-0002-9079-593X", "0000-0001-5109-3700", "0000-0002-1694-233X"] {

@@ -1,25 +1,25 @@
-//! The text of a study: TOML to JSON values, with the place of every key kept for error messages.
+//! The text of a study: converts TOML to JSON values and keeps the place of every key for error messages.
 
 use serde_json::{Map, Number, Value};
 use std::ops::Range;
 use toml_edit::{Document, Item, TableLike};
 
-/// Something wrong in a study's text.
+/// An error in a study's text.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{message}")]
 pub struct StudyError {
-    /// What is wrong and what would be right.
+    /// The problem, and what would be valid.
     pub message: String,
-    /// Bytes of the study's text that it is about.
+    /// Byte range in the study's text.
     pub span: Option<Range<usize>>,
     /// A suggestion.
     pub help: Option<String>,
-    /// The id that it says is missing; no error where the item of that id is itself refused.
+    /// The id reported as missing; the error is dropped if the item of that id was itself refused.
     pub missing_id: Option<String>,
 }
 
 impl StudyError {
-    /// An error about a place in the text.
+    /// An error at a place in the text.
     pub fn at(span: Option<Range<usize>>, message: impl Into<String>) -> Self {
         Self { message: message.into(), span, help: None, missing_id: None }
     }
@@ -30,7 +30,7 @@ impl StudyError {
     }
 }
 
-/// All that is wrong in a study's text, at least one thing.
+/// All errors in a study's text, at least one.
 #[derive(Clone, Debug, PartialEq, Eq, thiserror::Error)]
 #[error("{}", .0.iter().map(ToString::to_string).collect::<Vec<_>>().join("; "))]
 pub struct Refusals(pub Vec<StudyError>);
@@ -42,10 +42,10 @@ impl From<StudyError> for Refusals {
 }
 
 impl Refusals {
-    /// `Ok` where nothing is wrong; else what is, each thing once and in the order of the text.
+    /// `Ok` if there are no errors; otherwise the errors without duplicates, in the order of the text.
     ///
     /// # Errors
-    /// When there are any.
+    /// If there are any.
     pub fn none(mut errors: Vec<StudyError>) -> Result<(), Self> {
         if errors.is_empty() {
             return Ok(());
@@ -74,7 +74,7 @@ impl StudyText {
         Ok(Self { document })
     }
 
-    /// The whole text as JSON.
+    /// The text as JSON.
     ///
     /// # Errors
     /// A date or a number that is not finite, with its place.
@@ -82,18 +82,18 @@ impl StudyText {
         table_to_json(self.document.as_table())
     }
 
-    /// Place of the value at a path (array positions as numbers), or of its nearest parent that has one. `key` asks for the
-    /// key's own place instead of its value's.
+    /// Place of the value at a path (array positions as numbers), or of its nearest ancestor that has one. With `key`, the place
+    /// of the key instead of the value.
     pub fn span(&self, path: &[String], key: bool) -> Option<Range<usize>> {
         self.walk(path, key).last().flatten()
     }
 
-    /// Place of the value at a path; `None` when it is not there.
+    /// Place of the value at a path; `None` if it does not exist.
     pub fn exact_span(&self, path: &[String]) -> Option<Range<usize>> {
         self.walk(path, false).nth(path.len().checked_sub(1)?).flatten()
     }
 
-    /// The best place known after each step along a path, as far as the path goes.
+    /// The best known place after each step along a path, as far as the path exists.
     fn walk(&self, path: &[String], key: bool) -> impl Iterator<Item = Option<Range<usize>>> {
         let mut at = Some(Node::Item(self.document.as_item()));
         let mut best = None;
@@ -106,7 +106,7 @@ impl StudyText {
     }
 }
 
-/// A place in the document: values inside of arrays are no items of their own.
+/// A node in the document; values inside arrays are not items.
 #[derive(Clone, Copy)]
 enum Node<'a> {
     Item(&'a Item),
@@ -128,7 +128,7 @@ impl<'a> Node<'a> {
         }
     }
 
-    /// The place of `segment` below, and what is there.
+    /// The place of the child `segment`, and the child.
     fn step(self, segment: &str, key: bool) -> Option<(Option<Range<usize>>, Self)> {
         if let Some(table) = self.table() {
             let (name, value) = table.get_key_value(segment)?;
@@ -140,7 +140,7 @@ impl<'a> Node<'a> {
             let value = array.get(index)?;
             return Some((value.span(), Self::Value(value)));
         }
-        // One table of an array of tables is not an `Item`; descend through the array's own index.
+        // A table in an array of tables is not an `Item`; descend through the array's index.
         let Self::Item(item) = self else { return None };
         let table = item.as_array_of_tables().and_then(|_| item.get(index))?;
         Some((table.span(), Self::Item(table)))
@@ -166,7 +166,7 @@ fn item_to_json(item: &Item) -> Result<Value, StudyError> {
 /// A TOML value as JSON.
 ///
 /// # Errors
-/// Dates, and numbers that are not finite: no parameter takes them.
+/// Dates, and numbers that are not finite: no parameter accepts them.
 pub fn value_to_json(value: &toml_edit::Value) -> Result<Value, StudyError> {
     use toml_edit::Value as Toml;
     let refuse = |what: &str| StudyError::at(value.span(), what);
@@ -175,9 +175,9 @@ pub fn value_to_json(value: &toml_edit::Value) -> Result<Value, StudyError> {
         Toml::Integer(v) => Ok(Value::Number((*v.value()).into())),
         Toml::Float(v) => Number::from_f64(*v.value())
             .map(Value::Number)
-            .ok_or_else(|| refuse("the number is not finite; every parameter takes finite numbers only")),
+            .ok_or_else(|| refuse("the number is not finite; parameters must be finite")),
         Toml::Boolean(v) => Ok(Value::Bool(*v.value())),
-        Toml::Datetime(_) => Err(refuse("dates are written as text, \"YYYY-MM-DD\"")),
+        Toml::Datetime(_) => Err(refuse("dates must be written as text, \"YYYY-MM-DD\"")),
         Toml::Array(v) => v.iter().map(value_to_json).collect::<Result<_, _>>().map(Value::Array),
         Toml::InlineTable(v) => table_to_json(v),
     }
@@ -205,12 +205,43 @@ mod tests {
         assert_eq!(at(&["terrain", "1", "nothing"], false), Some("[[terrain]]"));
         assert_eq!(text.exact_span(&path(&["terrain", "1", "nothing"])), None);
         assert_eq!(text.exact_span(&path(&["terrain", "0", "id"])).map(|s| &TEXT[s]), Some("\"a\""));
+        assert_eq!(text.exact_span(&[]), None);
+        assert_eq!(at(&["fit", "0"], false), None);
+    }
+
+    /// Every type that a parameter may have, in tables, inline tables and lists of tables.
+    #[test]
+    fn val_toml_becomes_json() {
+        let text =
+            "a = 1\nb = 2.5\nc = true\nd = \"x\"\ne = [1, [2.0, \"y\"]]\nf = { g = 1 }\nh.i = 2\n[[j]]\nk = 3\n[[j]]\n";
+        let expected = serde_json::json!({
+            "a": 1, "b": 2.5, "c": true, "d": "x", "e": [1, [2.0, "y"]], "f": { "g": 1 }, "h": { "i": 2 }, "j": [{ "k": 3 }, {}]
+        });
+        assert_eq!(StudyText::parse(text).unwrap().to_json().unwrap(), expected);
+    }
+
+    /// Errors come once each, in the order of the text; those without a place come last.
+    #[test]
+    fn val_errors_are_sorted() {
+        let error = |span: Option<std::ops::Range<usize>>, message: &str| StudyError::at(span, message);
+        let all = vec![
+            error(None, "c"),
+            error(Some(9..10), "a"),
+            error(Some(2..5), "b"),
+            error(Some(2..3), "z"),
+            error(Some(9..10), "a"),
+        ];
+        let Refusals(sorted) = Refusals::none(all).unwrap_err();
+        assert_eq!(sorted.iter().map(|e| e.message.as_str()).collect::<String>(), "zbac");
+        assert_eq!(Refusals::none(Vec::new()), Ok(()));
     }
 
     #[test]
     fn val_refusals() {
         let error = StudyText::parse("a = nan").unwrap().to_json().unwrap_err();
         assert!(error.message.contains("not finite") && error.span == Some(4..7));
+        let error = StudyText::parse("a = [1, 2026-01-01]").unwrap().to_json().unwrap_err();
+        assert!(error.message.starts_with("dates must be written as text") && error.span == Some(8..18), "{error:?}");
         assert!(StudyText::parse("a = [").unwrap_err().message.contains("TOML"));
     }
 }

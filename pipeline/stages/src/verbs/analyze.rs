@@ -1,4 +1,4 @@
-//! `analyze`: the figures of logs of any origin.
+//! `analyze`: traversal metrics from logs of any origin.
 
 use super::{Read, Reading, read};
 use crate::error::Error;
@@ -15,32 +15,32 @@ use sastrugi_store::mcap::{McapError, read_log};
 use sastrugi_store::parquet::{TableMetadata, write_table};
 use std::path::Path;
 
-/// Rates that are accepted, Hz.
+/// Accepted sampling rates, Hz.
 const RATE_HZ: [f64; 2] = [1.0, 1000.0];
 
-/// What to judge.
+/// A request to analyse logs.
 pub struct Request<'a> {
-    /// How.
+    /// Settings of the analysis.
     pub settings: LogSettings,
     /// Ground under the logs.
     pub dem: Option<&'a Path>,
-    /// From the log's positions to those of the DEM, m.
+    /// Offset from the log's positions to the DEM's coordinates, m.
     pub offset_m: [f64; 3],
     /// Label.
     pub group: Option<String>,
 }
 
-/// Ground under logs: heights and classes.
+/// Ground under logs: heights and roughness classes.
 pub struct Terrain {
     dem: Grid,
     classes: Grid<u8>,
 }
 
-/// A judged log.
+/// An analysed log.
 pub struct Judged {
     /// Its row.
     pub row: LogRow,
-    /// Sentences on how it was read.
+    /// Notes on how it was read.
     pub notes: Vec<String>,
 }
 
@@ -53,14 +53,14 @@ impl Request<'_> {
         let LogSettings { rate_hz, band_hz: [low, high], .. } = self.settings;
         if !(RATE_HZ[0]..=RATE_HZ[1]).contains(&rate_hz) {
             return Err(Error::Usage(format!(
-                "`--rate {rate_hz}`: rates lie between {} and {} Hz",
+                "`--rate {rate_hz}`: must be between {} and {} Hz",
                 RATE_HZ[0], RATE_HZ[1]
             )));
         }
         if !(low > 0.0 && high > low && high <= 0.5 * rate_hz) {
             let nyquist = 0.5 * rate_hz;
             return Err(Error::Usage(format!(
-                "`--band {low},{high}`: a band rises from above 0 to at most half the rate, {nyquist} Hz"
+                "`--band {low},{high}`: must increase, start above 0 and end at or below half the rate, {nyquist} Hz"
             )));
         }
         let Some(path) = self.dem else { return Ok(None) };
@@ -70,10 +70,10 @@ impl Request<'_> {
         Ok(Some(Terrain { dem: dem.grid, classes }))
     }
 
-    /// Judges one log.
+    /// Analyses one log.
     ///
     /// # Errors
-    /// A file that is no MCAP or damaged, or that holds no usable poses.
+    /// A file that is not MCAP, is damaged, or has no usable poses.
     pub fn judge(&self, path: &Path, terrain: Option<&Terrain>) -> Result<Judged, Error> {
         let log = read_log(path).map_err(|e| match e {
             McapError::Io { .. } | McapError::Unusable { .. } => Error::Input(e.to_string()),
@@ -87,7 +87,7 @@ impl Request<'_> {
         let mut notes: Vec<String> = log.broken.iter().cloned().chain(found.notes.iter().cloned()).collect();
         notes.extend(log.unread.iter().map(|topic| format!("not read: {topic}")));
         if ground.is_some_and(|g| g.known_share == 0.0) {
-            notes.push("no sample lies over the DEM; `--offset` moves the log's positions".to_owned());
+            notes.push("no sample lies within the DEM; shift the log's positions with `--offset`".to_owned());
         }
         Ok(Judged { row: self.row(path, &log, &found, ground), notes })
     }
@@ -145,7 +145,7 @@ impl Request<'_> {
     }
 }
 
-/// How the mission ended, where the log has an event that says so; loggers of other programs say other things.
+/// Outcome of the mission, if the log has an event for it; other programs log other events.
 fn outcome(log: &Log) -> Option<String> {
     const ROVERS: [RoverEventKind; 6] = [
         RoverEventKind::Reached,
@@ -159,10 +159,10 @@ fn outcome(log: &Log) -> Option<String> {
     log.events.iter().rev().map(|(_, name)| name).find(|name| known(name)).cloned()
 }
 
-/// Writes the table `logs`, sorted by the names of the logs.
+/// Writes the table `logs`, sorted by log name.
 ///
 /// # Errors
-/// A log that is named twice; a file that cannot be written.
+/// A log that is given twice; a file that cannot be written.
 pub fn write(path: &Path, rows: &[LogRow]) -> Result<(), Error> {
     let metadata =
         TableMetadata { study_sha256: String::new(), seed: 0, version: PROGRAM.to_owned(), license: String::new() };

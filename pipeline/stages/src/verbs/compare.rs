@@ -29,13 +29,13 @@ pub struct Side<'a> {
 pub struct Request<'a> {
     /// A.
     pub a: Side<'a>,
-    /// B; where there is none, textures of one half of A are compared with its other half.
+    /// B; if absent, textures fitted to one half of A are compared with its other half.
     pub b: Option<Side<'a>>,
     /// Parameters of the comparison.
     pub parameters: Value,
     /// Seed of the random streams.
     pub seed: u64,
-    /// Cell size for files that carry none, m.
+    /// Cell size for files that state none, m.
     pub cell_m: Option<[f64; 2]>,
 }
 
@@ -44,7 +44,7 @@ enum Content {
     Fit(Box<FitFile>),
 }
 
-/// Compares two DEMs, two fits, a DEM (fitted as the fit was) and a fit, or textures of one half of a DEM with its other half.
+/// Compares two DEMs, two fits, a DEM (fitted with the settings of the fit) and a fit, or textures of one half of a DEM with its other half.
 /// Returns the comparison and its full record.
 ///
 /// # Errors
@@ -69,7 +69,7 @@ pub fn compare(request: &Request<'_>) -> Result<(Comparison, Value), Error> {
             fits(fit, &like(dem, fit, &settings, &streams)?, &settings, &streams)?
         }
         (Content::Fit(_), None) => {
-            let message = "a fit file has no halves; `--split-half` takes a DEM";
+            let message = "a fit file cannot be split; `--split-half` requires a DEM";
             return Err(Error::Usage(format!("{}: {message}", request.a.path.display())));
         }
     };
@@ -83,7 +83,7 @@ pub fn compare(request: &Request<'_>) -> Result<(Comparison, Value), Error> {
     Ok((comparison, record))
 }
 
-/// A side as it was read.
+/// A side after reading.
 struct Read {
     content: Content,
     notes: Vec<String>,
@@ -96,14 +96,14 @@ impl Read {
     }
 }
 
-/// A fit agrees with the DEM that it was made from: that is no evidence.
+/// Refuses to compare a fit with the DEM it was made from: their agreement is not evidence.
 fn not_circular(side: &Side<'_>, fit: &FitFile) -> Result<(), Error> {
     let name = side.path.display();
     let (_, sha256) = digest::of_file(side.path).map_err(|e| Error::Input(format!("{name}: {e}")))?;
     match fit.source.as_ref().is_some_and(|source| source.sha256 == sha256) {
         true => Err(Error::Usage(format!(
-            "{name} is the DEM that the fit was made from: that they agree says nothing; `compare {name} --split-half` judges a \
-             texture by what was not fitted"
+            "{name} is the DEM that the fit was made from, so agreement proves nothing; `compare {name} --split-half` tests \
+             a texture by statistics that were not fitted"
         ))),
         false => Ok(()),
     }
@@ -113,7 +113,7 @@ fn read(side: &Side<'_>, request: &Request<'_>) -> Result<Read, Error> {
     let name = side.path.display();
     if side.path.is_dir() {
         let message =
-            format!("{name} is a folder: a release is compared with another release, not with a DEM or a fit");
+            format!("{name} is a folder; a release can only be compared with another release, not with a DEM or a fit");
         return Err(Error::Usage(message));
     }
     let is_fit = side.path.extension().is_some_and(|e| e.eq_ignore_ascii_case("json"));
@@ -124,12 +124,12 @@ fn read(side: &Side<'_>, request: &Request<'_>) -> Result<Read, Error> {
         return Ok(Read { content: Content::Dem(dem.grid), notes });
     }
     if side.window.is_some() {
-        return Err(Error::Usage(format!("{name} is a fit file, which has no window to cut")));
+        return Err(Error::Usage(format!("{name} is a fit file; a window applies to DEMs only")));
     }
     Ok(Read { content: Content::Fit(Box::new(read_fit(side.path)?)), notes: Vec::new() })
 }
 
-/// A DEM fitted as a fit was: with its settings, or of an older file with its model, window and trimming.
+/// Fits a DEM with the settings of another fit; for older fit files, with its model, window and trimming.
 fn like(dem: &Grid, fit: &FitFile, settings: &CompareSettings, streams: &Streams) -> Result<FitFile, Error> {
     let own = settings.parameters();
     let given: FitParameters = serde_json::from_value(fit.settings.clone()).unwrap_or_default();

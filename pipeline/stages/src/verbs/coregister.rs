@@ -1,4 +1,4 @@
-//! `coregister`: how one DEM must be moved to lie on another, and what is left between them.
+//! `coregister`: the shift, raise and tilt that bring one DEM onto another, and their difference.
 
 use super::{Read, Reading, check_distinct, check_output, describe_grid, read_as_it_is, write_error};
 use crate::error::Error;
@@ -12,19 +12,19 @@ use std::path::Path;
 
 /// What to co-register.
 pub struct Request<'a> {
-    /// DEM that stays.
+    /// Reference DEM.
     pub a: &'a Path,
-    /// DEM that is moved.
+    /// DEM to move.
     pub b: &'a Path,
-    /// DEM to write with A less B as moved.
+    /// DEM to write with A minus the moved B.
     pub output: Option<&'a Path>,
     /// How it is written.
     pub options: WriteOptions,
-    /// How both are read. Window and masks are A's; masks say where B is fitted to A, and the difference covers the window.
+    /// How both are read. Window and masks are A's; masks restrict where B is fitted to A, and the difference covers the window.
     pub reading: Reading,
 }
 
-/// What came of it.
+/// The result.
 #[derive(Clone, Debug, Serialize)]
 pub struct Done {
     /// File of A.
@@ -33,18 +33,18 @@ pub struct Done {
     pub b: String,
     /// How B was moved.
     pub coregistration: Coregistration,
-    /// What that came to, in a sentence.
+    /// The verdict, in one sentence.
     pub verdict: String,
-    /// File and grid of the difference, where one was written.
+    /// File and grid of the difference, if written.
     pub difference: Option<Value>,
-    /// Sentences on how the DEMs were read and written.
+    /// Notes on how the DEMs were read and written.
     pub notes: Vec<String>,
 }
 
-/// Co-registers B to A, and writes their difference where that is asked for.
+/// Co-registers B to A, and writes their difference if requested.
 ///
 /// # Errors
-/// DEMs that cannot be read or co-registered, an output that no format has, that is an input, or that cannot be written.
+/// DEMs that cannot be read or co-registered; an output of unknown format, that is an input, or that cannot be written.
 pub fn coregister(request: &Request<'_>) -> Result<Done, Error> {
     if let Some(output) = request.output {
         check_output(output)?;
@@ -77,7 +77,7 @@ pub fn coregister(request: &Request<'_>) -> Result<Done, Error> {
     Ok(done)
 }
 
-/// Two DEMs in metres: the first as it is asked for, the second whole.
+/// Reads two DEMs in metres: the first as requested, the second in full.
 pub(super) fn pair(a: &Path, b: &Path, reading: &Reading) -> Result<(Read, Read), Error> {
     let whole = Reading { cell_m: reading.cell_m, gridding: reading.gridding, ..Reading::default() };
     let metric = |path: &Path, reading: &Reading| {

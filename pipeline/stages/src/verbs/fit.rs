@@ -1,4 +1,4 @@
-//! `fit`: covariance of a measured DEM to a fit file.
+//! `fit`: fits the covariance of a measured DEM and writes a fit file.
 
 use super::coregister::pair;
 use super::local::Local;
@@ -28,35 +28,35 @@ use std::sync::Mutex;
 pub struct Request<'a> {
     /// Measured DEM.
     pub dem: &'a Path,
-    /// Fit file to write, where one is wanted.
+    /// Fit file to write, if any.
     pub output: Option<&'a Path>,
     /// Parameters of the fit.
     pub parameters: Value,
-    /// Seed of the replicates' random streams.
+    /// Seed for the random streams of the replicates.
     pub seed: u64,
-    /// What of the DEM to take, and how.
+    /// Which part of the DEM is read, and how.
     pub reading: Reading,
-    /// DEM that is co-registered to the first and subtracted.
+    /// DEM to co-register to the first and subtract.
     pub minus: Option<&'a Path>,
-    /// DEM to write with the difference, before the fit.
+    /// DEM to write with the difference.
     pub difference: Option<&'a Path>,
     /// GeoTIFF to write with the covariance at every lag.
     pub map: Option<&'a Path>,
-    /// DEM to write with the background that the fit took off.
+    /// DEM to write with the background that the fit removes.
     pub background: Option<&'a Path>,
-    /// Maps of roughness by blocks to write.
+    /// Maps of local roughness to write.
     pub local: Option<Local<'a>>,
-    /// Other files that the caller writes about the fit: none may replace another file of this call.
+    /// Other files that the caller writes about the fit, checked for name clashes here.
     pub beside: Vec<&'a Path>,
 }
 
-/// What came of a DEM. A co-registration in the source stands whatever the fit says.
+/// Result for one DEM. A co-registration in the source is kept even if the fit failed.
 pub struct Done {
-    /// The fit as it was written, or why there is none.
+    /// The fit as written, or why it failed.
     pub fit: Result<FitFile, Error>,
-    /// Where the DEM came from.
+    /// Origin of the DEM.
     pub source: Source,
-    /// Sentences on how the DEM was read.
+    /// Notes on how the DEM was read.
     pub notes: Vec<String>,
 }
 
@@ -81,14 +81,14 @@ pub fn fit(request: &Request<'_>) -> Result<Done, Error> {
 /// Checked parameters of a fit.
 ///
 /// # Errors
-/// Unknown parameters, and those out of range.
+/// Parameters that are unknown or out of range.
 pub fn settings(parameters: &Value) -> Result<FitSettings, Error> {
     parameters::check_schema(parameters, &schema_of::<FitParameters>(), "fit")?;
     let raw: FitParameters = read_parameters(parameters)?;
     Ok(FitSettings::try_from(raw)?)
 }
 
-/// Writes what was fitted.
+/// Writes the outputs of a fit.
 fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result<FitFile, Error> {
     if let Some(path) = request.map {
         dem::write(path, &outcome.covariance_map(), &Crs::default(), &Default::default())
@@ -101,10 +101,10 @@ fn written(request: &Request<'_>, outcome: FitOutcome, source: Source) -> Result
     Ok(fit)
 }
 
-/// Writes the bins of a fit as flat CSV: rings, then directions.
+/// Writes the covariance bins of a fit as CSV: rings, then directions.
 ///
 /// # Errors
-/// The file system refused.
+/// File-system errors.
 pub fn write_bins(path: &Path, fit: &FitFile) -> Result<(), Error> {
     csv::write_rows(path, &BIN_COLUMNS, bins(fit)).map_err(|e| Error::at(path, e))
 }
@@ -127,7 +127,7 @@ fn bins(fit: &FitFile) -> impl Iterator<Item = Vec<Cell>> {
     })
 }
 
-/// Refuses rasters that no DEM format has, and outputs that would replace another file of this fit.
+/// Refuses rasters of unknown format, and outputs that would replace another file of this fit.
 fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
     let rasters = [request.map, request.difference, request.background];
     rasters.into_iter().flatten().try_for_each(super::check_output)?;
@@ -138,13 +138,13 @@ fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
     super::check_distinct(&outputs, &inputs)
 }
 
-/// Every file that a fit reads.
+/// All input files of a fit.
 fn inputs<'a>(request: &'a Request<'_>) -> impl Iterator<Item = &'a Path> {
     let masks = request.reading.masks.iter().map(|(path, _)| path.as_path());
     [request.dem].into_iter().chain(request.minus).chain(masks).chain(request.reading.noise_reference.as_deref())
 }
 
-/// Writes the background that a fit took off, where it is asked for.
+/// Writes the background that the fit removed, if requested.
 fn write_background(
     request: &Request<'_>,
     outcome: &FitOutcome,
@@ -165,11 +165,11 @@ struct Fitted {
     minus: Option<Minus>,
 }
 
-/// The fit of transects, of a raster that is read in parts, or of a DEM in memory.
+/// Fits transects, a raster that is read in parts, or a DEM in memory.
 fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error> {
     let streams = Streams::for_seed(request.seed, STAGE);
     let whole = |heights: &dyn Heights, settings: &FitSettings, crs: &Crs, mut notes: Vec<String>| {
-        // A fit and its replicates may take minutes: what cannot be mapped is refused before them.
+        // A fit and its replicates may take minutes, so refuse impossible maps first.
         let checked = request.local.as_ref().map_or(Ok(()), |local| local.check(settings, heights));
         let outcome = checked.and_then(|()| sastrugi_texture::fit(heights, settings, &streams).map_err(Error::from));
         let mapped = |outcome: FitOutcome| {
@@ -188,10 +188,10 @@ fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error
     if let Some(found) = transects(request.dem, &request.reading)? {
         let profiles = Profiles::new(found.spacing_m, &found.profiles)?;
         if let Some(path) = request.background {
-            let message = format!("{}: transects have no background raster; leave `--background` out", path.display());
+            let message = format!("{}: transects have no background raster; omit `--background`", path.display());
             return Err(Error::Usage(message));
         }
-        let note = format!("{} transects, a height every {} m", found.names.len(), found.spacing_m);
+        let note = format!("{} transects, spacing {} m", found.names.len(), found.spacing_m);
         return Ok(whole(&profiles, settings, &Crs::default(), vec![note]));
     }
     if let Some((parts, notes)) = Parts::of_large(request.dem, &request.reading)? {
@@ -205,17 +205,17 @@ fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error
     Ok(Fitted { masked_share, noise, ..whole(&dem.grid, &settings, &dem.info.crs, notes) })
 }
 
-/// Cells above which a GeoTIFF is read in parts: half a gigabyte of heights.
+/// Number of cells above which a GeoTIFF is read in parts: half a gigabyte of heights.
 const PARTS_CELLS: usize = 1 << 26;
 
-/// A raster of which parts are read as they are needed.
+/// A raster that is read in parts, on demand.
 struct Parts {
     reader: Mutex<BlockReader>,
     geometry: Geometry,
 }
 
 impl Parts {
-    /// A GeoTIFF that is better not held in memory, with sentences on how it is read.
+    /// Opens a GeoTIFF that is too large to hold in memory, with notes on how it is read.
     fn of_large(path: &Path, reading: &Reading) -> Result<Option<(Self, Vec<String>)>, Error> {
         let whole = Reading { cell_m: reading.cell_m, gridding: reading.gridding, ..Reading::default() };
         if Format::of_name(path) != Some(Format::GeoTiff) || *reading != whole {
@@ -239,7 +239,7 @@ impl Parts {
 
 impl Parts {
     fn crs(&self) -> Result<Crs, Error> {
-        let reader = self.reader.lock().map_err(|_| Error::failed("reading of the raster was given up"))?;
+        let reader = self.reader.lock().map_err(|_| Error::failed("reading of the raster was aborted"))?;
         Ok(reader.info().crs.clone())
     }
 }
@@ -250,13 +250,13 @@ impl Heights for Parts {
     }
 
     fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), String> {
-        let mut reader = self.reader.lock().map_err(|_| "reading of the raster was given up".to_owned())?;
+        let mut reader = self.reader.lock().map_err(|_| "reading of the raster was aborted".to_owned())?;
         *part = reader.read_part(rows, cols).map_err(|e| e.to_string())?.values;
         Ok(())
     }
 }
 
-/// What the fit file says of the files it was made from.
+/// The input files, as recorded in the fit file.
 fn source_of(request: &Request<'_>, noise: Option<&ReferenceNoise>) -> Result<Source, Error> {
     let mask = |(path, excludes): &(PathBuf, bool)| {
         named(path).map(|(file, sha256)| MaskSource { file, sha256, excludes: *excludes })
@@ -268,7 +268,7 @@ fn source_of(request: &Request<'_>, noise: Option<&ReferenceNoise>) -> Result<So
     Ok(Source { file, sha256, window: request.reading.window, masks, noise_reference, ..Source::default() })
 }
 
-/// A DEM less another, written where that is asked for, with how the first was read and a record of the second.
+/// The difference of two DEMs, written if requested, with how the first was read and a record of the second.
 fn subtracted(request: &Request<'_>, path: &Path) -> Result<(Grid, Read, Minus), Error> {
     let (mut read, other) = pair(request.dem, path, &request.reading)?;
     let Coregistered { difference, coregistration } = coregistered(&read.dem, &other.dem)?;

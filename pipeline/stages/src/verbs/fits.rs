@@ -1,5 +1,5 @@
-//! `fit` of several DEMs with the same settings: a table with one row for each, and a fit file for each where asked for.
-//! A DEM that cannot be fitted has a row that says why.
+//! `fit` of several DEMs with the same settings: a table with one row per DEM and, on request, one fit file per DEM.
+//! The row of a DEM that could not be fitted states the error.
 
 use super::fit::{self, Done};
 use super::{Reading, check_distinct};
@@ -17,26 +17,29 @@ use std::path::{Path, PathBuf};
 pub struct Request<'a> {
     /// Measured DEMs.
     pub dems: &'a [PathBuf],
-    /// Fit file of a single DEM; of several a folder for their fit files, `<name of the DEM>.json`. None are written without it.
+    /// Fit file of a single DEM; for several, a folder for fit files `<name of the DEM>.json`. Without it, none are written.
     pub output: Option<&'a Path>,
     /// Table to write, .csv or .parquet.
     pub table: Option<&'a Path>,
     /// Parameters of every fit.
     pub parameters: Value,
-    /// Seed of the replicates' random streams, the same for every DEM.
+    /// Seed for the random streams of the replicates, the same for every DEM.
     pub seed: u64,
-    /// What of each DEM to take, and how.
+    /// Which part of each DEM is read, and how.
     pub reading: Reading,
-    /// DEM that is co-registered to each and subtracted.
+    /// DEM to co-register to each and subtract.
     pub minus: Option<&'a Path>,
 }
 
-/// Fits every DEM; `hear` is told of each as it is done. The rows are sorted by file.
+/// Fits every DEM; `on_result` is called with each result. The rows are sorted by file.
 ///
 /// # Errors
-/// Unknown parameters; outputs that would replace another file; a table that cannot be written. What is wrong with one DEM
-/// stands in its row.
-pub fn fits(request: &Request<'_>, hear: &mut dyn FnMut(&Path, &Result<Done, Error>)) -> Result<Vec<DemFitRow>, Error> {
+/// Unknown parameters; outputs that would replace another file; a table that cannot be written. The error of a single DEM
+/// is recorded in its row.
+pub fn fits(
+    request: &Request<'_>,
+    on_result: &mut dyn FnMut(&Path, &Result<Done, Error>),
+) -> Result<Vec<DemFitRow>, Error> {
     fit::settings(&request.parameters)?;
     let outputs = fit_files(request)?;
     let mut rows = Vec::new();
@@ -55,7 +58,7 @@ pub fn fits(request: &Request<'_>, hear: &mut dyn FnMut(&Path, &Result<Done, Err
             beside: request.table.into_iter().collect(),
         };
         let done = fit::fit(&one);
-        hear(dem, &done);
+        on_result(dem, &done);
         rows.push(row(dem, done));
     }
     rows.sort_by(|a, b| a.file.cmp(&b.file));
@@ -63,12 +66,12 @@ pub fn fits(request: &Request<'_>, hear: &mut dyn FnMut(&Path, &Result<Done, Err
     Ok(rows)
 }
 
-/// The fit file of each DEM, none of which replaces another or an input.
+/// The fit file of each DEM; refuses names that would replace another or an input.
 fn fit_files(request: &Request<'_>) -> Result<Vec<Option<PathBuf>>, Error> {
     let mut owners: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let single = request.dems.len() == 1;
     if let Some(path) = request.output.filter(|path| !single && path.exists() && !path.is_dir()) {
-        let message = format!("{}: is a file; `-o` names a folder for the fit files of several DEMs", path.display());
+        let message = format!("{} is a file; for several DEMs, `-o` must be a folder", path.display());
         return Err(Error::Usage(message));
     }
     let of = |dem: &PathBuf| {
@@ -79,7 +82,7 @@ fn fit_files(request: &Request<'_>) -> Result<Vec<Option<PathBuf>>, Error> {
         let Some(file) = file else { continue };
         if let Some(other) = owners.insert(file.clone(), dem) {
             let message = format!(
-                "{} and {} would both be fitted to {}; rename one, or leave `-o` out",
+                "{} and {} would both be written to {}; rename one, or omit `-o`",
                 other.display(),
                 dem.display(),
                 file.display()
@@ -94,7 +97,7 @@ fn fit_files(request: &Request<'_>) -> Result<Vec<Option<PathBuf>>, Error> {
     let inputs: Vec<&Path> = dems.iter().copied().chain(others).collect();
     check_distinct(&outputs, &inputs)?;
     check_distinct(&dems, &[]).map_err(|_| {
-        let message = "a DEM is named twice; a table has one row for each";
+        let message = "a DEM is given twice; the table has one row per DEM";
         Error::Usage(message.to_owned())
     })?;
     Ok(files)
@@ -115,14 +118,14 @@ fn row(dem: &Path, done: Result<Done, Error>) -> DemFitRow {
         Ok(fit) => DemFitRow { file, fit: fit_row(&id, &id, &fit), beside, error: None },
         Err(error) => {
             let nothing = fit_row(&id, &id, &FitFile::default());
-            // What a fit file may leave out has a default there; here it is not known.
+            // Keys missing from a fit file have defaults; here they are unknown.
             let unknown = FitRow { nugget_m2: f64::NAN, ratio: f64::NAN, trim_level: f64::NAN, ..nothing };
             DemFitRow { file, fit: unknown, beside, error: Some(error.to_string()) }
         }
     }
 }
 
-/// The co-registration, which stands whatever the fit says, and what the fit is good for.
+/// The co-registration, kept even if the fit failed, and the verdict on the fit.
 fn beside(fit: Option<&FitFile>, source: &Source) -> BesideFit {
     let c = source.minus.as_ref().map(|minus| &minus.coregistration);
     let [shift_east_m, shift_north_m] = c.and_then(|c| c.shift_m).unwrap_or([f64::NAN; 2]);
@@ -138,7 +141,7 @@ fn beside(fit: Option<&FitFile>, source: &Source) -> BesideFit {
     }
 }
 
-/// Writes the table `dem_fits`: as CSV where the name ends so, else as Parquet.
+/// Writes the table `dem_fits`: as CSV if the name ends in .csv, else as Parquet.
 fn write(path: &Path, rows: &[DemFitRow]) -> Result<(), Error> {
     if path.extension().is_some_and(|e| e.eq_ignore_ascii_case("csv")) {
         return csv::write_records(path, rows).map_err(|e| Error::at(path, e));

@@ -10,20 +10,20 @@ use sastrugi_store::atomic;
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Most pixels along a side of a picture.
+/// Maximum number of pixels along a side of a picture.
 const PIXELS_MAX: u32 = 16384;
 
-/// Draws a DEM in metres, at most `pixels` along a side; slopes are exaggerated by `factor`, or by what makes them well visible. Returns
-/// what was drawn.
+/// Draws a DEM in metres, at most `pixels` along a side; slopes are exaggerated by `factor`, or by default enough to be visible. Returns
+/// a description of the picture.
 ///
 /// # Errors
 /// Numbers out of range, or a file that cannot be written.
 pub fn hillshade(read: &Read, output: &Path, pixels: u32, factor: Option<f64>) -> Result<Value, Error> {
     if !output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("png")) {
-        return Err(Error::Usage(format!("{}: the picture is a PNG; name it .png", output.display())));
+        return Err(Error::Usage(format!("{}: the picture must be a .png", output.display())));
     }
     if !(1..=PIXELS_MAX).contains(&pixels) {
-        return Err(Error::Usage(format!("`--pixels` is {pixels}; it must lie between 1 and {PIXELS_MAX}")));
+        return Err(Error::Usage(format!("`--pixels` must be between 1 and {PIXELS_MAX}, got {pixels}")));
     }
     let grid = &read.dem.grid;
     let factor = match factor {

@@ -1,4 +1,4 @@
-//! Maps of roughness by blocks, beside a fit.
+//! Maps of local roughness, block by block, written with a fit.
 
 use super::write_error;
 use crate::error::Error;
@@ -10,47 +10,47 @@ use sastrugi_texture::fit::Mode;
 use sastrugi_texture::{FitOutcome, FitSettings, Heights, LocalMaps};
 use std::path::{Path, PathBuf};
 
-/// Maps that are asked for.
+/// The requested maps.
 pub struct Local<'a> {
-    /// Start of the names of the maps.
+    /// Prefix of the map names.
     pub prefix: &'a Path,
-    /// Width of a block, m; four windows where it is `None`.
+    /// Width of a block, m; four windows if `None`.
     pub block_m: Option<f64>,
 }
 
-/// Width of a block where none is asked for, and the least, windows: those of `FitOutcome::local_maps`.
+/// Default and minimum width of a block, in windows; as in `FitOutcome::local_maps`.
 const BLOCK_WINDOWS: f64 = 4.0;
 const BLOCK_WINDOWS_MIN: f64 = 2.0;
 
-/// End of a map's name, and what it holds.
+/// Suffix and description of a map.
 const BAND_RMS: (&str, &str) = ("band-rms.tif", "root mean square of the residual before trimming");
-const SIGMA: (&str, &str) = ("sigma.tif", "standard deviation of the texture, range held at the fit's");
-const SIGMA2_OVER_B: (&str, &str) = ("sigma2-over-b.tif", "sigma squared over b, range held at the fit's");
+const SIGMA: (&str, &str) = ("sigma.tif", "standard deviation of the texture, range fixed at that of the fit");
+const SIGMA2_OVER_B: (&str, &str) = ("sigma2-over-b.tif", "sigma squared over b, range fixed at that of the fit");
 
 impl Local<'_> {
-    /// Every file that may be written.
+    /// All files that may be written.
     pub fn files(&self) -> Vec<PathBuf> {
         [BAND_RMS, SIGMA, SIGMA2_OVER_B].into_iter().map(|(end, _)| self.file(end)).collect()
     }
 
-    /// Refuses, before a fit is made, maps that its mode does not have.
+    /// Refuses, before the fit, maps that its mode does not support.
     ///
     /// # Errors
     /// Mode `paper`.
     pub fn check_mode(&self, settings: &FitSettings) -> Result<(), Error> {
         match settings.parameters().mode {
             Mode::Corrected => Ok(()),
-            Mode::Paper => Err(Error::Usage("`--local` needs a `corrected` fit, not mode `paper`".to_owned())),
+            Mode::Paper => Err(Error::Usage("`--local` requires mode `corrected`, not `paper`".to_owned())),
         }
     }
 
-    /// Refuses, before a fit is made, maps that its heights do not have, and blocks that do not fit the DEM.
+    /// Refuses, before the fit, maps of transects and blocks that do not fit the DEM.
     ///
     /// # Errors
     /// Transects; blocks below two windows or wider than the DEM.
     pub fn check(&self, settings: &FitSettings, heights: &dyn Heights) -> Result<(), Error> {
         if heights.are_profiles() {
-            return Err(Error::Usage("`--local` needs a raster, not transects".to_owned()));
+            return Err(Error::Usage("`--local` requires a raster, not transects".to_owned()));
         }
         let geometry = heights.geometry();
         let [x_m, y_m] = BoxWindow::nearest(settings.parameters().outer_scale_m, geometry.cell).size_m(geometry.cell);
@@ -58,17 +58,17 @@ impl Local<'_> {
         let [width_m, height_m] = geometry.size();
         let (least_m, most_m) = (BLOCK_WINDOWS_MIN * window_m, width_m.max(height_m));
         let block_m = self.block_m.unwrap_or(BLOCK_WINDOWS * window_m);
-        // Where no block fits, the outer scale is too large for the DEM, and the fit says so.
+        // If no block fits, the outer scale is too large for the DEM, and the fit reports that.
         if block_m >= least_m * (1.0 - 1e-9) && block_m <= most_m || least_m > most_m {
             return Ok(());
         }
         let [block, least, most] = [block_m, least_m, most_m].map(|m| shown((1e6 * m).round() / 1e6));
         let given = match self.block_m {
             Some(_) => format!("`--local-block` is {block} m"),
-            None => format!("`--local` takes blocks of four windows, {block} m, without `--local-block`"),
+            None => format!("the default block of `--local` is four windows, {block} m"),
         };
         Err(Error::Usage(format!(
-            "{given}; blocks are at least two windows, {least} m, and at most the DEM, {most} m, wide"
+            "{given}; blocks must be at least two windows ({least} m) and at most the DEM ({most} m) wide"
         )))
     }
 
@@ -78,7 +78,7 @@ impl Local<'_> {
         name.into()
     }
 
-    /// Writes the maps of a fit, and says what they hold in a sentence.
+    /// Writes the maps of a fit, and describes them in one sentence.
     ///
     /// # Errors
     /// Blocks that do not fit, heights that cannot be read, files that cannot be written.
@@ -106,7 +106,7 @@ fn sentence(maps: &LocalMaps) -> String {
     };
     let sigma = maps.sigma_m.as_ref().map_or_else(String::new, |map| {
         let error =
-            format!(" (standard error of a whole block {:.1} %, if the model is right)", 100.0 * maps.sigma_error);
+            format!(" (standard error of a full block {:.1} %, if the model is right)", 100.0 * maps.sigma_error);
         range("sigma", map) + &error
     });
     format!(

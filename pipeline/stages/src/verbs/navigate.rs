@@ -1,4 +1,4 @@
-//! `navigate`: a route over one DEM, as a file, a picture, or a small study of its own, which may lead a team along it.
+//! `navigate`: plans a route over one DEM and writes it as a file, a picture, or a release that may include a team following it.
 
 use super::reading::{Reading, read_as_it_is};
 use super::traverse::{Place as ReleasePlace, document, with};
@@ -23,7 +23,7 @@ use sastrugi_store::geojson;
 use serde_json::{Map, Value, json};
 use std::path::{Path, PathBuf};
 
-/// What is asked for.
+/// A request for a route.
 pub struct Request<'a> {
     /// DEM.
     pub dem: &'a Path,
@@ -31,32 +31,32 @@ pub struct Request<'a> {
     pub start: [f64; 2],
     /// Goal, in the DEM's own coordinates.
     pub goal: [f64; 2],
-    /// Vehicle whose limits of slope hold.
+    /// Vehicle whose slope limits apply.
     pub vehicle: Option<&'a str>,
-    /// Files of what cannot be entered.
+    /// Files of areas to avoid.
     pub obstacles: &'a [PathBuf],
     /// Parameters of the search.
     pub route: Value,
-    /// Parameters of the team that follows the route; needs a release.
+    /// Parameters of the team that follows the route; requires a release.
     pub team: Option<Value>,
 }
 
-/// Endings of what holds a route alone.
+/// Extensions of files that contain only a route.
 const ROUTE_ENDINGS: [&str; 2] = ["geojson", "svg"];
 
-/// True for outputs that hold a route alone.
+/// True for outputs that contain only a route.
 pub fn is_route_file(output: &Path) -> bool {
     let ending = output.extension().and_then(|ending| ending.to_str()).unwrap_or_default();
     ROUTE_ENDINGS.iter().any(|known| known.eq_ignore_ascii_case(ending))
 }
 
-/// Plans a route and writes it as GeoJSON, or as a picture (SVG). Returns its figures.
+/// Plans a route and writes it as GeoJSON, or as a picture (SVG). Returns its metrics.
 ///
 /// # Errors
 /// Wrong parameters, a DEM or obstacles that cannot be used, no route, or a file that cannot be written.
 pub fn route(request: &Request<'_>, output: &Path) -> Result<Value, Error> {
     if request.team.is_some() {
-        let message = format!("{}: a team needs a folder for its release; give `-o DIR`", output.display());
+        let message = format!("{}: a team is written as a release; name a folder with `-o DIR`", output.display());
         return Err(Error::Usage(message));
     }
     let parameters: RouteParameters = read_parameters(&request.route)?;
@@ -103,19 +103,21 @@ fn given(request: &Request<'_>, heights: &Grid, place: &Place) -> Result<Given, 
     Ok(given)
 }
 
-/// The sentence on a pair without a route.
+/// Message for a start and goal without a route.
 fn no_route(site: &Site, outcome: Option<&Outcome>) -> String {
     let [up, down] = site.map().limits().degrees();
     match outcome {
-        Some(Outcome::Budget) => "no route was found within `expansions_max`; raise it, or `suboptimality`".to_owned(),
+        Some(Outcome::Budget) => {
+            "no route found within `expansions_max`; raise it, or raise `suboptimality`".to_owned()
+        }
         _ => format!(
-            "no route joins start and goal with slopes of at most {up:.1} degrees uphill and {down:.1} downhill; raise \
+            "no route from start to goal with slopes of at most {up:.1} degrees uphill and {down:.1} downhill; raise \
              `max_up_deg` and `max_down_deg`, or allow 8 neighbours"
         ),
     }
 }
 
-/// The figures of a route, by name.
+/// The metrics of a route, by name.
 fn figures(site: &Site, route: &Route) -> Map<String, Value> {
     let degrees = |slope: f64| libm::atan(slope).to_degrees();
     let score = &route.smoothed_score;
@@ -146,7 +148,7 @@ impl Drawn<'_> {
     fn picture(&self, dem: &Path) -> Result<String, Error> {
         let figure = |name: &str| self.figures.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
         let words = format!(
-            "{:.0} m in plan, cost {:.0} m, climbs {:.1} degrees and descends {:.1} at most",
+            "{:.0} m in plan, cost {:.0} m, steepest climb {:.1} degrees, steepest descent {:.1} degrees",
             figure("length_m"),
             figure("cost_m"),
             figure("steepest_up_deg"),
@@ -166,10 +168,10 @@ impl Drawn<'_> {
     }
 }
 
-/// Plans a route over a DEM, leads a team along it where one is asked for, and writes a release with tables, GeoJSON, recordings and report.
+/// Plans a route over a DEM, simulates a team along it if requested, and writes a release with tables, GeoJSON, recordings and report.
 ///
 /// # Errors
-/// As [`crate::studies::run`]; also a DEM on which nothing can be planned.
+/// As [`crate::studies::run`]; also a DEM on which no route can be planned.
 pub fn release(
     request: &Request<'_>,
     date: &str,

@@ -1,4 +1,4 @@
-//! Parameters given on a command line or in a small TOML file, brought to the form that a study's items have.
+//! Converts parameters from a command line or a small TOML file to the form they have in a study.
 
 use crate::error::Error;
 use crate::study::keys;
@@ -12,22 +12,39 @@ use std::path::Path;
 ///
 /// # Errors
 /// A pair without `=`, or a value that is not finite.
+///
+/// # Examples
+/// ```
+/// use sastrugi_stages::verbs::parameters::assign;
+/// use serde_json::json;
+///
+/// # fn main() -> Result<(), sastrugi_stages::Error> {
+/// let mut parameters = json!({ "size_px": [64, 64] });
+/// let pairs = ["high.fractal_dimension=2.5", "size_px=[512, 256]", "phase=gaussian"].map(str::to_owned);
+/// assign(&mut parameters, &pairs)?;
+/// assert_eq!(
+///     parameters,
+///     json!({ "size_px": [512, 256], "high": { "fractal_dimension": 2.5 }, "phase": "gaussian" })
+/// );
+/// # Ok(())
+/// # }
+/// ```
 pub fn assign(params: &mut Value, pairs: &[String]) -> Result<(), Error> {
     for pair in pairs {
         let (name, text) = pair
             .split_once('=')
             .filter(|(name, _)| !name.trim().is_empty())
-            .ok_or_else(|| Error::Usage(format!("`--set {pair}`: it takes name=value")))?;
+            .ok_or_else(|| Error::Usage(format!("`--set {pair}`: expected name=value")))?;
         place(params, name.trim(), parse_value(pair, text.trim())?)?;
     }
     Ok(())
 }
 
-/// Keys of a vehicle file: those that are read, and those that `kinds` prints beside them.
+/// Keys of a vehicle file: those that are read, and those that `kinds` prints in addition.
 const VEHICLE_KEYS: [&str; 8] = ["base", "parameters", "sources", "kind", "family", "summary", "source", "schema"];
 
-/// The vehicle of a run: the name of a known one, or a vehicle file (`.toml`, or `.json` as `kinds` prints it). The table `parameters` of a file holds
-/// those that differ from the vehicle named by `base` or `kind`, or all of them where neither is there.
+/// Sets the vehicle of a run: a known name, or a vehicle file (`.toml`, or `.json` as printed by `kinds`). The table `parameters` of the file
+/// holds the values that differ from the vehicle named by `base` or `kind`, or all values if neither is given.
 ///
 /// # Errors
 /// A file that cannot be read, is neither TOML nor JSON, or is not a vehicle file.
@@ -44,16 +61,16 @@ pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
     } else {
         StudyText::parse(&text).and_then(|text| text.to_json()).map_err(|e| refused(&e))?
     };
-    // `kinds` lists what it prints.
+    // `kinds` prints a list.
     let file = match file.as_array().map(Vec::as_slice) {
         None => &file,
         Some([one]) => one,
-        Some(several) => return Err(refused(&format!("holds {} vehicles; keep one of them", several.len()))),
+        Some(several) => return Err(refused(&format!("contains {} vehicles; keep one of them", several.len()))),
     };
     let mut keys = file.as_object().into_iter().flat_map(Map::keys);
     if let Some(unknown) = keys.find(|key| !VEHICLE_KEYS.contains(&key.as_str())) {
         return Err(refused(&format!(
-            "unknown key `{unknown}`; numbers of the vehicle stand in the table `parameters`"
+            "unknown key `{unknown}`; values of the vehicle belong in the table `parameters`"
         )));
     }
     let base = match file.get("base").or_else(|| file.get("kind")) {
@@ -69,7 +86,7 @@ pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
     }
 }
 
-/// Doubts about the vehicle of a run, a sentence each.
+/// Warnings about the vehicle of a run, one sentence each.
 pub fn vehicle_doubts(params: &Value) -> Vec<String> {
     let changes = params["vehicle_changes"].as_object().cloned().unwrap_or_default();
     params["vehicle"].as_str().map(|kind| doubts(kind, &changes)).unwrap_or_default()
@@ -85,7 +102,7 @@ fn parse_value(pair: &str, text: &str) -> Result<Value, Error> {
 fn place(params: &mut Value, dotted: &str, value: Value) -> Result<(), Error> {
     let mut at = params;
     for word in dotted.split('.') {
-        let map = at.as_object_mut().ok_or_else(|| Error::Usage(format!("`{dotted}`: its parent is no table")))?;
+        let map = at.as_object_mut().ok_or_else(|| Error::Usage(format!("`{dotted}`: its parent is not a table")))?;
         at = map.entry(word).or_insert_with(|| Value::Object(Map::new()));
     }
     *at = value;
@@ -95,9 +112,17 @@ fn place(params: &mut Value, dotted: &str, value: Value) -> Result<(), Error> {
 /// A JSON value as TOML.
 ///
 /// # Errors
-/// Nulls and integers beyond 64 bits, which TOML does not have.
+/// Nulls and integers beyond 64 bits, which do not exist in TOML.
+///
+/// ```
+/// use sastrugi_stages::verbs::parameters::to_toml;
+/// use serde_json::json;
+///
+/// assert_eq!(to_toml(&json!([1, 2.5])).map(|value| value.to_string()).ok().as_deref(), Some("[1, 2.5]"));
+/// assert!(to_toml(&json!(null)).is_err());
+/// ```
 pub fn to_toml(value: &Value) -> Result<toml_edit::Value, Error> {
-    let refuse = || Error::Usage(format!("{value} has no TOML form"));
+    let refuse = || Error::Usage(format!("{value} cannot be written as TOML"));
     Ok(match value {
         Value::Null => return Err(refuse()),
         Value::Bool(b) => (*b).into(),
@@ -125,7 +150,7 @@ pub fn read_file(path: &Path) -> Result<Value, Error> {
     read.map_err(|error| Error::Study { name, text, refusals: error.into() })
 }
 
-/// Refuses parameters that a kind does not have.
+/// Refuses unknown parameters of a kind.
 ///
 /// # Errors
 /// The first unknown parameter, with the nearest known one.
@@ -133,7 +158,7 @@ pub fn check(params: &Value, kind: &Kind) -> Result<(), Error> {
     check_schema(params, &kind.parameters, kind.kind)
 }
 
-/// Refuses keys that a schema does not have.
+/// Refuses keys that are not in a schema.
 ///
 /// # Errors
 /// The first unknown key, with the nearest known one.
@@ -142,7 +167,7 @@ pub fn check_schema(params: &Value, schema: &Value, of: &str) -> Result<(), Erro
     let Some(unknown) = found.first() else { return Ok(()) };
     let hint = match unknown.nearest() {
         Some(nearest) => format!("did you mean `{nearest}`?"),
-        None => format!("it has {}", unknown.known.join(", ")),
+        None => format!("known: {}", unknown.known.join(", ")),
     };
     Err(Error::Usage(format!("`{of}` has no parameter `{}`; {hint}", unknown.path.join("."))))
 }
@@ -158,8 +183,54 @@ mod tests {
         let pairs = ["a=1", "b.c=[1.5, 2]", "word=gaussian", "t=\"x y\"", "u={v=true}"].map(str::to_owned);
         assign(&mut params, &pairs).unwrap();
         assert_eq!(params, json!({"a": 1, "b": {"c": [1.5, 2]}, "word": "gaussian", "t": "x y", "u": {"v": true}}));
-        assert!(assign(&mut params, &["x".to_owned()]).is_err());
-        assert!(assign(&mut params, &["x=nan".to_owned()]).is_err());
-        assert!(assign(&mut params, &["a.b=1".to_owned()]).is_err());
+        for (pair, words) in [
+            ("x", "`--set x`: expected name=value"),
+            ("=1", "expected name=value"),
+            ("x=nan", "`--set x=nan`: the number is not finite"),
+            ("x=2026-01-01", "dates must be written as text"),
+            ("a.b=1", "`a.b`: its parent is not a table"),
+        ] {
+            let error = assign(&mut params, &[pair.to_owned()]).unwrap_err();
+            assert!(matches!(&error, Error::Usage(message) if message.contains(words)), "{pair}: {error}");
+        }
+    }
+
+    /// Vehicles by name and by file: what belongs to the vehicle goes below `vehicle_changes`.
+    #[test]
+    fn val_vehicles() {
+        let mut params = json!({ "speed_m_s": 1.0 });
+        assign_vehicle(&mut params, "husky_a200").unwrap();
+        assert_eq!(params, json!({ "speed_m_s": 1.0, "vehicle": "husky_a200" }));
+        let folder = tempfile::tempdir().unwrap();
+        let file = |name: &str, text: &str| {
+            let path = folder.path().join(name);
+            std::fs::write(&path, text).unwrap();
+            let mut params = json!({});
+            assign_vehicle(&mut params, &path.to_string_lossy()).map(|()| params).map_err(|e| e.to_string())
+        };
+        let based = file("a.toml", "base = \"ugv_4x4\"\n[parameters.drive]\nspeed_limit_m_s = 0.8\n").unwrap();
+        assert_eq!(based, json!({ "vehicle": "ugv_4x4", "vehicle_changes": { "drive": { "speed_limit_m_s": 0.8 } } }));
+        // Without a base, all values are the file's own; `kinds --json` prints a list of one.
+        let printed = file("b.JSON", "[{ \"kind\": \"mine\", \"parameters\": {} }]").unwrap();
+        assert_eq!(printed, json!({ "vehicle": "mine", "vehicle_changes": {} }));
+        assert_eq!(file("c.toml", "[parameters]\n").unwrap()["vehicle"], CUSTOM);
+        for (name, text, words) in [
+            ("d.toml", "base = 5\n[parameters]\n", "`base` must be the name of a vehicle"),
+            ("e.toml", "base = \"ugv_4x4\"\n", "missing table `parameters`"),
+            ("f.toml", "mass_kg = 5\n", "unknown key `mass_kg`"),
+            ("g.json", "[{}, {}]", "contains 2 vehicles"),
+        ] {
+            let error = file(name, text).unwrap_err();
+            assert!(error.contains(words) && error.contains(name), "{name}: {error}");
+        }
+    }
+
+    #[test]
+    fn val_unknown_parameters_have_a_hint() {
+        let kinds = sastrugi_terrain::kinds();
+        let gap = kinds.iter().find(|kind| kind.kind == "gap").unwrap();
+        assert!(check(&json!({ "size_px": [64, 64] }), gap).is_ok());
+        let error = check(&json!({ "size_pxx": [64, 64] }), gap).unwrap_err().to_string();
+        assert_eq!(error, "`gap` has no parameter `size_pxx`; did you mean `size_px`?");
     }
 }

@@ -1,4 +1,4 @@
-//! `photoclinometry`: heights and albedo from images and what is known of them.
+//! `photoclinometry`: recovers heights and albedo from described images.
 
 use super::{Reading, parameters, read};
 use crate::error::Error;
@@ -17,21 +17,21 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// `IMAGES.toml`: images, and what else is known. Paths are relative to the file.
+/// `IMAGES.toml`: images and auxiliary data. Paths are relative to the file.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ImagesFile {
-    /// Descriptions, the JSON files that `render` and a release have beside images.
+    /// Image descriptions: the JSON files that `render` and releases write next to images.
     pub images: Vec<String>,
     /// Images described here, with the same keys.
     pub image: Vec<ImageDescription>,
-    /// Coarse DEM that holds the heights: rounds begin there, and it is a soft constraint.
+    /// Coarse DEM that constrains the heights: the first round starts from it, and it is a soft constraint.
     pub coarse: Option<String>,
-    /// Standard deviation of the heights of its cells, m.
+    /// Standard deviation of its heights, m.
     pub coarse_sigma_m: Option<f64>,
-    /// Measured points (columns `x`, `y`, `z`, `sigma`, m), each a soft constraint with its sigma, above 0.
+    /// CSV file of measured points (columns `x`, `y`, `z`, `sigma`, m), each a soft constraint with its sigma, above 0.
     pub altimetry: Option<String>,
-    /// Height of the level ground where rounds begin, m; what the middles of the images show when absent.
+    /// Height of the level ground from which the first round starts, m; default: from the centres of the images.
     pub level_m: Option<f64>,
     /// True surface to compare with.
     pub truth: Option<String>,
@@ -47,19 +47,22 @@ pub struct Request<'a> {
     pub set: &'a [String],
     /// Seed of the random streams.
     pub seed: u64,
-    /// Heights to write; the maps stand beside them.
+    /// DEM to write; the maps are written next to it.
     pub output: &'a Path,
     /// How to write.
     pub options: WriteOptions,
 }
 
-/// Recovers a surface and writes it with its maps. Returns what was made.
+/// Recovers a surface and writes it with its maps. Returns a description of the result.
 ///
 /// # Errors
 /// Unknown keys, images that cannot be read or do not determine a surface, files that cannot be written.
 pub fn photoclinometry(request: &Request<'_>) -> Result<Value, Error> {
     if Format::of_name(request.output) != Some(Format::GeoTiff) {
-        return Err(Error::Usage(format!("{}: heights and maps are GeoTIFFs; name it .tif", request.output.display())));
+        return Err(Error::Usage(format!(
+            "{}: heights and maps are written as GeoTIFF; use the extension .tif",
+            request.output.display()
+        )));
     }
     let file = read_file(request)?;
     file.settings.check().map_err(Error::from)?;
@@ -81,7 +84,7 @@ pub fn photoclinometry(request: &Request<'_>) -> Result<Value, Error> {
     };
     let maps: Vec<(Map, PathBuf)> = made.maps().into_iter().map(beside).collect();
     let targets = maps.iter().map(|(map, path)| (map, path.as_path().into()));
-    // No map of an earlier surface stays beside this one.
+    // Remove maps of an earlier surface of the same name.
     for path in outputs[1..].iter().filter(|path| !maps.iter().any(|(_, written)| written == *path)) {
         match std::fs::remove_file(path) {
             Err(e) if e.kind() != std::io::ErrorKind::NotFound => return Err(Error::at(path, e)),
@@ -90,7 +93,7 @@ pub fn photoclinometry(request: &Request<'_>) -> Result<Value, Error> {
     }
     let mut notes = made.write(request.output.into(), targets, &request.options)?;
     notes.extend(made.recovered.warnings.iter().cloned());
-    Ok(told(request, &made, &maps, notes))
+    Ok(description(request, &made, &maps, notes))
 }
 
 fn refused(error: RecoverError) -> Error {
@@ -118,7 +121,7 @@ fn described(file: &ImagesFile, folder: &Path) -> Result<(Vec<Described>, Vec<Pa
     for (k, name) in file.images.iter().enumerate() {
         if file.images[..k].contains(name) {
             return Err(Error::Usage(format!(
-                "`images` holds {name} twice; its noise would count as that of two images"
+                "`images` lists {name} twice, which would count its noise as independent"
             )));
         }
         let path = folder.join(name);
@@ -143,13 +146,13 @@ fn beside(file: &ImagesFile, folder: &Path) -> Result<Beside, Error> {
             Some(Coarse { dem: dem(name)?, sigma_m })
         }
         (None, None) => None,
-        _ => return Err(Error::Usage("`coarse` and `coarse_sigma_m` go together".to_owned())),
+        _ => return Err(Error::Usage("`coarse` and `coarse_sigma_m` must be given together".to_owned())),
     };
     let points = file.altimetry.as_ref().map(|name| read_points(&folder.join(name))).transpose()?.unwrap_or_default();
     Ok(Beside { truth: file.truth.as_ref().map(dem).transpose()?, coarse, points, level_m: file.level_m })
 }
 
-fn told(request: &Request<'_>, made: &Made, maps: &[(Map, PathBuf)], notes: Vec<String>) -> Value {
+fn description(request: &Request<'_>, made: &Made, maps: &[(Map, PathBuf)], notes: Vec<String>) -> Value {
     let r = &made.recovered;
     let median = |values: &[f64]| sums::median(&sums::finite(values));
     let rounds: Vec<Value> = r

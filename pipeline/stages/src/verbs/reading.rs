@@ -1,4 +1,4 @@
-//! How the verbs read a DEM.
+//! Reading of DEMs by the verbs.
 
 use crate::error::Error;
 use crate::operations::dem::{input_error, to_metres, window_of};
@@ -10,44 +10,44 @@ use sastrugi_store::transect::{self, TransectOptions, Transects};
 use sastrugi_texture::noise::ReferenceNoise;
 use std::path::{Path, PathBuf};
 
-/// What of a DEM is taken, and how it is read.
+/// Which part of a DEM is read, and how.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Reading {
     /// Part of the DEM in its own coordinates.
     pub window: Option<[f64; 4]>,
-    /// Cell size for files that carry none, m.
+    /// Cell size for files that state none, m.
     pub cell_m: Option<[f64; 2]>,
-    /// How a point cloud becomes cells.
+    /// How a point cloud is gridded.
     pub gridding: GridSettings,
-    /// Files of the cells that take part, and those (`true`) of cells that do not.
+    /// Mask files; `true` for those that exclude cells.
     pub masks: Vec<(PathBuf, bool)>,
-    /// File that marks a part which is smooth in reality, for the noise.
+    /// File that marks a smooth reference area, for the noise.
     pub noise_reference: Option<PathBuf>,
 }
 
 /// A DEM that was read.
 pub struct Read {
-    /// Window cut, masks applied, metres.
+    /// Heights in metres, cropped to the window and masked.
     pub dem: Dem,
-    /// Sentences on how it was read.
+    /// Notes on how it was read.
     pub notes: Vec<String>,
-    /// Share of the window's cells with data that masks dropped, where there are masks.
+    /// Share of the window's cells with data that masks removed, if there are masks.
     pub masked_share: Option<f64>,
-    /// Noise found in the reference, where there is one.
+    /// Noise estimated in the reference area, if there is one.
     pub noise: Option<ReferenceNoise>,
 }
 
-/// A DEM as the kernels want it: window cut, masks applied, metres.
+/// Reads a DEM for the kernels: cropped, masked, in metres.
 ///
 /// # Errors
-/// A DEM or a mask that cannot be read, settings that it does not take, a window or masks that leave no data.
+/// A DEM or a mask that cannot be read, settings that do not apply to it, a window or masks that leave no data.
 pub fn read(path: &Path, reading: &Reading) -> Result<Read, Error> {
     let read = read_as_it_is(path, reading)?;
     let (dem, converted) = to_metres(read.dem);
     Ok(Read { dem, notes: read.notes.into_iter().chain(converted).collect(), ..read })
 }
 
-/// As [`read`], in the DEM's own coordinates: a geographic raster stays in degrees.
+/// As [`read`], but in the DEM's own coordinates: a geographic raster stays in degrees.
 ///
 /// # Errors
 /// As [`read`].
@@ -67,10 +67,10 @@ pub fn read_as_it_is(path: &Path, reading: &Reading) -> Result<Read, Error> {
     Ok(Read { dem: Dem { grid, info }, notes, masked_share, noise })
 }
 
-/// Transects, where the file holds some (see [`transect::looks_like`]).
+/// Reads transects, if the file contains any (see [`transect::looks_like`]).
 ///
 /// # Errors
-/// A file that cannot be read, or settings that transects do not take.
+/// A file that cannot be read, or settings that do not apply to transects.
 pub fn transects(path: &Path, reading: &Reading) -> Result<Option<Transects>, Error> {
     if !transect::looks_like(path) {
         return Ok(None);
@@ -78,19 +78,22 @@ pub fn transects(path: &Path, reading: &Reading) -> Result<Option<Transects>, Er
     let plain = Reading { cell_m: reading.cell_m, ..Reading::default() };
     let spacing_m = match reading.cell_m {
         Some([x, y]) if x != y => {
-            return Err(Error::Usage(format!("{}: transects have one cell size", path.display())));
+            return Err(Error::Usage(format!(
+                "{}: transects have a single spacing; give one cell size",
+                path.display()
+            )));
         }
         cell => cell.map(|[x, _]| x),
     };
     if *reading != plain {
-        let message = "is a table of transects, which take no window, mask, noise reference or setting of point clouds";
+        let message = "window, masks, noise reference and point-cloud options do not apply to transects";
         return Err(Error::Usage(format!("{}: {message}", path.display())));
     }
     let options = TransectOptions { spacing_m, ..TransectOptions::default() };
     transect::read(path, &options).map(Some).map_err(refused)
 }
 
-/// Settings that the file does not take are the caller's.
+/// Settings that do not apply to the file are bad usage.
 fn refused(error: DemError) -> Error {
     match error {
         DemError::Unfit { .. } => Error::Usage(error.to_string()),

@@ -1,6 +1,6 @@
-//! `compare` for two releases: which files differ, and do their figures?
+//! `compare` for two releases: which files differ, and do the metrics differ?
 //!
-//! Files are compared by the hashes in the manifests, figures as [`sastrugi_report::releases`] says.
+//! Files are compared by the hashes in the manifests, metrics as described in [`sastrugi_report::releases`].
 
 use super::parameters;
 use crate::error::Error;
@@ -25,7 +25,7 @@ const STAGE: &str = releases::STREAMS;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Parameters {
-    /// Difference of means that counts as none: a share of A's mean; for success and the shares of classes, of one.
+    /// Largest difference of means that counts as the same: a share of A's mean; for success and class shares, an absolute difference.
     pub margin: f64,
     /// Probability of any false "different" in the comparison, and of each false "same".
     pub alpha: f64,
@@ -40,33 +40,33 @@ impl Default for Parameters {
 impl Parameters {
     fn check(self) -> Result<Self, ParameterError> {
         if !(self.margin.is_finite() && self.margin > 0.0) {
-            return Err(ParameterError::new("margin", format!("is {}; it must be above 0", self.margin)));
+            return Err(ParameterError::new("margin", format!("must be above 0, got {}", self.margin)));
         }
         if !(self.alpha > 0.0 && self.alpha < 0.5) {
-            return Err(ParameterError::new("alpha", format!("is {}; it must be above 0 and below 0.5", self.alpha)));
+            return Err(ParameterError::new("alpha", format!("must be above 0 and below 0.5, got {}", self.alpha)));
         }
         Ok(self)
     }
 }
 
-/// Two releases beside each other.
+/// Comparison of two releases.
 #[derive(Clone, Debug, Serialize)]
 pub struct Comparison {
     /// Always `releases`.
     pub what: &'static str,
     /// A and B.
     pub releases: [Side; 2],
-    /// True when both were made from one study by one version: then every byte should be the same.
+    /// True when both were made from the same study by the same version, so that every byte should be equal.
     pub same_study_and_version: bool,
-    /// Files; absent where the versions differ, whose bytes cannot be compared.
+    /// Files; absent if the versions differ, since bytes are then not comparable.
     pub files: Option<Files>,
-    /// Figures of the groups that both have.
+    /// Metrics of the groups that both have.
     pub quantities: Vec<Quantity>,
-    /// The answer over all figures.
+    /// The verdict over all metrics.
     pub answer: Answer,
-    /// The answer in words.
+    /// The verdict in one sentence.
     pub sentence: String,
-    /// What a reader must know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
     /// Parameters of the comparison.
     pub parameters: Parameters,
@@ -75,7 +75,7 @@ pub struct Comparison {
 }
 
 impl Comparison {
-    /// True when a figure is different, or a byte where none should be.
+    /// True when a metric is different, or a byte that should be equal.
     pub fn differs(&self) -> bool {
         let bytes = self.same_study_and_version && self.files.as_ref().is_some_and(|files| !files.are_equal());
         self.answer == Answer::Different || bytes
@@ -98,11 +98,11 @@ pub struct Side {
 /// Files of two releases by path.
 #[derive(Clone, Debug, Default, Serialize)]
 pub struct Files {
-    /// Number of files with the same bytes.
+    /// Number of identical files.
     pub equal: usize,
-    /// Other bytes, but the same heights, rows or messages.
+    /// Files with different bytes but the same heights, rows or messages.
     pub packaging: Vec<String>,
-    /// Other bytes and other content, or content that has no hash of its own.
+    /// Files with different content, or with different bytes and no content hash.
     pub different: Vec<String>,
     /// Only in A.
     pub only_a: Vec<String>,
@@ -139,7 +139,7 @@ impl Files {
 /// Compares two releases.
 ///
 /// # Errors
-/// Unknown parameters, folders that are no releases, tables that cannot be read.
+/// Unknown parameters, folders that are not releases, tables that cannot be read.
 pub fn compare(a: &Path, b: &Path, parameters: &Value, seed: u64) -> Result<Comparison, Error> {
     parameters::check_schema(parameters, &schema_of::<Parameters>(), STAGE)?;
     let parameters = read_parameters::<Parameters>(parameters)?.check()?;
@@ -165,9 +165,9 @@ pub fn compare(a: &Path, b: &Path, parameters: &Value, seed: u64) -> Result<Comp
     };
     if !same_version {
         let versions = format!("made by versions {} and {}", one.version, other.version);
-        comparison.notes.push(format!("{versions}: not comparable byte by byte"));
+        comparison.notes.push(format!("{versions}; bytes cannot be compared"));
     } else if !same_study {
-        comparison.notes.push("made from different studies: their files are not expected to be equal".to_owned());
+        comparison.notes.push("made from different studies; files are not expected to be identical".to_owned());
     }
     let only = |(name, groups): (&str, Vec<String>)| format!("only in {name}: {}", groups.join("; "));
     comparison.notes.extend(["A", "B"].into_iter().zip(alone).filter(|(_, groups)| !groups.is_empty()).map(only));
@@ -190,7 +190,7 @@ impl Side {
     }
 }
 
-/// What is compared of one release.
+/// The metrics of one release.
 fn figures(release: &Release) -> Result<Figures, Error> {
     let mut figures = Figures::default();
     let contents: BTreeMap<&str, Option<&str>> =
@@ -215,16 +215,16 @@ fn sentence(quantities: &[Quantity], answer: Answer) -> String {
     let count = |answer| quantities.iter().filter(|q| q.answer == answer).count();
     let (n, same) = (quantities.len(), count(Answer::Same));
     match answer {
-        _ if n == 0 => "no table holds a group that both releases have".to_owned(),
-        Answer::Same => format!("all {n} figures are the same within the margin"),
+        _ if n == 0 => "the releases have no group in common".to_owned(),
+        Answer::Same => format!("all {n} metrics are the same within the margin"),
         Answer::Different => {
             let names = quantities.iter().filter(|q| q.answer == Answer::Different);
             let names: Vec<String> = names.map(|q| format!("{} of {}", q.figure, q.group)).collect();
-            format!("{} of {n} figures differ: {}", names.len(), names.join("; "))
+            format!("{} of {n} metrics differ: {}", names.len(), names.join("; "))
         }
         Answer::CannotTell => format!(
-            "no figure is shown to differ; {same} of {n} are the same within the margin, of the others the data rules out \
-             neither"
+            "no metric differs significantly; {same} of {n} are the same within the margin; for the others the data cannot \
+             tell"
         ),
     }
 }

@@ -11,7 +11,7 @@ use sastrugi_store::dem::{Crs, WriteOptions};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
-/// Ending of the albedo map beside a DEM.
+/// Suffix of the albedo map next to a DEM.
 const ALBEDO_ENDING: &str = "albedo.tif";
 
 /// What to render.
@@ -22,28 +22,28 @@ pub struct Request<'a> {
     pub reading: Reading,
     /// `name=value` pairs of a generator.
     pub set_surface: &'a [String],
-    /// Raster of the albedo, in place of the map beside the DEM.
+    /// Albedo raster, used instead of the map next to the DEM.
     pub albedo: Option<&'a Path>,
-    /// True where the map beside the surface does not count.
+    /// True if the map next to the surface is ignored.
     pub one_albedo: bool,
     /// Parameters of the image.
     pub parameters: Value,
-    /// Seed of the random streams of surface and noise; the specification's, or 0, when absent.
+    /// Seed of the random streams of surface and noise; default: that of the specification, or 0.
     pub seed: Option<u64>,
-    /// Where to write: a GeoTIFF, with its description beside it, or a PNG.
+    /// Output: a GeoTIFF, with a description next to it, or a PNG.
     pub output: &'a Path,
     /// How to write.
     pub options: WriteOptions,
 }
 
-/// What an output name asks for.
+/// Format of the output.
 #[derive(Clone, Copy, PartialEq, Eq)]
 enum Output {
     Tiff,
     Png,
 }
 
-/// Renders an image and writes it. A study's item with the same surface, parameters and explicit `seed` has the same bytes. Returns what was made.
+/// Renders an image and writes it. An item of a study with the same surface, parameters and explicit `seed` has the same bytes. Returns a description of the image.
 ///
 /// # Errors
 /// A surface or albedo that cannot be read, parameters out of range, a camera that sees no ground, a file that cannot be written.
@@ -75,11 +75,11 @@ fn output_of(path: &Path) -> Result<Output, Error> {
     match ending.as_str() {
         "tif" | "tiff" => Ok(Output::Tiff),
         "png" => Ok(Output::Png),
-        _ => Err(Error::Usage(format!("{}: an image is a GeoTIFF or a PNG; name it .tif or .png", path.display()))),
+        _ => Err(Error::Usage(format!("{}: images are written as .tif or .png", path.display()))),
     }
 }
 
-/// The surface with its albedo, the seed, and sentences on how it was read.
+/// The surface with its albedo, the seed, and notes on how it was read.
 fn ground(request: &Request<'_>, outputs: [&Path; 2]) -> Result<(Ground, u64, Vec<String>), Error> {
     let (mut ground, seed, notes) =
         if is_generator(request.surface) { generated(request)? } else { measured(request, outputs)? };
@@ -94,7 +94,7 @@ fn ground(request: &Request<'_>, outputs: [&Path; 2]) -> Result<(Ground, u64, Ve
     Ok((ground, seed, notes))
 }
 
-/// Whether a surface is generated: every name that is no file is looked up among the generators.
+/// Whether a surface is generated: a name that is not a file is taken for a generator.
 fn is_generator(surface: &str) -> bool {
     let is_spec = surface.to_ascii_lowercase().ends_with(".toml");
     is_spec || sastrugi_terrain::kinds().iter().any(|k| k.kind == surface) && !Path::new(surface).exists()
@@ -103,7 +103,7 @@ fn is_generator(surface: &str) -> bool {
 fn generated(request: &Request<'_>) -> Result<(Ground, u64, Vec<String>), Error> {
     let prepared = terrain::prepare(request.surface, request.set_surface, request.seed)?;
     let (made, crs) = prepared.make()?;
-    // As an item of a study reads it.
+    // As it is read by an item of a study.
     let albedo = made.maps.iter().find(|map| map.name == "albedo").map(|map| map.values.as_stored());
     let albedo_name = albedo.as_ref().map(|_| "albedo".to_owned());
     let name = request.surface.to_owned();
@@ -118,7 +118,7 @@ fn measured(request: &Request<'_>, outputs: [&Path; 2]) -> Result<(Ground, u64, 
     let path = Path::new(request.surface);
     super::check_distinct(&outputs, &[path])?;
     if !request.set_surface.is_empty() {
-        return Err(Error::Usage(format!("`--set-surface` is for generators; {} is a DEM", request.surface)));
+        return Err(Error::Usage(format!("`--set-surface` applies to generators only; {} is a DEM", request.surface)));
     }
     let read = read(path, &request.reading)?;
     let beside: PathBuf = path.with_extension(ALBEDO_ENDING);
@@ -130,7 +130,7 @@ fn measured(request: &Request<'_>, outputs: [&Path; 2]) -> Result<(Ground, u64, 
     Ok((Ground { heights: read.dem.grid, albedo, crs, name, albedo_name }, request.seed.unwrap_or(0), read.notes))
 }
 
-/// A camera that does not fit is the caller's; surfaces and maps are input.
+/// An unsuitable camera is bad usage; unusable surfaces and maps are bad input.
 fn refused(surface: &str, error: RenderError) -> Error {
     match error {
         RenderError::Parameter(e) => e.into(),

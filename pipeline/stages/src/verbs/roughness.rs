@@ -1,4 +1,4 @@
-//! `roughness`: a DEM described and classified, what of it shakes a vehicle, and its aerodynamic roughness.
+//! `roughness`: statistics and roughness classes of a DEM, its ride-relevant roughness, and its aerodynamic roughness.
 
 use super::{Read, Reading, parameters, read};
 use crate::error::Error;
@@ -31,13 +31,13 @@ pub struct Request<'a> {
     pub classes: Option<&'a Path>,
     /// How the DEM is read.
     pub reading: Reading,
-    /// What to look at for a vehicle.
+    /// Ride roughness to evaluate.
     pub ride: Option<RideRequest<'a>>,
-    /// Wind whose roughness length is asked for.
+    /// Wind directions for the roughness length.
     pub wind: Option<WindSettings>,
 }
 
-/// Whose band of wavelengths counts.
+/// Source of the wavelength band.
 pub enum Bumps<'a> {
     /// A vehicle: `wb=WHEELBASE,r=RADIUS` in m, a name, or a vehicle file.
     Vehicle(&'a str),
@@ -45,27 +45,27 @@ pub enum Bumps<'a> {
     Band(&'a str),
 }
 
-/// What to look at for a vehicle.
+/// Settings for ride roughness.
 pub struct RideRequest<'a> {
     /// The band.
     pub bumps: Bumps<'a>,
-    /// How the local mean is taken off.
+    /// Detrending.
     pub detrender: Detrender,
-    /// Whether cells may be too large for the shortest wave.
+    /// Whether cells may be too large for the shortest wavelength.
     pub allow_coarse: bool,
     /// Map of the RMS to write, as text.
     pub map: Option<&'a Path>,
-    /// Raster of what was predicted for it.
+    /// Raster of the predicted RMS.
     pub predicted: Option<&'a Path>,
 }
 
-/// A DEM described.
+/// Roughness of a DEM.
 #[derive(Serialize)]
 pub struct Described {
     /// The surface.
     #[serde(flatten)]
     pub summary: Summary,
-    /// What of it shakes a vehicle.
+    /// Ride-relevant roughness.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub ride: Option<Ride>,
     /// Roughness length by wind direction.
@@ -73,10 +73,10 @@ pub struct Described {
     pub aerodynamic: Option<AerodynamicRoughness>,
 }
 
-/// Describes a DEM; returns the figures and sentences on how it was read.
+/// Computes the roughness of a DEM; returns it with notes on how the DEM was read.
 ///
 /// # Errors
-/// Unknown settings, a DEM that cannot be read or that does not hold the band or the outer scale, a map that cannot be written.
+/// Unknown settings, a DEM that cannot be read or does not contain the band or the outer scale, a map that cannot be written.
 pub fn roughness(request: &Request<'_>) -> Result<(Described, Vec<String>), Error> {
     parameters::check_schema(&request.parameters, &schema_of::<RoughnessSection>(), "roughness")?;
     let section: RoughnessSection = read_parameters(&request.parameters)?;
@@ -102,13 +102,13 @@ fn aerodynamic_over(dem: &Grid, wind: &WindSettings) -> Result<AerodynamicRoughn
     })
 }
 
-/// The band that is asked for.
+/// The requested band.
 fn band(bumps: &Bumps<'_>) -> Result<WaveBand, Error> {
     let refused = |option: &str, text: &str, e: BandError| Error::Usage(format!("`{option} {text}`: {e}"));
     match bumps {
         Bumps::Band(text) => {
             let [min, max] = super::numbers("--band", &text.replacen(':', ",", 1))
-                .map_err(|_| Error::Usage(format!("`--band {text}`: it takes two lengths in m, MIN:MAX")))?;
+                .map_err(|_| Error::Usage(format!("`--band {text}`: expected two lengths in m, MIN:MAX")))?;
             WaveBand::new(min, max).map_err(|e| refused("--band", text, e))
         }
         Bumps::Vehicle(text) => {
@@ -143,18 +143,19 @@ fn lengths_of_vehicle(text: &str) -> Result<[f64; 2], Error> {
 
 fn not_a_vehicle(text: &str) -> Error {
     Error::Usage(format!(
-        "`--vehicle {text}`: it takes wb=WHEELBASE,r=TYRE_RADIUS in m, the name of a vehicle, or a vehicle file"
+        "`--vehicle {text}`: expected wb=WHEELBASE,r=TYRE_RADIUS in m, the name of a vehicle, or a vehicle file"
     ))
 }
 
-/// The figures for a vehicle, and their map where it is asked for.
+/// Computes the ride roughness, and writes its map if requested.
 fn ride_over(dem: &Grid, request: &RideRequest<'_>, band: &WaveBand) -> Result<Ride, Error> {
     if request.predicted.is_some() && request.detrender != Detrender::Band {
-        let message = "figures of different detrenders are not comparable: what is predicted is of the detrender band";
+        let message =
+            "predictions exist only for `--detrend band`; results of other detrenders are not comparable with them";
         return Err(Error::Usage(format!("`--rms-predicted`: {message}")));
     }
     let ride = Ride::of(dem, band, request.detrender, request.allow_coarse).map_err(|e| match e {
-        BandError::Coarse { .. } => Error::Input(format!("{e} (`--allow-coarse` lets it pass)")),
+        BandError::Coarse { .. } => Error::Input(format!("{e} (override with `--allow-coarse`)")),
         e => Error::Input(e.to_string()),
     })?;
     if let Some(path) = request.map {
@@ -165,18 +166,18 @@ fn ride_over(dem: &Grid, request: &RideRequest<'_>, band: &WaveBand) -> Result<R
     Ok(ride)
 }
 
-/// The raster of what was predicted, on the cells of the DEM.
+/// The raster of predicted RMS, on the cells of the DEM.
 fn predicted(path: &Path, dem: &Grid) -> Result<Grid, Error> {
     let grid = read(path, &Reading::default())?.dem.grid;
     if grid.geometry == dem.geometry {
         Ok(grid)
     } else {
-        Err(Error::Input(format!("{}: its cells are not those of the DEM", path.display())))
+        Err(Error::Input(format!("{}: its cells do not match those of the DEM", path.display())))
     }
 }
 
-/// Lines `x y rms_predicted rms_measured` (the third only where something is predicted), one longest wavelength apart,
-/// where the window is defined, below a line that says what they are.
+/// A header line, then lines `x y rms_predicted rms_measured` (the third only with a prediction), spaced by the longest wavelength,
+/// wherever the window is complete.
 fn map_as_text(ride: &Ride, predicted: Option<&Grid>) -> String {
     let g = ride.map.geometry;
     let [min, max] = ride.band_m;

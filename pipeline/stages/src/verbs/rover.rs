@@ -1,7 +1,7 @@
-//! `rover`: the rover trials of a study, perturbed on request, and what came out of them.
+//! `rover`: runs the rover trials of a study, perturbed on request, and summarises them.
 //!
-//! The study that is run, and released, is the given one without what rovers do not need, and with the key `perturb` set: `run` makes the
-//! same release of it.
+//! The study that is run and released is the given one, reduced to what rovers need and with the key `perturb` set. `run` on it gives
+//! the same release.
 
 use crate::error::Error;
 use crate::jobs::{rover, rover_designs, rover_effects};
@@ -19,23 +19,23 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::path::Path;
 use toml_edit::{DocumentMut, InlineTable, Item, TableLike};
 
-/// Stage whose results the verb is about.
+/// Stage whose results are reported.
 pub const PURPOSE: &str = rover::STAGE;
-/// Stages whose items are wanted; parents come with them.
+/// Stages whose items are run, with their parents.
 const STAGES: [&str; 3] = [rover::STAGE, rover_designs::STAGE, rover_effects::STAGE];
-/// Sections whose tables stay where rovers need them; those that others need alone go.
+/// Sections of which only the tables that rovers need are kept.
 const SECTIONS: [&str; 4] = ["dem", "terrain", "fit", "texture"];
-/// Sections that stay as they are.
+/// Sections kept unchanged.
 const KEPT: [&str; 3] = ["study", "roughness", "rover"];
 /// Coverage of the intervals.
 const LEVEL: f64 = 0.95;
-/// Redraws behind an interval.
+/// Bootstrap replicates of an interval.
 const REDRAWS: usize = 2000;
 
-/// What is asked for.
+/// A request for perturbations.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct Request {
-    /// Largest relative change of the numbers of every navigator; nothing new is perturbed when absent.
+    /// Largest relative change of the parameters of every navigator; if absent, no perturbation is added.
     pub share: Option<f64>,
     /// Trajectories of each perturbation.
     pub trajectories: Option<u32>,
@@ -53,30 +53,32 @@ pub fn share(text: &str) -> Result<f64, Error> {
     };
     match share {
         Some(share) if Perturb { share, ..Perturb::default() }.check().is_ok() => Ok(share),
-        _ => Err(Error::Usage(format!(
-            "`--perturb {text}`: it must be a share above 0 and below 100%, such as 10% or 0.1"
-        ))),
+        _ => {
+            Err(Error::Usage(format!("`--perturb {text}`: must be a share above 0 and below 100%, such as 10% or 0.1")))
+        }
     }
 }
 
-/// The rover trials of a study.
+/// Loads the rover trials of a study.
 ///
 /// # Errors
-/// A study that is wrong or has no rovers; trajectories without anything perturbed.
+/// A study that is invalid or has no rovers; trajectories without a perturbation.
 pub fn load(study: &Path, request: &Request) -> Result<Loaded, Error> {
     let (text, name, folder) = (read(study)?, study.display().to_string(), study.parent().unwrap_or(Path::new("")));
     let whole = load_text(&text, &name, folder)?;
     let wanted = (0..whole.graph.len()).filter(|&p| STAGES.contains(&whole.graph.node(p).item.stage.as_str()));
     let needed = whole.graph.closure(wanted);
     if needed.is_empty() {
-        return Err(Error::Usage(format!("{name}: the study has no rovers; add [[rover]], see `sastrugi kinds`")));
+        return Err(Error::Usage(format!(
+            "{name}: the study has no rovers; add a [[rover]] table (see `sastrugi kinds`)"
+        )));
     }
     let origins = needed.iter().filter_map(|&p| whole.origins.get(&whole.graph.node(p).item.id));
     let edited = edit(&text, &origins.copied().collect(), request).map_err(|e| Error::Usage(format!("{name}: {e}")))?;
     load_text(&edited, &name, folder)
 }
 
-/// The study's text without what rovers do not need, perturbed as asked.
+/// The study's text, reduced to what rovers need and perturbed as requested.
 fn edit(text: &str, needed: &BTreeSet<(&str, usize)>, request: &Request) -> Result<String, String> {
     let mut document: DocumentMut =
         text.trim_start_matches('\u{feff}').parse().map_err(|e| format!("not valid TOML: {e}"))?;
@@ -96,12 +98,12 @@ fn edit(text: &str, needed: &BTreeSet<(&str, usize)>, request: &Request) -> Resu
         perturbed |= table.contains_key("perturb");
     }
     if request.trajectories.is_some() && !perturbed {
-        return Err("`--trajectories` needs --perturb, or a [[rover]] with the key `perturb`".to_owned());
+        return Err("`--trajectories` needs --perturb or a [[rover]] with the key `perturb`".to_owned());
     }
     Ok(document.to_string())
 }
 
-/// Drops tables by their place; how many are left.
+/// Removes tables by position; returns how many are left.
 fn keep(item: &mut Item, wanted: impl Fn(usize) -> bool) -> usize {
     match item {
         Item::ArrayOfTables(tables) => {
@@ -127,7 +129,7 @@ fn tables(item: &mut Item) -> Vec<&mut dyn TableLike> {
     }
 }
 
-/// Sets what is asked for; other settings of a perturbation stay.
+/// Sets the requested keys; other settings of a perturbation stay.
 fn perturb(rover: &mut dyn TableLike, request: &Request) {
     if request.share.is_some() && !rover.contains_key("perturb") {
         rover.insert("perturb", toml_edit::value(InlineTable::new()));
@@ -176,23 +178,23 @@ pub struct TrialSummary {
     pub worlds: usize,
     /// Rovers that reached the goal.
     pub arrived: usize,
-    /// Their share, with an interval that counts worlds, not rovers (Clopper and Pearson, of the shares of worlds).
+    /// Their share, with an interval over worlds, not rovers (Clopper and Pearson, of the shares of worlds).
     pub arrival: Estimated,
-    /// Mean efficiency, with a bootstrap interval over worlds; without one on a single world.
+    /// Mean efficiency, with a bootstrap interval over worlds; none for a single world.
     pub efficiency: Estimated,
     /// Distance from start to goal over mean distance driven.
     pub straight_over_mean_distance: f64,
-    /// Mean distance driven, m; rovers that stopped short of the goal count with what they drove.
+    /// Mean distance driven, m; rovers that stopped before the goal count with the distance they drove.
     pub mean_distance_m: f64,
-    /// Mean efficiency of those that arrived; NaN where none did.
+    /// Mean efficiency of those that arrived; NaN if none did.
     pub efficiency_of_arrivals: f64,
-    /// Rovers that ended off the ground: they count as an efficiency of 0.
+    /// Rovers that left the ground; their efficiency counts as 0.
     pub off_ground: usize,
     /// Rovers that stopped at their distance or cycle limit: their distances are censored.
     pub at_limit: usize,
 }
 
-/// What came out of the rovers of a release.
+/// Results of the rovers of a release.
 #[derive(Clone, Debug, Serialize)]
 pub struct Summary {
     /// Trials, by stage, group and variant.
@@ -204,7 +206,7 @@ pub struct Summary {
     pub ranking: Vec<RoverEffectRow>,
 }
 
-/// Reads what came out of the rovers of a release.
+/// Reads the results of the rovers of a release.
 ///
 /// # Errors
 /// A release that cannot be read.
@@ -241,7 +243,7 @@ fn of_trial(rows: &[RoverRow], stream: &mut Stream) -> TrialSummary {
     // As `Drive::counted_efficiency`.
     let efficiencies = by_world(|row| if row.outcome == Ending::OFF_GROUND { 0.0 } else { row.efficiency });
     let arrivals: Vec<f64> = rows.iter().filter(|row| reached(row) > 0.0).map(|row| row.efficiency).collect();
-    // Worlds have the same number of rovers, so that the mean of their means is that of all.
+    // All worlds have the same number of rovers, so the mean of their means is the overall mean.
     let of_worlds = |drawn: &[Vec<usize>]| sums::mean(&drawn[0].iter().map(|&w| efficiencies[w]).collect::<Vec<_>>());
     let arrival = by_world(reached);
     let stayed: Vec<&RoverRow> = rows.iter().filter(|row| !is_off(row)).collect();
@@ -289,9 +291,9 @@ mod tests {
         let plain = loaded(STUDY, Request::default()).unwrap();
         assert!(plain.released.starts_with("# A study.\n[study]"));
         assert!(!plain.released.contains("missions") && !plain.released.contains("\"b\""), "{}", plain.released);
-        // Two terrains, described; rovers on one and on two; ten trajectories on two, and their effects.
+        // Two terrains with their descriptions; rovers on one and on two; ten trajectories on two, and their effects.
         assert_eq!(plain.graph.len(), 2 + 2 + 1 + 2 + 20 + 1);
-        // The same items as in the whole study: nothing is computed twice.
+        // The items have the same keys as in the complete study, so nothing is computed twice.
         let whole = load_text(STUDY, "study", Path::new("")).unwrap();
         for (position, node) in plain.graph.nodes().iter().enumerate() {
             let there = whole.graph.find(&node.item).unwrap();
@@ -317,14 +319,14 @@ mod tests {
 
     #[test]
     fn val_refusals() {
-        let told = |text: &str, request, words: &str| {
+        let refused = |text: &str, request, words: &str| {
             let error = loaded(text, request).err().unwrap();
             assert!(error.contains(words), "{error}");
         };
-        told(STUDY.split("[[rover]]").next().unwrap(), Request::default(), "the study has no rovers");
+        refused(STUDY.split("[[rover]]").next().unwrap(), Request::default(), "the study has no rovers");
         let trajectories = Request { trajectories: Some(3), ..Request::default() };
-        told(STUDY.split("[[rover]]\nid = \"q\"").next().unwrap(), trajectories, "`--trajectories` needs --perturb");
-        told(STUDY, Request { trajectories: Some(0), ..trajectories }, "`perturb.trajectories` is 0");
+        refused(STUDY.split("[[rover]]\nid = \"q\"").next().unwrap(), trajectories, "`--trajectories` needs --perturb");
+        refused(STUDY, Request { trajectories: Some(0), ..trajectories }, "`perturb.trajectories` is 0");
         for (text, expected) in [("10%", 0.1), ("0.1", 0.1), (" 2.5 % ", 0.025)] {
             assert!((share(text).unwrap() - expected).abs() < 1e-12);
         }

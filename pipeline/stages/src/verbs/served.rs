@@ -1,4 +1,4 @@
-//! `serve`: what there is to serve in a file or a release.
+//! `serve`: finds the worlds and rasters to serve in a file or a release.
 
 use super::terrain::prepare;
 use crate::error::Error;
@@ -16,40 +16,40 @@ use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
-/// Name of the heights in metres beside a DEM that is in degrees.
+/// Name of the heights in metres of a DEM in degrees.
 const METRIC: &str = "metric";
 
-/// A world, at every place of which any patch can be made.
+/// A world, of which any patch can be generated.
 #[derive(Clone)]
 pub struct ServedWorld {
     /// Name of the file, or id of the item in its study.
     pub id: String,
-    /// What it is made from.
+    /// Its generator.
     pub surface: Surface,
-    /// The inputs that it follows.
+    /// Its inputs.
     pub inputs: Vec<Input>,
     /// Its full parameters.
     pub parameters: Value,
     /// Its random streams.
     pub streams: Streams,
-    /// Licence of the study that it stands in, SPDX.
+    /// Licence of its study, SPDX.
     pub license: Option<String>,
 }
 
-/// A generator that can make any window.
+/// A generator for arbitrary windows.
 #[derive(Clone)]
 pub enum Surface {
-    /// A world without end, with the inputs that it follows.
+    /// An unbounded world, with its inputs.
     Planetary(Box<Planetary>),
     /// A DEM with finer detail.
     Elaborate(Arc<Elaborated>),
 }
 
 impl ServedWorld {
-    /// The ground with the processes at some places of its list, from 0; the others keep their draws.
+    /// The ground with only the selected processes, by index from 0; the random draws of each process do not change.
     ///
     /// # Errors
-    /// A raster that the rocks follow is missing.
+    /// The raster of rock potential is missing.
     pub fn ground(&self, acts: impl Fn(usize) -> bool) -> Result<Arc<dyn Windows>, Error> {
         Ok(match &self.surface {
             Surface::Planetary(world) => Arc::new(world.world_of(&self.streams, acts)?),
@@ -73,7 +73,7 @@ impl ServedWorld {
         }
     }
 
-    /// Place of lattice point 0, m.
+    /// Position of lattice point 0, m.
     pub fn offset_m(&self) -> [f64; 2] {
         match &self.surface {
             Surface::Planetary(_) => [0.0; 2],
@@ -81,7 +81,7 @@ impl ServedWorld {
         }
     }
 
-    /// The window of its file: place of the south-west sample and distance of samples, m, and columns and rows.
+    /// The window of its file: position of the south-west sample and sample spacing, m, and columns and rows.
     pub fn window(&self) -> ([f64; 2], f64, Option<[u32; 2]>) {
         match &self.surface {
             Surface::Planetary(world) => (world.raw().origin_m, world.raw().cell_m, world.raw().size_px),
@@ -97,7 +97,7 @@ impl ServedWorld {
         }
     }
 
-    /// The DEM that it follows, where it has an end.
+    /// The DEM that bounds it, if any.
     pub fn dem(&self) -> Option<&Grid> {
         match (&self.surface, self.inputs.first()) {
             (Surface::Elaborate(_), Some(Input::Grid(dem))) => Some(dem),
@@ -109,9 +109,9 @@ impl ServedWorld {
 /// A file of a release.
 #[derive(Clone, Debug)]
 pub struct SealedFile {
-    /// Where it is.
+    /// Path.
     pub path: PathBuf,
-    /// SHA-256 that its manifest states.
+    /// SHA-256 from the manifest.
     pub sha256: String,
 }
 
@@ -126,15 +126,15 @@ pub struct ServedRaster {
     pub height_range_m: [f64; 2],
     /// File of the heights.
     pub heights: SealedFile,
-    /// Files of its maps by name, as `class`.
+    /// Files of its maps by name, such as `class`.
     pub maps: BTreeMap<String, SealedFile>,
-    /// Licence, SPDX: that of its measured data where there is some, else that of the release.
+    /// Licence, SPDX: that of its measured data if there is any, else that of the release.
     pub license: String,
-    /// Whom to name.
+    /// Attribution.
     pub credit: Option<String>,
 }
 
-/// What a file or folder has to serve.
+/// Contents of a file or folder that can be served.
 #[derive(Clone)]
 pub enum Served {
     /// Worlds of a file.
@@ -143,10 +143,10 @@ pub enum Served {
     Release(Box<Release>, Vec<ServedRaster>),
 }
 
-/// What there is to serve: the `planetary` or `elaborate` surface of a terrain file, the `planetary` worlds of a study, or the heights of a release.
+/// Finds what can be served: the `planetary` or `elaborate` surface of a terrain file, the `planetary` worlds of a study, or the heights of a release.
 ///
 /// # Errors
-/// A file that is neither, or wrong; one without anything to serve.
+/// A file that is none of these or invalid; one without anything to serve.
 pub fn served(path: &Path) -> Result<Served, Error> {
     if path.is_dir() {
         let release = Release::open(path)?;
@@ -158,7 +158,7 @@ pub fn served(path: &Path) -> Result<Served, Error> {
     }
     if !path.to_string_lossy().to_ascii_lowercase().ends_with(".toml") {
         return Err(Error::Usage(format!(
-            "{}: not a world or study (.toml), nor the folder of a release; to serve a DEM, write a TOML file with `kind = \"{}\"` and `dem = \"...\"`",
+            "{}: not a world or study (.toml) or a release folder; to serve a DEM, write a TOML file with `kind = \"{}\"` and `dem = \"...\"`",
             path.display(),
             elaborate::KIND
         )));
@@ -176,7 +176,7 @@ pub fn served(path: &Path) -> Result<Served, Error> {
     Ok(Served::Worlds(worlds))
 }
 
-/// The world of a terrain file: `kind`, `seed` and parameters, as the verb `terrain` reads it.
+/// The world of a terrain file: `kind`, `seed` and parameters, as read by the verb `terrain`.
 fn world_of_file(path: &Path) -> Result<ServedWorld, Error> {
     let spec = path.display().to_string();
     let prepared = prepare(&spec, &[], None)?;
@@ -207,7 +207,7 @@ fn unusable(error: TerrainError) -> Error {
     Error::Input(format!("failed to {error}"))
 }
 
-/// An id for addresses and studies from the name of a file: lower case, `-` for what else than letters, digits, `-` and `_` stands there.
+/// An id for URLs and studies from a file name: lower case, with `-` for all characters except letters, digits, `-` and `_`.
 fn id_of(name: &str) -> String {
     let kept = |c: char| if c.is_ascii_alphanumeric() || c == '_' { c.to_ascii_lowercase() } else { '-' };
     let id: String = name.chars().map(kept).collect();
@@ -220,7 +220,7 @@ fn world(parameters: &Value) -> Result<Planetary, Error> {
     Ok(Planetary::try_from(raw)?)
 }
 
-/// The worlds of a study. One that follows the map of another item needs that item's files: it is left out.
+/// The worlds of a study, except those that depend on the map of another item and so need its files.
 fn worlds_of_study(path: &Path, text: &str) -> Result<Vec<ServedWorld>, Error> {
     let folder = path.parent().unwrap_or(Path::new(""));
     let loaded = loaded::load_text(text, &path.display().to_string(), folder)?;
@@ -245,7 +245,7 @@ fn worlds_of_study(path: &Path, text: &str) -> Result<Vec<ServedWorld>, Error> {
     Ok(worlds)
 }
 
-/// A section `[[terrain]]` of a study: `head` holds the lines of the id.
+/// A section `[[terrain]]` of a study; `head` contains the line of the id.
 ///
 /// # Errors
 /// Parameters that TOML cannot hold.
@@ -260,12 +260,12 @@ pub fn section(head: &str, seed: Option<u64>, kind: &str, parameters: &Value) ->
     Ok(text)
 }
 
-/// Revision of everything that the samples of worlds and releases depend on: part of what tells answers of a server apart.
+/// Revision of everything that determines the samples of worlds and releases, for the entity tags of the server.
 pub fn revision() -> String {
     crate::revision::revision(&[Room::Roughness, Room::Terrain, Room::Imaging])
 }
 
-/// The heights of a release: every row of its table `terrains` whose file was sealed.
+/// The heights of a release: all rows of its table `terrains` whose file is in the manifest.
 fn rasters(release: &Release) -> Result<Vec<ServedRaster>, Error> {
     let manifest = release.manifest();
     let rows: Vec<TerrainRow> = release.rows()?;
@@ -285,7 +285,7 @@ fn rasters(release: &Release) -> Result<Vec<ServedRaster>, Error> {
             }
             sources.extend(artifact.origin.sources.iter().cloned());
         }
-        // A DEM in degrees is studied, and served, in metres.
+        // A DEM in degrees is analysed, and served, in metres.
         let Some(heights) = maps.remove(METRIC).or(heights) else { continue };
         let measured: Vec<&Source> = manifest.sources.iter().filter(|s| sources.contains(&s.id)).collect();
         let license = measured.iter().find_map(|s| s.license.clone()).unwrap_or_else(|| manifest.license.clone());

@@ -1,4 +1,4 @@
-//! `terrain`: one generated heightfield to a file.
+//! `terrain`: generates one heightfield and writes it to a file.
 
 use super::parameters;
 use crate::error::Error;
@@ -17,16 +17,16 @@ pub struct Request<'a> {
     pub spec: &'a str,
     /// `name=value` pairs.
     pub set: &'a [String],
-    /// Seed of the random streams; the file's, or 0, when absent.
+    /// Seed of the random streams; default: that of the file, or 0.
     pub seed: Option<u64>,
-    /// Where to write.
+    /// Output file.
     pub output: &'a Path,
     /// How to write.
     pub options: WriteOptions,
 }
 
-/// Generates a terrain and writes it. A study's item with the same parameters and an explicit `seed` has the same bytes.
-/// Returns what was made.
+/// Generates a terrain and writes it. An item of a study with the same parameters and an explicit `seed` has the same bytes.
+/// Returns a description of the result.
 ///
 /// # Errors
 /// Unknown kinds and parameters, parameters out of range, files that cannot be written.
@@ -72,7 +72,7 @@ pub(super) struct Prepared {
     streams: Streams,
 }
 
-/// The generator of a specification; without a `seed` that of the file, or 0, counts.
+/// The generator of a specification; without `seed`, the seed of the file, or 0, is used.
 pub(super) fn prepare(spec: &str, set: &[String], seed: Option<u64>) -> Result<Prepared, Error> {
     let (kind, mut params, own_seed) = read_spec(spec)?;
     parameters::assign(&mut params, set)?;
@@ -85,7 +85,7 @@ pub(super) fn prepare(spec: &str, set: &[String], seed: Option<u64>) -> Result<P
 }
 
 impl Prepared {
-    /// What it makes, and the coordinate system of its first input.
+    /// The generated terrain, and the coordinate system of its first input.
     pub(super) fn make(&self) -> Result<(Terrain, Crs), Error> {
         let (inputs, crs) = read_inputs(self.generator.as_ref())?;
         Ok((generate(self.generator.as_ref(), &self.streams, &inputs)?, crs))
@@ -101,7 +101,7 @@ impl Prepared {
         self.generator.parameters()
     }
 
-    /// What it takes as input.
+    /// Its inputs.
     pub(super) fn inputs(&self) -> Result<Vec<Input>, Error> {
         Ok(read_inputs(self.generator.as_ref())?.0)
     }
@@ -116,13 +116,13 @@ impl Prepared {
         self.seed
     }
 
-    /// Sentences on its parameters.
+    /// Notes on its parameters.
     pub(super) fn notes(&self) -> Vec<String> {
         self.generator.notes()
     }
 }
 
-/// The files of a generator's inputs, surfaces in metres, and the coordinate system of the first.
+/// Reads a generator's inputs, surfaces in metres, and the coordinate system of the first.
 fn read_inputs(generator: &dyn Generator) -> Result<(Vec<Input>, Crs), Error> {
     let mut read_inputs = Vec::new();
     let mut crs = None;
@@ -141,7 +141,7 @@ fn read_inputs(generator: &dyn Generator) -> Result<(Vec<Input>, Crs), Error> {
     Ok((read_inputs, crs.unwrap_or_default()))
 }
 
-/// Heights as an item of a study reads them.
+/// Heights, read as in a study.
 fn heights(path: &Path) -> Result<Loaded, Error> {
     let read = super::read(path, &super::Reading::default())?.dem;
     Ok(Loaded { input: read.grid.as_stored().into(), crs: Some(read.info.crs) })
@@ -153,15 +153,15 @@ fn read_spec(spec: &str) -> Result<(String, Value, Option<u64>), Error> {
         return Ok((spec.to_owned(), json!({}), None));
     }
     let mut table = parameters::read_file(Path::new(spec))?;
-    let map = table.as_object_mut().ok_or_else(|| Error::Usage(format!("{spec}: it holds no table")))?;
+    let map = table.as_object_mut().ok_or_else(|| Error::Usage(format!("{spec}: not a TOML table")))?;
     let Some(Value::String(kind)) = map.remove("kind") else {
-        return Err(Error::Usage(format!("{spec}: `kind` is missing; it names a generator (see `sastrugi kinds`)")));
+        return Err(Error::Usage(format!("{spec}: missing `kind`, the name of a generator (see `sastrugi kinds`)")));
     };
     let seed =
         match map.remove("seed") {
             None => None,
             Some(seed) => Some(seed.as_u64().ok_or_else(|| {
-                Error::Usage(format!("{spec}: `seed` is {seed}; it must be a whole number, 0 or above"))
+                Error::Usage(format!("{spec}: `seed` must be a whole number, 0 or above, got {seed}"))
             })?),
         };
     Ok((kind, table, seed))

@@ -1,4 +1,4 @@
-//! `texture`: a field that matches a fit file.
+//! `texture`: synthesises a heightfield with the covariance of a fit file.
 
 use super::parameters;
 use crate::error::Error;
@@ -26,11 +26,11 @@ pub struct Request<'a> {
     pub parameters: Value,
     /// Seed of the random streams.
     pub seed: u64,
-    /// Base DEM to add the texture to.
+    /// DEM to add the texture to.
     pub onto: Option<&'a Path>,
     /// Factor on the heights of the texture.
     pub amplitude: Option<Amplitude<'a>>,
-    /// DEM whose holes are filled, in place of a texture.
+    /// DEM whose holes are filled, instead of synthesising a texture.
     pub fill: Option<&'a Path>,
     /// DEM to write.
     pub output: &'a Path,
@@ -43,13 +43,12 @@ pub struct Request<'a> {
 pub enum Amplitude<'a> {
     /// One number.
     Factor(f64),
-    /// A raster of factors of the texture on its base.
+    /// A raster of factors, for a texture on a base.
     Raster(&'a Path),
 }
 
-/// Said where `covariance` is not given with a base: a file does not say whether it was measured.
-const RESIDUAL_CHOSEN: &str =
-    "covariance = residual: the base is taken for a measured background; --covariance surface for a generated one";
+/// Note for a base without `covariance`: a file does not state whether it was measured.
+const RESIDUAL_CHOSEN: &str = "covariance = residual: the base is assumed to be a measured background; use --covariance surface for a generated one";
 
 /// Whether a file is the DEM that a fit was made from, by its SHA-256.
 fn is_fitted_dem(path: &Path, fit: &FitFile) -> bool {
@@ -57,11 +56,11 @@ fn is_fitted_dem(path: &Path, fit: &FitFile) -> bool {
     !fitted.is_empty() && digest::of_file(path).is_ok_and(|(_, sha256)| sha256 == fitted)
 }
 
-/// Synthesises a texture and writes it. Returns what was made.
+/// Synthesises a texture and writes it. Returns a description of the result.
 ///
-/// A study's item with the same fit, parameters, explicit `seed` and explicit `covariance` has the same bytes. Without
-/// `covariance` the defaults differ: a study takes `residual` only on a measured DEM and on a fit's background, since it knows
-/// its bases.
+/// An item of a study with the same fit, parameters, explicit `seed` and explicit `covariance` has the same bytes. The default
+/// of `covariance` differs: in a study, where the origin of the base is known, it is `residual` only on a measured DEM and on the
+/// background of a fit.
 ///
 /// # Errors
 /// Unknown methods and parameters, an unusable fit file or base, a file that cannot be written.
@@ -79,7 +78,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         Some(Amplitude::Raster(path)) => (1.0, Some(path)),
     };
     if raster.is_some() && request.onto.is_none() {
-        let message = "`--amplitude` with a raster needs `--onto`, the base whose texture it changes";
+        let message = "`--amplitude` with a raster requires `--onto`";
         return Err(Error::Usage(message.to_owned()));
     }
     let mut parameters = request.parameters.clone();
@@ -138,7 +137,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
 /// Fills the holes of a DEM and writes it.
 fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Error> {
     super::check_output(request.output)?;
-    // For a DEM that states none.
+    // For a DEM without a cell size.
     let cell_m = request.parameters["cell_m"].as_f64().map(|side| [side; 2]);
     let Read { dem, mut notes, .. } = read(path, &Reading { cell_m, ..Reading::default() })?;
     let streams = Streams::for_seed(request.seed, STAGE);
@@ -159,16 +158,19 @@ fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Erro
     }))
 }
 
-/// Reads a fit file; `model` and `parameters` are enough.
+/// Reads a fit file; only `model` and `parameters` are required.
 ///
 /// # Errors
-/// A missing file, or one that is no fit.
+/// A missing file, or one that is not a fit.
 pub fn read_fit(path: &Path) -> Result<FitFile, Error> {
     let name = path.display();
     let bytes = sastrugi_store::file::read(path).map_err(|e| Error::Input(format!("{name}: {e}")))?;
-    let fit: FitFile = serde_json::from_slice(&bytes).map_err(|e| Error::Input(format!("{name}: no fit file: {e}")))?;
+    let fit: FitFile = serde_json::from_slice(&bytes).map_err(|e| match dem::Format::of_name(path) {
+        Some(_) => Error::Input(format!("{name} is a DEM, not a fit file; run `sastrugi fit` first")),
+        None => Error::Input(format!("{name}: not a fit file: {e}")),
+    })?;
     if fit.model.is_empty() || fit.parameters.is_empty() {
-        return Err(Error::Input(format!("{name}: no fit file: it needs `model` and `parameters`")));
+        return Err(Error::Input(format!("{name}: not a fit file: `model` and `parameters` are required")));
     }
     Ok(fit)
 }

@@ -1,4 +1,4 @@
-//! `traverse`: missions over one DEM, as a small study of its own.
+//! `traverse`: missions over one DEM, run as a small study.
 
 use super::parameters;
 use crate::error::Error;
@@ -16,13 +16,13 @@ pub struct Request<'a> {
     pub dem: &'a Path,
     /// Seed of the random streams.
     pub seed: u64,
-    /// Settings of `[roughness]`, by which starts and goals are judged.
+    /// Settings of `[roughness]`, which decide where missions may start and end.
     pub roughness: Value,
     /// Rules of the missions.
     pub missions: Value,
-    /// Parameters of the run, vehicle included.
+    /// Parameters of the traverse, including the vehicle.
     pub parameters: Value,
-    /// Date that the release carries.
+    /// Date of the release.
     pub date: &'a str,
 }
 
@@ -30,9 +30,9 @@ pub struct Request<'a> {
 pub struct Place<'a> {
     /// Release folder.
     pub output: &'a Path,
-    /// Work area; `<output>.work` when absent.
+    /// Work area; default: `<output>.work`.
     pub work: Option<&'a Path>,
-    /// Whether a release of the same missions with fewer failed items is replaced.
+    /// Whether to replace a release of the same missions that has fewer failed items.
     pub replace: bool,
     /// Limits.
     pub limits: Limits,
@@ -41,7 +41,7 @@ pub struct Place<'a> {
 /// Drives missions over a DEM and writes a release with recordings, tables and report.
 ///
 /// # Errors
-/// As [`crate::studies::run`]; also a DEM on which nothing can be driven.
+/// As [`crate::studies::run`]; also a DEM on which no mission can be driven.
 pub fn traverse(request: &Request<'_>, place: &Place<'_>, progress: &dyn Progress) -> Result<RunSummary, Error> {
     let path = std::path::absolute(request.dem).map_err(|e| Error::Input(format!("{}: {e}", request.dem.display())))?;
     if !path.is_file() {
@@ -60,7 +60,7 @@ pub fn traverse(request: &Request<'_>, place: &Place<'_>, progress: &dyn Progres
 /// The text of a study: its head, its `[roughness]`, and one item of each section given.
 ///
 /// # Errors
-/// Values that TOML does not have.
+/// Values that cannot be written as TOML.
 pub(super) fn document<'a>(
     head: &Value,
     roughness: &Value,
@@ -77,7 +77,7 @@ pub(super) fn document<'a>(
     Ok(document.to_string())
 }
 
-/// An envelope with parameters beside its keys; the envelope's keys are not the caller's to set.
+/// Adds parameters to an envelope; the keys of the envelope cannot be overridden.
 pub(super) fn with(mut envelope: Value, more: &Value) -> Result<Value, Error> {
     let (Some(map), Some(more)) = (envelope.as_object_mut(), more.as_object()) else { return Ok(envelope) };
     for (key, value) in more {

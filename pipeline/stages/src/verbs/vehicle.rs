@@ -1,4 +1,4 @@
-//! A vehicle for other simulators: a known one or that of a vehicle file, as bodies on joints.
+//! Export of a vehicle for other simulators, as bodies connected by joints.
 
 use super::parameters::assign_vehicle;
 use crate::error::Error;
@@ -13,10 +13,10 @@ pub fn is_known(name: &str) -> bool {
     kinds().iter().any(|kind| kind.family == "vehicle" && kind.kind == name)
 }
 
-/// The vehicle of that name or file, with the friction of a surface preset, and doubts about it, a sentence each.
+/// The vehicle of that name or file, with the friction of a surface preset, and warnings about it, one sentence each.
 ///
 /// # Errors
-/// A file that cannot be read, a vehicle or a surface that is not known, or a number out of range.
+/// A file that cannot be read, an unknown vehicle or surface, or a value out of range.
 pub fn mechanism(name: &str, surface: Option<&str>) -> Result<(Mechanism, Vec<String>), Error> {
     let mut params = json!({});
     assign_vehicle(&mut params, name)?;

@@ -1,4 +1,4 @@
-//! ESRI ASCII grids: a header of words, then rows from the north.
+//! ESRI ASCII grids: a header of keys and values, then rows from the north.
 
 use super::band::Values;
 use super::checks::{cell_count, free_of_no_data_value};
@@ -9,19 +9,19 @@ use std::fmt::Write;
 use std::iter::Peekable;
 use std::path::Path;
 
-/// Sizes of the usual global grids in arc seconds that no grid in metres has by chance (as degrees they have no short
-/// decimal form).
+/// Cell sizes of common global grids in arc seconds. No grid in metres has them by chance, because in degrees they have no short
+/// decimal form.
 const ARC_SECONDS: [f64; 10] = [1.0 / 9.0, 1.0 / 3.0, 1.0, 2.0, 3.0, 5.0, 6.0, 10.0, 15.0, 30.0];
 
-/// Bytes of a file in which its header is looked for.
+/// Bytes of a file that are searched for its header.
 const HEADER_BYTES_MAX: u64 = 1 << 12;
 
-/// True for the text of an ESRI ASCII grid: its first word is one of a header.
+/// True for the text of an ESRI ASCII grid: its first word is a header key.
 pub(crate) fn looks_like(bytes: &[u8]) -> bool {
     words(bytes).next().is_some_and(|word| matches!(Key::of(word), Some(Key::Columns | Key::Rows)))
 }
 
-/// Words of the file, each with the number of bytes from its start to the file's end.
+/// Whitespace-separated words of the file.
 fn words(bytes: &[u8]) -> impl Iterator<Item = &[u8]> {
     let text = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
     text.split(u8::is_ascii_whitespace).filter(|word| !word.is_empty())
@@ -75,7 +75,7 @@ impl Header {
         let mut header = Self::default();
         while let Some(key) = words.peek().copied().and_then(Key::of) {
             words.next();
-            let value = words.next().ok_or_else(|| Refusal::new("the header of the ASCII grid breaks off"))?;
+            let value = words.next().ok_or_else(|| Refusal::new("the header of the ASCII grid is truncated"))?;
             header.set(key, value)?;
         }
         Ok(header)
@@ -98,7 +98,7 @@ impl Header {
     }
 
     fn geometry(&self) -> Result<Geometry, Refusal> {
-        let missing = |what: &str| Refusal::new(format!("the header of the ASCII grid lacks {what}"));
+        let missing = |what: &str| Refusal::new(format!("the header of the ASCII grid has no {what}"));
         let (rows, cols) = (self.rows.ok_or_else(|| missing("nrows"))?, self.cols.ok_or_else(|| missing("ncols"))?);
         cell_count(rows, cols)?;
         let mut cell = [0.0; 2];
@@ -119,15 +119,15 @@ fn quoted(word: &[u8]) -> String {
 
 fn number(word: &[u8]) -> Result<f64, Refusal> {
     let parsed = std::str::from_utf8(word).ok().and_then(|text| text.parse().ok());
-    parsed.ok_or_else(|| Refusal::new(format!("the ASCII grid holds {} where a number belongs", quoted(word))))
+    parsed.ok_or_else(|| Refusal::new(format!("the ASCII grid contains {} instead of a number", quoted(word))))
 }
 
 fn count(word: &[u8], key: &str) -> Result<u64, Refusal> {
     let parsed = std::str::from_utf8(word).ok().and_then(|text| text.parse().ok());
-    parsed.ok_or_else(|| Refusal::new(format!("{key} of the ASCII grid is {}; it must be a count", quoted(word))))
+    parsed.ok_or_else(|| Refusal::new(format!("{key} of the ASCII grid must be a count, got {}", quoted(word))))
 }
 
-/// Reads an ESRI ASCII grid, with the `.prj` file beside it when there is one.
+/// Reads an ESRI ASCII grid, with its `.prj` file if there is one.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
     let mut words = words(bytes).peekable();
     let header = Header::read(&mut words)?;
@@ -154,18 +154,18 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
     Ok(Dem { grid: Grid::new(geometry, values), info })
 }
 
-/// What the header says, and the `.prj` file beside it.
+/// Size and position according to the header and the `.prj` file.
 pub(super) fn claimed(path: &Path) -> Option<Claimed> {
     let head = crate::file::head(path, HEADER_BYTES_MAX).ok()?;
     let mut words = words(&head).peekable();
     let header = Header::read(&mut words).ok()?;
-    // A header that ends with these bytes may have been cut in the middle of a number.
+    // If nothing follows the header, the bytes read may end in the middle of a number.
     words.peek()?;
     let geometry = header.geometry().ok()?;
     Some(Claimed::raster(geometry, crs_of(path, &geometry).0.geographic))
 }
 
-/// The system of a grid: that of the `.prj` file beside it when there is one.
+/// The system of a grid: that of its `.prj` file, or a guess.
 fn crs_of(path: &Path, geometry: &Geometry) -> (Crs, Vec<String>) {
     let projection = crate::file::read_text(&path.with_extension("prj")).ok();
     projection.as_deref().and_then(named_crs).unwrap_or_else(|| guess_crs(geometry))
@@ -180,19 +180,19 @@ fn read_values<'a>(
     let mut integers = true;
     for word in words {
         if values.len() == cells {
-            return Err(Refusal::new(format!("holds more than the {cells} values its header announces")));
+            return Err(Refusal::new(format!("has more than the {cells} values that its header declares")));
         }
         let value = number(word)?;
         integers &= word.iter().all(|b| matches!(b, b'0'..=b'9' | b'-' | b'+'));
         values.push(if Some(value) == nodata { f64::NAN } else { value });
     }
     if values.len() < cells {
-        return Err(Refusal::new(format!("holds {} of the {cells} values its header announces", values.len())));
+        return Err(Refusal::new(format!("has {} of the {cells} values that its header declares", values.len())));
     }
     Ok((values, integers))
 }
 
-/// The system of a `.prj` file (well-known text): its kind and name.
+/// Kind and name of the system in a `.prj` file (well-known text).
 fn named_crs(text: &str) -> Option<(Crs, Vec<String>)> {
     let name = text.split('"').nth(1)?.to_owned();
     let crs = match text.trim_start().get(..4)?.to_ascii_uppercase().as_str() {
@@ -203,7 +203,7 @@ fn named_crs(text: &str) -> Option<(Crs, Vec<String>)> {
     Some((crs, vec![]))
 }
 
-/// The format names no reference system; coordinates on the globe at a usual arc-second spacing are taken as degrees.
+/// The format has no reference system; coordinates on the globe with a common arc-second spacing are treated as degrees.
 fn guess_crs(g: &Geometry) -> (Crs, Vec<String>) {
     let [width, height] = g.size();
     let on_globe = g.origin[0] >= -180.01
@@ -212,13 +212,13 @@ fn guess_crs(g: &Geometry) -> (Crs, Vec<String>) {
         && g.origin[1] + height <= 90.01;
     let seconds = 3600.0 * g.cell[1];
     if on_globe && ARC_SECONDS.iter().any(|s| (seconds / s - 1.0).abs() < 1e-5) {
-        let note = format!("coordinates are taken as degrees on WGS 84 (cells of {seconds:.4} arc seconds)");
+        let note = format!("coordinates are treated as degrees on WGS 84 (cells of {seconds:.4} arc seconds)");
         return (Crs::wgs84(), vec![note]);
     }
-    (Crs::default(), vec!["the format names no reference system; coordinates are taken as metres".to_owned()])
+    (Crs::default(), vec!["the file names no reference system; coordinates are treated as metres".to_owned()])
 }
 
-/// The grid as text: shortest decimal forms that read back to the same numbers. Also sentences on what is lost.
+/// The grid as text, with the shortest decimals that read back to the same numbers, and notes on what is lost.
 pub(super) fn render(grid: &Grid, crs: &Crs) -> Result<(Vec<u8>, Vec<String>), Refusal> {
     free_of_no_data_value(grid)?;
     let g = &grid.geometry;

@@ -1,37 +1,37 @@
-//! What the values of a raster are, as a GeoTIFF says it: unit and description of the band in GDAL's metadata.
+//! Kind of values of a raster, as stored in a GeoTIFF: unit and description of the band in GDAL's metadata.
 
 use std::borrow::Cow;
 use std::fmt::Write;
 
 /// TIFF tag of GDAL's metadata, XML.
 pub(super) const TAG: u16 = 42112;
-/// Units that are metres, in lower case; programs write all of these.
+/// Spellings of metres in use, in lower case.
 const METRES: [&str; 6] = ["", "m", "metre", "metres", "meter", "meters"];
-/// Item that codes have, beside those that GDAL knows.
+/// Item that marks codes, in addition to the items that GDAL defines.
 const CODES: &str = "VALUES";
 
-/// What the values of a raster are.
+/// Kind of values of a raster.
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub enum Values {
     /// Heights, m.
     #[default]
     Heights,
-    /// Figures of another kind.
+    /// Values of another quantity.
     Figures {
-        /// Their unit, `1` for plain numbers.
+        /// Unit, `1` for dimensionless values.
         unit: Cow<'static, str>,
-        /// What they are.
+        /// Description.
         description: Cow<'static, str>,
     },
-    /// Codes, which have no means: overviews hold one of them.
+    /// Codes, which cannot be averaged: an overview cell holds one of them.
     Codes {
-        /// What they stand for.
+        /// Meaning of the codes.
         description: Cow<'static, str>,
     },
 }
 
 impl Values {
-    /// Their unit; none for codes.
+    /// Unit; `None` for codes.
     pub fn unit(&self) -> Option<&str> {
         match self {
             Self::Heights => Some("m"),
@@ -40,7 +40,7 @@ impl Values {
         }
     }
 
-    /// What they are; empty where a file does not say it.
+    /// Description; empty if the file gives none.
     pub fn description(&self) -> &str {
         match self {
             Self::Heights => "heights",
@@ -48,16 +48,18 @@ impl Values {
         }
     }
 
-    /// The sentence for those who take the values for heights in metres.
+    /// Note for values that are not heights in metres.
     pub(super) fn note(&self) -> Option<String> {
-        let taken = "the numbers are taken as they are";
+        let unconverted = "they are used unconverted";
         match self {
             Self::Heights => None,
             Self::Figures { unit, .. } if unit == "m" => None,
             Self::Figures { unit, .. } => {
-                Some(format!("the file says that its values are in `{unit}`, not m; {taken}"))
+                Some(format!("values are in `{unit}` according to the file, not in m; {unconverted}"))
             }
-            Self::Codes { description } => Some(format!("the file says that it holds codes ({description}); {taken}")),
+            Self::Codes { description } => {
+                Some(format!("values are codes ({description}) according to the file, not heights; {unconverted}"))
+            }
         }
     }
 
@@ -84,7 +86,7 @@ impl Values {
         text
     }
 
-    /// What the text of the tag says of the first band; heights where it says nothing else.
+    /// Parses the text of the tag for the first band; heights if it states nothing else.
     pub(super) fn of_metadata(text: &str) -> Self {
         let items: Vec<(&str, String)> = items(text).collect();
         let find = |what: &str| items.iter().find(|(attributes, _)| attributes.contains(what)).map(|(_, value)| value);
@@ -111,7 +113,7 @@ fn items(text: &str) -> impl Iterator<Item = (&str, String)> {
     parts.filter(|(attributes, _)| attributes.contains("sample=\"0\""))
 }
 
-/// Text of an item, escaped twice: so GDAL writes it, and reads it.
+/// Text of an item, escaped twice, as GDAL writes and reads it.
 fn escaped(text: &str) -> String {
     let once = |text: &str| text.replace('&', "&amp;").replace('<', "&lt;").replace('>', "&gt;");
     once(&once(text))
@@ -128,7 +130,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// As GDAL 3.10.3 writes items (seen through rasterio), of two bands.
+    /// Items of two bands, as written by GDAL 3.10.3 (through rasterio).
     #[test]
     fn val_units_of_other_programs() {
         let of = |unit: &str| {
@@ -147,9 +149,9 @@ mod tests {
     }
 
     proptest! {
-        /// Whatever it says is read as it was written.
+        /// Any metadata is read back as written.
         #[test]
-        fn prop_what_is_written_is_read(unit in "[a-z&<>/0-9]{1,8}", description in "[ -~]{0,40}") {
+        fn prop_metadata_is_read_back(unit in "[a-z&<>/0-9]{1,8}", description in "[ -~]{0,40}") {
             let description = Cow::<str>::Owned(description.trim().to_owned());
             let codes = Values::Codes { description: description.clone() };
             prop_assert_eq!(&Values::of_metadata(&codes.metadata()), &codes);

@@ -1,11 +1,12 @@
-//! Rows of a raster at a time, for rasters larger than memory.
+//! Row-wise reading, for rasters larger than memory.
 //!
-//! A GeoTIFF (strips or tiles, of every type and compression that [`super::read`] reads) is decoded as its rows are asked
-//! for: memory holds the cells asked for, 8 bytes each and once as they are stored, and two rows of strips or tiles (at most
-//! 256 MiB), which are kept for the next call: whoever reads downwards, overlapping or not, has each decoded once. Other
-//! formats are read whole when they are opened.
+//! A GeoTIFF (strips or tiles, of every type and compression that [`super::read`] supports) is decoded on demand. Memory holds
+//! the requested cells, at 8 bytes each and once as stored, and two rows of strips or tiles (at most 256 MiB), which are kept
+//! for the next call: reading downwards, with or without overlap, decodes each once. Other formats are read completely when
+//! they are opened.
 //!
-//! Infinite values are no data, as in [`super::read`], which counts them; a raster without any data is found out by its reader.
+//! Infinite values are treated as no data, as in [`super::read`], but are not counted; a raster without any data is not refused
+//! here.
 
 use super::checks::check_place;
 use super::geotiff::Raster;
@@ -16,10 +17,10 @@ use std::io::BufReader;
 use std::ops::Range;
 use std::path::{Path, PathBuf};
 
-/// Rows of strips or tiles that are kept: a part may end in one and the next begin there.
+/// Rows of strips or tiles kept: one part may end, and the next begin, within the same row.
 const ROWS_OF_BLOCKS: usize = 2;
 
-/// A raster of which rows can be read.
+/// A raster that can be read by rows.
 pub struct BlockReader {
     path: PathBuf,
     rows: Rows,
@@ -31,19 +32,19 @@ enum Rows {
 }
 
 impl BlockReader {
-    /// Of a GeoTIFF, decoded as its rows are asked for.
+    /// Reader of a GeoTIFF, decoded on demand.
     pub(super) fn of_geotiff(path: &Path, options: &ReadOptions) -> Result<Self, DemError> {
         let raster = Raster::open(path, options, ROWS_OF_BLOCKS)?;
         check_place(&raster.geometry).map_err(|refusal| refusal.about(path))?;
         Ok(Self { path: path.to_owned(), rows: Rows::File(raster) })
     }
 
-    /// Of a raster that was read whole.
+    /// Reader of a raster that is already in memory.
     pub(super) fn of_dem(path: &Path, dem: Dem) -> Self {
         Self { path: path.to_owned(), rows: Rows::Held(dem.grid, dem.info) }
     }
 
-    /// Shape and place of the whole raster.
+    /// Shape and position of the whole raster.
     pub fn geometry(&self) -> Geometry {
         match &self.rows {
             Rows::File(raster) => raster.geometry,
@@ -51,7 +52,7 @@ impl BlockReader {
         }
     }
 
-    /// What the file says about its heights.
+    /// Metadata of the file.
     pub fn info(&self) -> &DemInfo {
         match &self.rows {
             Rows::File(raster) => &raster.info,
@@ -59,7 +60,7 @@ impl BlockReader {
         }
     }
 
-    /// Rows that are decoded together. (Of a raster whose first row is the southern one, they are counted from the south.)
+    /// Rows that are decoded together, counted from the south if the first row is the southern one.
     pub fn block_rows(&self) -> usize {
         match &self.rows {
             Rows::File(raster) => raster.block_rows,
@@ -67,7 +68,7 @@ impl BlockReader {
         }
     }
 
-    /// Heights of some rows, counted from the north, m; `NaN` without data.
+    /// Heights of some rows, counted from the north, m; `NaN` means no data.
     ///
     /// # Errors
     /// As [`Self::read_part`].
@@ -76,16 +77,16 @@ impl BlockReader {
         self.read_part(rows, cols)
     }
 
-    /// Heights of some rows, counted from the north, and columns, m; `NaN` without data.
+    /// Heights of some rows, counted from the north, and columns, m; `NaN` means no data.
     ///
     /// # Errors
-    /// Rows or columns that the raster does not have or that are too many at once, and strips or tiles that cannot be decoded.
+    /// Rows or columns out of range, or too many at once; strips or tiles that cannot be decoded.
     pub fn read_part(&mut self, rows: Range<usize>, cols: Range<usize>) -> Result<Grid, DemError> {
         let g = self.geometry();
         let cells = (rows.len() as u64).saturating_mul(cols.len() as u64);
         if cells == 0 || rows.end > g.rows || cols.end > g.cols || cells > MAX_CELLS {
             let reason =
-                format!("rows {rows:?} and columns {cols:?} of {} x {} cannot be read at once", g.rows, g.cols);
+                format!("cannot read rows {rows:?} and columns {cols:?} of {} x {} cells at once", g.rows, g.cols);
             return Err(DemError::Unfit { path: self.path.clone(), reason });
         }
         match &mut self.rows {

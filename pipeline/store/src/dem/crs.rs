@@ -1,15 +1,15 @@
-//! Coordinate reference systems: recognised as far as needed, carried through whole.
+//! Coordinate reference systems: interpreted only as far as needed, and passed through unchanged.
 
-/// A coordinate reference system as GeoTIFF keys describe it. The default is a local plane in metres.
+/// A coordinate reference system, as described by GeoTIFF keys. The default is a local plane in metres.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Crs {
-    /// True when coordinates are degrees of longitude and latitude.
+    /// True if coordinates are degrees of longitude and latitude.
     pub geographic: bool,
-    /// EPSG code, when the system has one.
+    /// EPSG code, if the system has one.
     pub epsg: Option<u16>,
-    /// Name, as far as the file gives one.
+    /// Name; empty if the file gives none.
     pub name: String,
-    /// GeoTIFF keys by number, in ascending order and without the raster type: what is written to a derived raster.
+    /// GeoTIFF keys in ascending order, without the raster type, as written to derived rasters.
     pub keys: Vec<(u16, GeoKey)>,
 }
 
@@ -35,7 +35,7 @@ const LINEAR_UNITS: u16 = 3076;
 const VERTICAL_UNITS: u16 = 4099;
 
 const MODEL_GEOGRAPHIC: u16 = 2;
-/// Codes that stand for `undefined` and `user-defined`.
+/// Codes for `undefined` and `user-defined`.
 const NO_CODE: [u16; 2] = [0, 32767];
 
 impl Crs {
@@ -59,20 +59,20 @@ impl Crs {
         crs
     }
 
-    /// Sentences on units that are not metres.
+    /// Notes on units other than metres.
     pub(crate) fn unit_notes(&self) -> Vec<String> {
         let not_metre = |id| self.short(id).filter(|unit| *unit != 9001 && !NO_CODE.contains(unit));
         let horizontal = not_metre(LINEAR_UNITS).filter(|_| !self.geographic);
         let vertical = not_metre(VERTICAL_UNITS);
-        let sentence = |what: &str, unit: u16| format!("{what} are in the unit EPSG:{unit}, but are taken as metres");
+        let sentence = |what: &str, unit: u16| format!("{what} are in the unit EPSG:{unit} but are treated as metres");
         let notes = [horizontal.map(|u| sentence("coordinates", u)), vertical.map(|u| sentence("heights", u))];
         notes.into_iter().flatten().collect()
     }
 
-    /// The sentence for those who write to a format that keeps no system.
+    /// Note on writing to a format without a reference system.
     pub(super) fn loss_notes(&self) -> Vec<String> {
         let known = *self != Self::default();
-        known.then(|| "the format keeps no coordinate reference system".to_owned()).into_iter().collect()
+        known.then(|| "the format does not store the coordinate reference system".to_owned()).into_iter().collect()
     }
 
     fn get(&self, id: u16) -> Option<&GeoKey> {

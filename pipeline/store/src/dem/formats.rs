@@ -1,4 +1,4 @@
-//! The table of formats: how each is recognised, read and written. It imports the formats; none imports it.
+//! Table of formats: how each is recognised, read and written. It imports the formats; none imports it.
 
 use super::blocks::BlockReader;
 use super::crs::Crs;
@@ -9,9 +9,9 @@ use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::path::Path;
 
-/// Endings of names that [`super::write()`] takes.
+/// File name endings that [`super::write()`] supports.
 pub const WRITTEN_ENDINGS: &str = ".tif, .asc, .hgt, .png, .npy, .obj, .glb and .usda";
-/// What can be read, in words.
+/// Formats that can be read.
 pub(super) const READ_FORMATS: &str = "GeoTIFF, ESRI ASCII, .hgt, .npy, greyscale .png, .las and .laz";
 
 type GridPoints = fn(&Path, File, &ReadOptions, &GridSettings) -> Result<Dem, DemError>;
@@ -21,7 +21,7 @@ type Open = fn(&Path, &ReadOptions) -> Result<BlockReader, DemError>;
 type Claim = fn(&Path, File, &ReadOptions) -> Option<Claimed>;
 type Render = fn(&Path, &Grid, &Crs, &WriteOptions) -> Result<(Vec<u8>, Vec<String>), Refusal>;
 
-/// What the program does with a format.
+/// Capabilities of a format.
 pub(super) struct Codec {
     format: Format,
     /// Name in tables.
@@ -30,21 +30,21 @@ pub(super) struct Codec {
     endings: &'static [&'static str],
     /// True for the first bytes of such a file.
     starts: fn(&[u8]) -> bool,
-    /// Grids the points of a file; takes it open, at any place.
+    /// Grids the points of an open file, at any position.
     pub grid: Option<GridPoints>,
-    /// Reads a raster without holding its bytes.
+    /// Reads a raster without loading the whole file.
     pub stream: Option<Stream>,
     /// Reads a raster from all of its bytes.
     pub parse: Option<Parse>,
-    /// Opens a raster whose rows are decoded as they are asked for.
+    /// Opens a raster whose rows are decoded on demand.
     pub open: Option<Open>,
-    /// What the header says of the size; takes the file open, behind its first bytes.
+    /// Size according to the header; takes the open file, positioned after its first bytes.
     pub claimed: Option<Claim>,
-    /// The bytes of a file, and sentences on what it lost.
+    /// The bytes of a file, and notes on what is lost.
     pub render: Option<Render>,
-    /// States metres.
+    /// Defined in metres.
     in_metres: bool,
-    /// Holds triangles, which may be decimated.
+    /// A mesh, which may be decimated.
     mesh: bool,
 }
 
@@ -136,31 +136,31 @@ static CODECS: [Codec; 9] = [
     Codec {
         starts: points::looks_like,
         grid: Some(points::read_dem),
-        // A cloud only by its name.
-        parse: Some(|_, _, _| Err(Refusal::new("is no point cloud: LAS and LAZ files start with \"LASF\""))),
+        // A point cloud by name only.
+        parse: Some(|_, _, _| Err(Refusal::new("is not a point cloud: LAS and LAZ files start with \"LASF\""))),
         claimed: Some(|_, file, options| points::claimed(file, options.cell_m.map(|[x, y]| x.min(y)))),
         ..Codec::new(Format::Las, "las", &["las", "laz"])
     },
 ];
 
-/// The format that a file's first bytes tell.
+/// The format identified by the first bytes of a file.
 pub(super) fn of_start(bytes: &[u8]) -> Option<&'static Codec> {
     CODECS.iter().find(|codec| (codec.starts)(bytes))
 }
 
-/// The format of a file of which only the first bytes are known: by them, or by its name where that format has no such bytes, or longer
-/// ones.
+/// The format of a file of which only the first bytes are known: by those bytes, or by its name for formats without a signature or
+/// with a longer one.
 pub(super) fn of_header(path: &Path, bytes: &[u8]) -> Option<&'static Codec> {
     let by_name = |codec: &&Codec| matches!(codec.format, Format::EsriAscii | Format::Hgt | Format::Npy);
     of_start(bytes).or_else(|| of_name(path).filter(by_name))
 }
 
-/// The format of a raster: by its first bytes, and by its name where those tell none, or a point cloud.
+/// The format of a raster: by its first bytes, or by its name if those are not recognised or indicate a point cloud.
 pub(super) fn of_raster(path: &Path, bytes: &[u8]) -> Option<&'static Codec> {
     of_start(bytes).filter(|codec| codec.grid.is_none()).or_else(|| of_name(path))
 }
 
-/// The format of a file name's ending.
+/// The format with the ending of a file name.
 pub(super) fn of_name(path: &Path) -> Option<&'static Codec> {
     let ending = path.extension()?.to_str()?.to_ascii_lowercase();
     CODECS.iter().find(|codec| codec.endings.contains(&ending.as_str()))
@@ -168,7 +168,7 @@ pub(super) fn of_name(path: &Path) -> Option<&'static Codec> {
 
 impl Format {
     fn codec(self) -> &'static Codec {
-        CODECS.iter().find(|codec| codec.format == self).expect("every format stands in the table")
+        CODECS.iter().find(|codec| codec.format == self).expect("every format is in the table")
     }
 
     /// Name in tables.
@@ -176,12 +176,12 @@ impl Format {
         self.codec().name
     }
 
-    /// The format of a file name's ending.
+    /// The format with the ending of a file name.
     pub fn of_name(path: &Path) -> Option<Self> {
         of_name(path).map(|codec| codec.format)
     }
 
-    /// True for formats that state metres, so that a raster in degrees is converted before it is written.
+    /// True for formats defined in metres, for which a raster in degrees is converted before writing.
     pub fn in_metres(self) -> bool {
         self.codec().in_metres
     }
@@ -198,7 +198,7 @@ mod tests {
     use std::collections::BTreeSet;
 
     #[test]
-    fn val_the_endings_in_words_are_those_of_the_table() {
+    fn val_the_listed_endings_are_those_of_the_table() {
         let words = WRITTEN_ENDINGS.replace(" and ", ", ");
         let named: BTreeSet<&str> = words.split(", ").map(|ending| ending.trim_start_matches('.')).collect();
         let written = CODECS.iter().filter(|codec| codec.render.is_some()).map(|codec| codec.endings[0]);

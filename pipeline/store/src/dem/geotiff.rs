@@ -1,8 +1,8 @@
 //! TIFF and GeoTIFF, read through `geotiff-reader`; a TIFF without GeoTIFF tags through `tiff`.
 //!
-//! `geotiff-reader` was chosen because it reads every combination of strips and tiles, LZW, deflate, Zstandard,
-//! PackBits and LERC, predictors 1 to 3, BigTIFF and big-endian files tried bit for bit; it refuses files without
-//! georeferencing. Both stand behind [`parse`], and behind [`Raster`] for rows at a time.
+//! `geotiff-reader` was chosen because it reads all tested combinations of strips and tiles, LZW, deflate, Zstandard, PackBits
+//! and LERC, predictors 1 to 3, BigTIFF and big-endian files bit for bit; it refuses files without georeferencing. [`parse`]
+//! and, for row-wise reading, [`Raster`] wrap both.
 
 use super::band::{self, Values};
 use super::checks::cell_count;
@@ -18,15 +18,15 @@ use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
 
-/// Raster bytes allowed per byte of file: Zstandard stores 128 KiB of one value in 4 bytes, and nothing does better.
+/// Raster bytes allowed per byte of file: Zstandard, the best case, stores 128 KiB of one value in 4 bytes.
 const MAX_EXPANSION: u64 = 1 << 15;
-/// Raster bytes allowed for any file.
+/// Raster bytes allowed for any file, however small.
 const FREE_BYTES: u64 = 1 << 26;
-/// Most bytes of decoded strips and tiles that are kept for the next reading.
+/// Most bytes of decoded strips and tiles kept for the next read.
 const KEPT_BYTES_MAX: u64 = 1 << 28;
-/// Most strips and tiles that are kept.
+/// Most strips and tiles kept.
 const KEPT_BLOCKS_MAX: usize = 1 << 14;
-/// Cells that are decoded together when all are read.
+/// Cells decoded together when the whole raster is read.
 const TOGETHER_CELLS: usize = 1 << 20;
 const RASTER_PIXEL_IS_POINT: u16 = 2;
 const SAMPLE_FORMATS_COMPLEX: [u16; 2] = [5, 6];
@@ -42,7 +42,7 @@ pub(super) fn read(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> 
     Raster::open(path, options, 0)?.whole().map_err(|refusal| refusal.about(path))
 }
 
-/// What the header says.
+/// Size and position according to the header.
 pub(super) fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     let Raster { geometry, info, .. } = Raster::open(path, options, 0).ok()?;
     Some(Claimed::raster(geometry, info.crs.geographic))
@@ -60,13 +60,13 @@ pub(super) fn parse(bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refusa
     raster.whole()
 }
 
-/// Options of a decoder that keeps so many decoded strips or tiles, and so many bytes of them.
+/// Options of a decoder whose cache is limited to a number of decoded strips or tiles and to a number of bytes.
 fn limits([block_cache_slots, block_cache_bytes]: [usize; 2]) -> GeoTiffOpenOptions {
     let decode_output_bytes = MAX_CELLS as usize * 8;
     GeoTiffOpenOptions { decode_output_bytes, block_cache_slots, block_cache_bytes, ..GeoTiffOpenOptions::default() }
 }
 
-/// Number and bytes of the strips or tiles in some rows of them, at most [`KEPT_BYTES_MAX`].
+/// Number and bytes of the strips or tiles in `rows_of_blocks` rows of them, at most [`KEPT_BYTES_MAX`].
 fn kept(file: &GeoTiffFile, rows_of_blocks: usize) -> Result<[usize; 2], Refusal> {
     let ifd = file.tiff().ifd(file.base_ifd_index()).map_err(|e| refused(&e))?;
     let bits = ifd.raster_layout().map_err(|e| refused(&e))?.bits_per_sample;
@@ -77,11 +77,11 @@ fn kept(file: &GeoTiffFile, rows_of_blocks: usize) -> Result<[usize; 2], Refusal
     let blocks = rows_of_blocks.saturating_mul(file.width().div_ceil(wide.max(1)) as usize);
     let cells = u64::from(wide).saturating_mul(u64::from(high.min(file.height())));
     let bytes = cells.saturating_mul(u64::from(bits).div_ceil(8)).saturating_mul(blocks as u64);
-    // Every slot takes memory by itself.
+    // Every cache slot takes memory of its own.
     Ok([blocks.min(KEPT_BLOCKS_MAX), bytes.min(KEPT_BYTES_MAX) as usize])
 }
 
-/// A decoder of a TIFF that has no georeferencing.
+/// A decoder for a TIFF without georeferencing; `None` if it has some.
 fn unreferenced<R: Read + Seek>(reader: R) -> Option<Decoder<R>> {
     let mut limits = Limits::default();
     limits.decoding_buffer_size = MAX_CELLS as usize * 8;
@@ -93,10 +93,10 @@ fn unreferenced<R: Read + Seek>(reader: R) -> Option<Decoder<R>> {
 }
 
 fn refused(error: &dyn std::error::Error) -> Refusal {
-    Refusal::new(format!("is no TIFF that can be read: {error}"))
+    Refusal::new(format!("is not a readable TIFF: {error}"))
 }
 
-/// A TIFF of heights that is open, with nothing decoded yet.
+/// An open TIFF of heights, with nothing decoded yet.
 pub(super) struct Raster<R: Read + Seek> {
     pixels: Pixels<R>,
     pub geometry: Geometry,
@@ -117,8 +117,7 @@ enum Pixels<R: Read + Seek> {
 }
 
 impl Raster<BufReader<File>> {
-    /// Opens a TIFF whose rows are to be read as they are needed. Decoded strips or tiles are kept for the next reading, so
-    /// many rows of them.
+    /// Opens a TIFF for row-wise reading. `rows_of_blocks` rows of decoded strips or tiles are kept for the next read.
     pub fn open(path: &Path, options: &ReadOptions, rows_of_blocks: usize) -> Result<Self, DemError> {
         let reading = |e| DemError::reading(path, e);
         let file = crate::file::open(path).map_err(reading)?;
@@ -160,7 +159,7 @@ impl<R: Read + Seek> Raster<R> {
         let geometry = place(&file, options, &mut notes)?;
         let south_first = file.transform().is_some_and(|t| t.pixel_height >= 0.0);
         if south_first {
-            notes.push("its first row is the southern one; rows were turned".to_owned());
+            notes.push("the first row is the southern one; rows were flipped".to_owned());
         }
         let pixel_is_point = file.crs().raster_type == RASTER_PIXEL_IS_POINT;
         let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, placed, pixel_is_point, notes };
@@ -176,7 +175,7 @@ impl<R: Read + Seek> Raster<R> {
 
     /// A TIFF without any georeferencing.
     fn plain(decoder: Option<Decoder<R>>, size: u64, options: &ReadOptions) -> Result<Self, Refusal> {
-        let mut decoder = decoder.ok_or_else(|| Refusal::new("is no TIFF that can be read"))?;
+        let mut decoder = decoder.ok_or_else(|| Refusal::new("is not a readable TIFF"))?;
         let mut number = |tag| decoder.find_tag_unsigned::<u64>(tag).map_err(|e| refused(&e));
         let bands = number(Tag::SamplesPerPixel)?.unwrap_or(1);
         let photometric = number(Tag::PhotometricInterpretation)?.and_then(|n| u16::try_from(n).ok());
@@ -197,7 +196,7 @@ impl<R: Read + Seek> Raster<R> {
         let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, placed, pixel_is_point, notes };
         let (wide, high) = decoder.chunk_dimensions();
         if wide == 0 || high == 0 {
-            return Err(Refusal::new("has strips or tiles without cells"));
+            return Err(Refusal::new("has empty strips or tiles"));
         }
         let block_rows = (high as usize).min(geometry.rows);
         Ok(Self { pixels: Pixels::Plain(Box::new(decoder)), geometry, info, block_rows })
@@ -213,14 +212,14 @@ impl<R: Read + Seek> Raster<R> {
         Ok(Dem { grid: Grid::new(self.geometry, values), info: self.info })
     }
 
-    /// Heights of rows (from the north) and columns that exist; `NaN` without data.
+    /// Heights of rows (from the north) and columns, which must be in range; `NaN` means no data.
     pub fn window(&mut self, rows: Range<usize>, cols: Range<usize>) -> Result<Vec<f64>, Refusal> {
         let mut values = Vec::with_capacity(rows.len() * cols.len());
         self.add_window(rows, cols, &mut values)?;
         Ok(values)
     }
 
-    /// Adds what [`Self::window`] reads.
+    /// Appends what [`Self::window`] returns.
     fn add_window(&mut self, rows: Range<usize>, cols: Range<usize>, values: &mut Vec<f64>) -> Result<(), Refusal> {
         let (g, nodata, before) = (&self.geometry, self.info.nodata, values.len());
         match &mut self.pixels {
@@ -230,9 +229,9 @@ impl<R: Read + Seek> Raster<R> {
             }
             Pixels::Referenced { file, stored, south_first: true } => {
                 let from_south = g.rows - rows.end..g.rows - rows.start;
-                let mut turned = Vec::with_capacity(rows.len() * cols.len());
-                stored_window(file, *stored, nodata, &from_south, &cols, &mut turned)?;
-                values.extend(turned.chunks_exact(cols.len()).rev().flatten());
+                let mut flipped = Vec::with_capacity(rows.len() * cols.len());
+                stored_window(file, *stored, nodata, &from_south, &cols, &mut flipped)?;
+                values.extend(flipped.chunks_exact(cols.len()).rev().flatten());
             }
         }
         let (found, count, wide) = (values.len() - before, rows.len(), cols.len());
@@ -245,7 +244,7 @@ impl<R: Read + Seek> Raster<R> {
 
 fn single_band(bands: u64, photometric: Option<u16>) -> Result<(), Refusal> {
     if bands != 1 {
-        return Err(Refusal::new(format!("has {bands} bands; a raster of heights has one")));
+        return Err(Refusal::new(format!("has {bands} bands; a raster of heights must have one")));
     }
     if photometric == Some(PHOTOMETRIC_PALETTE) {
         return Err(Refusal::new("holds palette colours, not heights"));
@@ -253,10 +252,10 @@ fn single_band(bands: u64, photometric: Option<u16>) -> Result<(), Refusal> {
     Ok(())
 }
 
-/// Refuses a raster that cannot have come from so few bytes.
+/// Refuses a raster too large to be stored in so few bytes.
 fn affordable(rows: u32, cols: u32, bytes_per_cell: u64, size: u64) -> Result<(), Refusal> {
     if rows == 0 || cols == 0 {
-        return Err(Refusal::new(format!("holds no cell ({rows} rows, {cols} columns)")));
+        return Err(Refusal::new(format!("has no cells ({rows} rows, {cols} columns)")));
     }
     let cells = u64::from(rows) * u64::from(cols);
     if cells.saturating_mul(bytes_per_cell) > FREE_BYTES.max(size.saturating_mul(MAX_EXPANSION)) {
@@ -265,7 +264,7 @@ fn affordable(rows: u32, cols: u32, bytes_per_cell: u64, size: u64) -> Result<()
     Ok(())
 }
 
-/// Name of a type of stored heights.
+/// Name of the type of stored heights.
 fn dtype(format: u16, bits: u16) -> Result<&'static str, Refusal> {
     match (format, bits) {
         (3, 32) => Ok("float32"),
@@ -276,11 +275,13 @@ fn dtype(format: u16, bits: u16) -> Result<&'static str, Refusal> {
         (2, 16) => Ok("int16"),
         (1, 32) => Ok("uint32"),
         (2, 32) => Ok("int32"),
-        _ => Err(Refusal::new(format!("holds {bits}-bit values of TIFF sample format {format}, which are no heights"))),
+        _ => Err(Refusal::new(format!(
+            "holds {bits}-bit values of TIFF sample format {format}, which is not supported for heights"
+        ))),
     }
 }
 
-/// Adds rows and columns of a georeferenced file in its own order to `values`.
+/// Appends rows and columns of a georeferenced file, in the file's own order, to `values`.
 fn stored_window(
     file: &GeoTiffFile,
     stored: (u16, u16),
@@ -314,7 +315,7 @@ fn stored_window(
     }
 }
 
-/// The text of a float32 raster's no-data value is rounded to float32 like the values.
+/// Rounds the no-data value of a float32 raster, which is stored as text, to float32 like the values.
 fn single(nodata: Option<f64>) -> Option<f64> {
     nodata.map(|v| f64::from(v as f32))
 }
@@ -342,16 +343,19 @@ fn place(file: &GeoTiffFile, options: &ReadOptions, notes: &mut Vec<String>) -> 
         return Ok(unplaced(rows, cols, options, notes));
     };
     if t.skew_x != 0.0 || t.skew_y != 0.0 {
-        return Err(Refusal::new("its rows are rotated; warp it to a north-up raster first"));
+        return Err(Refusal::new("the raster is rotated; warp it to north-up first"));
     }
     if t.pixel_width <= 0.0 {
-        return Err(Refusal::new(format!("its columns run from east to west (pixel width {})", t.pixel_width)));
+        return Err(Refusal::new(format!(
+            "columns run from east to west (pixel width {}); flip the raster first",
+            t.pixel_width
+        )));
     }
     let south = t.origin_y + f64::min(0.0, t.pixel_height * rows as f64);
     Ok(Geometry { rows, cols, cell: [t.pixel_width, t.pixel_height.abs()], origin: [t.origin_x, south] })
 }
 
-/// Rows and columns of a file without georeferencing: the strips or tiles that hold them, cut.
+/// Rows and columns of a file without georeferencing, cut from the strips or tiles that hold them.
 fn plain_window<R: Read + Seek>(
     decoder: &mut Decoder<R>,
     g: &Geometry,
@@ -393,6 +397,6 @@ fn widened(samples: DecodingResult, nodata: Option<f64>) -> Result<Vec<f64>, Ref
         DecodingResult::I16(values) => widen!(values, nodata),
         DecodingResult::U32(values) => widen!(values, nodata),
         DecodingResult::I32(values) => widen!(values, nodata),
-        _ => Err(Refusal::new("holds values of a type that is no height")),
+        _ => Err(Refusal::new("holds values of a type that is not supported for heights")),
     }
 }

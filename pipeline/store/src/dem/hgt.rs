@@ -1,5 +1,5 @@
-//! SRTM tiles: big-endian 16-bit posts of one degree, 1201 or 3601 to a side, the outer ones shared with the neighbours.
-//! The name gives the south-western post; posts are cell centres, so the grid reaches half a cell beyond the degree.
+//! SRTM tiles: one degree of big-endian 16-bit posts, 1201 or 3601 per side; the outer ones are shared with the neighbours.
+//! The name gives the south-western post; posts are cell centres, so the grid extends half a cell beyond the degree.
 
 use super::band::Values;
 use super::crs::Crs;
@@ -14,7 +14,10 @@ const SIDES: [usize; 2] = [1201, 3601];
 /// Reads a tile.
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
     let side = SIDES.into_iter().find(|n| n * n * 2 == bytes.len()).ok_or_else(|| {
-        Refusal::new(format!("has {} bytes; an .hgt tile has 2884802 (3 arc seconds) or 25934402 (1)", bytes.len()))
+        Refusal::new(format!(
+            "has {} bytes; an .hgt tile has 2884802 (3 arc seconds) or 25934402 (1 arc second)",
+            bytes.len()
+        ))
     })?;
     let geometry = tile(corner(path)?, side);
     let height = |post: &[u8]| match i16::from_be_bytes([post[0], post[1]]) {
@@ -35,7 +38,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
     Ok(Dem { grid: Grid::new(geometry, values), info })
 }
 
-/// What name and length of the file say.
+/// Size and position according to name and length of the file.
 pub(super) fn claimed(path: &Path, file: &File) -> Option<Claimed> {
     let bytes = file.metadata().ok()?.len();
     let side = SIDES.into_iter().find(|n| (n * n * 2) as u64 == bytes)?;
@@ -47,11 +50,11 @@ fn tile(corner: [f64; 2], side: usize) -> Geometry {
     Geometry { rows: side, cols: side, cell: [cell; 2], origin: corner.map(|c| c - 0.5 * cell) }
 }
 
-/// Longitude and latitude of the south-western post, from a name as `N44W072` (endings and suffixes ignored).
+/// Longitude and latitude of the south-western post, from a name such as `N44W072` (endings and suffixes ignored).
 fn corner(path: &Path) -> Result<[f64; 2], Refusal> {
     let name = path.file_name().and_then(|n| n.to_str()).unwrap_or_default();
     parse_corner(name)
-        .ok_or_else(|| Refusal::new("an .hgt tile is named after its south-western corner, as N44W072.hgt"))
+        .ok_or_else(|| Refusal::new("an .hgt tile must be named after its south-western corner, such as N44W072.hgt"))
 }
 
 fn parse_corner(name: &str) -> Option<[f64; 2]> {
@@ -70,20 +73,20 @@ pub(super) fn render(path: &Path, grid: &Grid, crs: &Crs) -> Result<(Vec<u8>, Ve
     let g = &grid.geometry;
     if g.rows != g.cols || !SIDES.contains(&g.rows) {
         let shape = format!("{} x {}", g.rows, g.cols);
-        return Err(Refusal::new(format!("an .hgt tile has 1201 x 1201 or 3601 x 3601 posts, not {shape}")));
+        return Err(Refusal::new(format!("an .hgt tile must have 1201 x 1201 or 3601 x 3601 posts, got {shape}")));
     }
     let expected = tile(corner(path)?, g.rows);
     let shift = (0..2).map(|a| (g.origin[a] - expected.origin[a]).abs()).fold(0.0, f64::max);
     if crs.geographic && shift > 0.5 * expected.cell[0] {
-        return Err(Refusal::new(format!("the grid does not lie where the name says ({shift} degrees away)")));
+        return Err(Refusal::new(format!("the grid is {shift} degrees away from the position in the file name")));
     }
     let mut bytes = Vec::with_capacity(g.len() * 2);
     for &value in &grid.values {
         bytes.extend(post(value)?.to_be_bytes());
     }
-    let mut notes = vec!["an .hgt tile keeps whole metres".to_owned()];
+    let mut notes = vec!["heights are rounded to whole metres in an .hgt tile".to_owned()];
     if !crs.geographic {
-        notes.push("an .hgt tile covers one degree; the grid's own cell size and place are lost".to_owned());
+        notes.push("an .hgt tile covers one degree; the grid's own cell size and position are lost".to_owned());
     }
     Ok((bytes, notes))
 }

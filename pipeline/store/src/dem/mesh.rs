@@ -1,8 +1,8 @@
 //! Triangle meshes: Wavefront `.obj`, binary glTF 2.0 `.glb` (Khronos Group, "glTF 2.0 Specification", 2021) and OpenUSD `.usda`.
 //!
 //! One vertex per cell with data, at its centre; two triangles between four neighbours, counter-clockwise from above, whose common
-//! side runs from north-west to south-east. A triangle with a corner without data is left out. A mesh may be decimated: fewer
-//! triangles between some of the cells ([`sastrugi_numeric::triangulation`]), with the error stated in the file.
+//! side runs from north-west to south-east. A triangle with a corner without data is left out. A mesh may be decimated to fewer
+//! triangles over a subset of the cells ([`sastrugi_numeric::triangulation`]); the file then states the error.
 
 use super::checks::check_single_precision;
 use super::crs::Crs;
@@ -12,21 +12,21 @@ use sastrugi_numeric::{Grid, Triangulation, triangulate};
 use serde_json::{Value, json};
 use std::fmt::Write;
 
-/// Most cells of a `.glb` or `.usda`: 4096 a side. Programs that read them hold several times their bytes in memory.
+/// Most cells of a `.glb` or `.usda`: 4096 per side. Programs that read them need several times the file size in memory.
 pub(super) const MAX_CELLS: usize = 1 << 24;
-/// glTF: component types and targets of buffers.
+/// glTF component types and buffer targets.
 const FLOAT: u32 = 5126;
 const UNSIGNED_INT: u32 = 5125;
 const ARRAY_BUFFER: u32 = 34962;
 const ELEMENT_ARRAY_BUFFER: u32 = 34963;
 
-/// Number of a cell without data, which has no vertex.
+/// Vertex number of a cell without a vertex.
 const NO_VERTEX: u32 = u32::MAX;
 
-/// How far a mesh may be decimated; at least one of both.
+/// Limits of decimation; at least one must be set.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct MeshLimits {
-    /// Largest vertical distance of a cell centre from the mesh, m; 0 where only the triangles are limited.
+    /// Largest vertical distance of a cell centre from the mesh, m; 0 if only the triangles are limited.
     pub error_max_m: Option<f64>,
     /// Most triangles.
     pub triangles_max: Option<usize>,
@@ -37,8 +37,8 @@ pub struct MeshLimits {
 pub struct Decimation {
     limits: MeshLimits,
     triangulation: Triangulation,
-    /// Triangles of the mesh that is not decimated.
-    whole: usize,
+    /// Triangles of the undecimated mesh.
+    full: usize,
 }
 
 impl Decimation {
@@ -46,46 +46,46 @@ impl Decimation {
     pub(super) fn new(grid: &Grid, limits: &MeshLimits) -> Result<Self, Refusal> {
         let error_max = limits.error_max_m.unwrap_or(0.0);
         if !(error_max.is_finite() && error_max >= 0.0) {
-            return Err(Refusal::new(format!("the largest error of a mesh must be 0 m or more, got {error_max} m")));
+            return Err(Refusal::new(format!("the mesh error limit must be 0 m or more, got {error_max} m")));
         }
         if grid.geometry.len() > triangulation::MAX_CELLS {
             return Err(too_many(grid, triangulation::MAX_CELLS));
         }
-        let whole = Mesh::of(grid, [0.0; 3], None)?.triangles().count();
-        let asked = Limits { error_max, triangles_max: limits.triangles_max };
-        let triangulation = triangulate(grid, &asked).ok_or_else(no_mesh)?;
+        let full = Mesh::of(grid, [0.0; 3], None)?.triangles().count();
+        let requested = Limits { error_max, triangles_max: limits.triangles_max };
+        let triangulation = triangulate(grid, &requested).ok_or_else(no_mesh)?;
         let count = triangulation.triangles.len();
         if limits.triangles_max.is_some_and(|most| count > most) {
             let reason =
-                format!("the outline and the rims of holes alone take {count} triangles; ask for as many or more");
+                format!("the outline and the rims of holes alone take {count} triangles; allow at least that many");
             return Err(Refusal::new(reason));
         }
-        Ok(Self { limits: *limits, triangulation, whole })
+        Ok(Self { limits: *limits, triangulation, full })
     }
 
-    /// What was done, and the error.
+    /// Result and error as a sentence.
     pub fn sentence(&self) -> String {
         let found = &self.triangulation;
         let mut text = format!(
             "decimated to {} of {} triangles; largest error at a cell centre {} m, RMS {} m",
             found.triangles.len(),
-            self.whole,
+            self.full,
             stated(found.error_max),
             stated(found.error_rms)
         );
         if let Some(limit) = self.limits.error_max_m.filter(|limit| found.error_max > *limit) {
-            text.push_str(&format!("; {limit} m would take more triangles"));
+            text.push_str(&format!("; an error of {limit} m would take more triangles"));
         }
         text
     }
 
-    /// The same as numbers.
+    /// Result and error as JSON.
     pub fn to_json(&self) -> Value {
         let found = &self.triangulation;
         json!({
             "vertices": found.cells.len(),
             "triangles": found.triangles.len(),
-            "triangles_of_dem": self.whole,
+            "triangles_of_dem": self.full,
             "error_max_m": found.error_max,
             "error_rms_m": found.error_rms,
         })
@@ -97,7 +97,7 @@ fn stated(error_m: f64) -> f64 {
     let nearest: f64 = format!("{error_m:.3e}").parse().unwrap_or(error_m);
     match nearest >= error_m {
         true => nearest,
-        // One in the last digit more.
+        // One unit in the last digit higher.
         false => format!("{:.3e}", nearest + 1e-3 * libm::pow(10.0, libm::floor(libm::log10(error_m))))
             .parse()
             .unwrap_or(error_m),
@@ -105,30 +105,30 @@ fn stated(error_m: f64) -> f64 {
 }
 
 fn no_mesh() -> Refusal {
-    Refusal::new("no three neighbouring cells hold data, so that there is no mesh")
+    Refusal::new("no three neighbouring cells hold data, so there is no triangle")
 }
 
 fn too_many(grid: &Grid, most: usize) -> Refusal {
     let g = &grid.geometry;
-    let limit = format!("which takes {most}; choose a smaller size, or cut a window");
-    Refusal::new(format!("{} x {} cells are too many for a mesh, {limit}", g.cols, g.rows))
+    let advice = "choose a smaller size, or cut a window";
+    Refusal::new(format!("{} x {} cells are too many for a mesh of at most {most}; {advice}", g.cols, g.rows))
 }
 
-/// Vertices (x east, y north, z up, m) and triangles of a grid, made as they are asked for.
+/// Vertices (x east, y north, z up, m) and triangles of a grid, generated lazily.
 struct Mesh<'a> {
     grid: &'a Grid,
-    /// Where coordinates count from.
+    /// Origin of the coordinates.
     zero: [f64; 3],
-    /// For each cell, the number of its vertex.
+    /// Vertex number of each cell.
     numbers: Vec<u32>,
     decimation: Option<&'a Decimation>,
 }
 
 impl<'a> Mesh<'a> {
-    /// The grid with coordinates counted from `zero`.
+    /// The grid with coordinates relative to `zero`.
     ///
     /// # Errors
-    /// No triangle, or a height that does not fit in single precision.
+    /// No triangle, or a height beyond single precision.
     fn of(grid: &'a Grid, zero: [f64; 3], decimation: Option<&'a Decimation>) -> Result<Self, Refusal> {
         check_single_precision(grid.values.iter().map(|z| z - zero[2]))?;
         let mut numbers = vec![NO_VERTEX; grid.values.len()];
@@ -146,7 +146,7 @@ impl<'a> Mesh<'a> {
         Ok(mesh)
     }
 
-    /// The grid from its south-west corner, for formats of single precision.
+    /// The grid relative to its south-west corner, for single-precision formats.
     fn local(grid: &'a Grid, decimation: Option<&'a Decimation>) -> Result<Self, Refusal> {
         let [x, y] = grid.geometry.origin;
         let mesh = Self::of(grid, [x, y, 0.0], decimation)?;
@@ -165,7 +165,7 @@ impl<'a> Mesh<'a> {
         cells.map(move |(at, (_, height))| [g.x(at % g.cols) - x, g.y(at / g.cols) - y, height - z])
     }
 
-    /// Corners of the triangles, counter-clockwise from above: those of the decimation, or all.
+    /// Corners of the triangles, counter-clockwise from above: those of the decimation if given, or all.
     fn triangles(&self) -> impl Iterator<Item = [u32; 3]> {
         let few = self.decimation.map(|decimation| decimation.triangulation.triangles.iter().copied());
         let all = self.decimation.is_none().then(|| self.all_triangles());
@@ -183,7 +183,7 @@ impl<'a> Mesh<'a> {
     }
 }
 
-/// Numbers these cells in their order.
+/// Numbers the vertices of these cells in order.
 fn number_vertices(numbers: &mut [u32], cells: impl Iterator<Item = usize>) {
     for (number, cell) in (0..).zip(cells) {
         numbers[cell] = number;
@@ -195,8 +195,8 @@ pub(super) fn obj(grid: &Grid, decimation: Option<&Decimation>) -> Result<Vec<u8
     obj_above(grid, 0.0, decimation)
 }
 
-/// Wavefront, in the DEM's own coordinates, with heights above `zero_m`: single precision then counts the relief, not the height
-/// above the sea.
+/// Wavefront, in the DEM's own coordinates, with heights above `zero_m`, so that single precision resolves the relief rather than the
+/// elevation above sea level.
 pub(super) fn obj_above(grid: &Grid, zero_m: f64, decimation: Option<&Decimation>) -> Result<Vec<u8>, Refusal> {
     let mesh = Mesh::of(grid, [0.0, 0.0, zero_m], decimation)?;
     let mut text = String::from("# terrain mesh; x east, y north, z up, metres\n");
@@ -240,7 +240,7 @@ pub(super) fn glb(grid: &Grid, decimation: Option<&Decimation>) -> Result<Vec<u8
         scene["meshes"][0]["extras"] = decimation.to_json();
     }
     let mut text = scene.to_string();
-    // Chunks fill multiples of 4 bytes; that of the numbers does by itself.
+    // Chunks are padded to multiples of 4 bytes; the binary chunk always is one.
     text.push_str(&" ".repeat(text.len().next_multiple_of(4) - text.len()));
     let total = 12 + 8 + text.len() + 8 + vertex_bytes + index_bytes;
     let mut bytes = Vec::with_capacity(total);
@@ -255,7 +255,7 @@ pub(super) fn glb(grid: &Grid, decimation: Option<&Decimation>) -> Result<Vec<u8
     Ok(bytes)
 }
 
-/// OpenUSD: metres, z up, a collision mesh of its own triangles (no convex hull).
+/// OpenUSD: metres, z up, colliding by its own triangles (not a convex hull).
 pub(super) fn usda(grid: &Grid, decimation: Option<&Decimation>) -> Result<Vec<u8>, Refusal> {
     let mesh = Mesh::local(grid, decimation)?;
     let points = || mesh.vertices().map(|point| point.map(|v| v as f32));
@@ -282,20 +282,20 @@ pub(super) fn usda(grid: &Grid, decimation: Option<&Decimation>) -> Result<Vec<u
     Ok(text.into_bytes())
 }
 
-/// A decimation as a sentence, after those on what was lost.
+/// Appends a note on the decimation, if any.
 pub(super) fn with_decimation(mut notes: Vec<String>, decimation: Option<&Decimation>) -> Vec<String> {
     notes.extend(decimation.map(Decimation::sentence));
     notes
 }
 
-/// Sentences on what the formats of single precision lose, whose coordinates must stay small.
+/// Notes on what single-precision formats lose, whose coordinates must stay small.
 pub(super) fn local_notes(grid: &Grid, crs: &Crs) -> Vec<String> {
     let [x, y] = grid.geometry.origin;
-    let shift = format!("x and y of the mesh count from the DEM's south-west corner, ({x}, {y})");
+    let shift = format!("x and y of the mesh are relative to the DEM's south-west corner, ({x}, {y})");
     crs.loss_notes().into_iter().chain(([x, y] != [0.0; 2]).then_some(shift)).collect()
 }
 
-/// Values with commas between them.
+/// Appends values separated by commas.
 fn listed<T: std::fmt::Display>(text: &mut String, values: impl Iterator<Item = T>) {
     for (k, value) in values.enumerate() {
         // Writing to a string cannot fail.

@@ -1,12 +1,11 @@
-//! Elevation rasters of many formats, and point clouds gridded to one ([`points`]), read to one form and written
-//! from it.
+//! Elevation rasters of many formats, and gridded point clouds ([`points`]), read into and written from one common form.
 //!
-//! Heights are metres as the file states them; `NaN` stands for no data. Cells follow the grid convention of
-//! `sastrugi-numeric`: a PixelIsPoint raster is shifted by half a cell so that its posts become cell centres. What is
-//! read equals what GDAL reads, value for value.
+//! Heights are the file's own values, in metres; `NaN` means no data. Cells follow the grid convention of
+//! `sastrugi-numeric`: a PixelIsPoint raster is shifted by half a cell so that its posts become cell centres. Values are
+//! identical to those that GDAL reads.
 //!
-//! Every size a file claims is checked against [`MAX_CELLS`] and against the bytes that are there before memory is
-//! asked for.
+//! Before memory is allocated, every size that a file claims is checked against [`MAX_CELLS`] and against the bytes actually
+//! present.
 
 mod ascii;
 mod band;
@@ -50,19 +49,31 @@ use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
-/// Number of the first bytes of a file, which tell what is not read whole.
+/// Number of leading bytes read to recognise a format before the rest of the file.
 const FIRST_BYTES: u64 = 4;
 
 /// Reads a raster.
 ///
 /// # Errors
-/// See [`DemError`]: a missing file, one that is no single-band raster of heights, one without any data, or one whose
-/// cells are rotated.
+/// See [`DemError`]: a file that is missing, is not a single-band raster of heights, has no data, or has rotated cells.
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("a.asc");
+/// std::fs::write(&path, "ncols 2\nnrows 1\nxllcorner 10\nyllcorner 20\ncellsize 0.5\nNODATA_value -1\n7.5 -1\n")?;
+/// let dem = sastrugi_store::dem::read(&path)?;
+/// assert_eq!((dem.grid.geometry.origin, dem.grid.geometry.cell), ([10.0, 20.0], [0.5, 0.5]));
+/// assert!(dem.grid.values[0] == 7.5 && dem.grid.values[1].is_nan());
+/// # Ok(())
+/// # }
+/// ```
 pub fn read(path: &Path) -> Result<Dem, DemError> {
     read_with(path, &ReadOptions::default())
 }
 
-/// Reads a raster with what the caller knows about it. A point cloud becomes the mean of each cell, without filling.
+/// Reads a raster with options. A point cloud is gridded to the mean of each cell, without filling.
 ///
 /// # Errors
 /// As [`read`].
@@ -70,11 +81,11 @@ pub fn read_with(path: &Path, options: &ReadOptions) -> Result<Dem, DemError> {
     read_gridded(path, options, &GridSettings::default())
 }
 
-/// As [`read_with`], with the settings by which a point cloud is gridded. The cell size of a cloud is that of the settings,
-/// or else that of the options.
+/// As [`read_with`], with settings for gridding a point cloud. The cell size of a cloud is that of the settings, or else that of
+/// the options.
 ///
 /// # Errors
-/// As [`read`]; also [`DemError::Unfit`] when a setting is out of range, or the file is a raster, which takes none.
+/// As [`read`]; also [`DemError::Unfit`] if a setting is out of range, or is given for a raster.
 pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings) -> Result<Dem, DemError> {
     let reading = |e| DemError::reading(path, e);
     let (mut file, mut bytes) = opened(path).map_err(reading)?;
@@ -83,7 +94,7 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
         return grid(path, file, options, settings);
     }
     if (GridSettings { cell_m: None, ..*settings }) != GridSettings::default() {
-        let reason = "is no point cloud; statistic, filling and ground points are for .las and .laz";
+        let reason = "is not a point cloud; statistic, filling and ground-only apply to .las and .laz";
         return Err(Refusal::new(reason).unfit(path));
     }
     let dem = match codec.and_then(|codec| codec.stream) {
@@ -96,7 +107,7 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
     checked(dem).map_err(|refusal| refusal.about(path))
 }
 
-/// A file behind its first bytes, and these.
+/// Opens a file and returns it, positioned after its first bytes, with those bytes.
 fn opened(path: &Path) -> io::Result<(File, Vec<u8>)> {
     let mut file = crate::file::open(path)?;
     let mut first = Vec::new();
@@ -110,14 +121,35 @@ fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refu
     }
     match formats::of_raster(path, &bytes).and_then(|codec| codec.parse) {
         Some(parse) => parse(path, bytes, options),
-        None => Err(Refusal::new(format!("is no raster that can be read; {READ_FORMATS} can"))),
+        None => Err(Refusal::new(format!("is not a supported raster; supported are {READ_FORMATS}"))),
     }
 }
 
 /// Opens a raster for reading rows.
 ///
 /// # Errors
-/// As [`read`]; what is wrong with the cells themselves is found when they are read.
+/// As [`read`]; errors in the cells themselves are found when they are read.
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_store::dem::{self, Crs, ReadOptions, WriteOptions};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("a.tif");
+/// let grid = Grid::new(Geometry::square(600, 2, 1.0), (0..1200).map(f64::from).collect());
+/// dem::write(&path, &grid, &Crs::default(), &WriteOptions::default())?;
+/// let mut reader = dem::open(&path, &ReadOptions::default())?;
+/// let (rows, block) = (reader.geometry().rows, reader.block_rows());
+/// let mut sum = 0.0;
+/// for first in (0..rows).step_by(block) {
+///     sum += reader.read_rows(first..rows.min(first + block))?.values.iter().sum::<f64>();
+/// }
+/// assert_eq!((block, sum), (256, 1199.0 * 600.0));
+/// # Ok(())
+/// # }
+/// ```
 pub fn open(path: &Path, options: &ReadOptions) -> Result<BlockReader, DemError> {
     let (_, first) = opened(path).map_err(|e| DemError::reading(path, e))?;
     match formats::of_raster(path, &first).and_then(|codec| codec.open) {
@@ -126,19 +158,19 @@ pub fn open(path: &Path, options: &ReadOptions) -> Result<BlockReader, DemError>
     }
 }
 
-/// What a file claims of its size and place; `None` for files whose header cannot be read.
+/// Size and position according to the header; `None` if the header cannot be read.
 pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     let (file, first) = opened(path).ok()?;
     let claim = formats::of_header(path, &first)?.claimed?;
     claim(path, file, options).filter(|claimed| claimed.geometry.is_none_or(|g| check_place(&g).is_ok()))
 }
 
-/// Writes heights in the format of the name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),
+/// Writes heights in the format given by the file name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),
 /// `.asc`, `.npy` (float64), `.hgt` (whole metres, 1201 or 3601 posts), `.png` (16 bit, scaled), or `.obj`, `.glb`, `.usda`
-/// (meshes). Returns sentences on what the format lost.
+/// (meshes). Returns notes on what the format loses.
 ///
 /// # Errors
-/// [`DemError::Unfit`] when the format cannot hold the grid, [`DemError::Io`] when the file cannot be written.
+/// [`DemError::Unfit`] if the format cannot represent the grid, [`DemError::Io`] if the file cannot be written.
 pub fn write<'a>(
     target: impl Into<Target<'a>>,
     grid: &Grid,
@@ -151,32 +183,32 @@ pub fn write<'a>(
     Ok(notes)
 }
 
-/// Decimates the mesh of a grid in metres, to be written with [`WriteOptions::decimation`].
+/// Decimates the mesh of a grid in metres, for writing with [`WriteOptions::decimation`].
 ///
 /// # Errors
-/// [`DemError::Unfit`] for a limit out of range or one that the rims of holes exceed, for a grid without three neighbouring cells with
-/// data, and for one that is too large for a mesh.
+/// [`DemError::Unfit`] for a limit that is out of range or that outline and hole rims alone exceed, for a grid without three
+/// neighbouring cells with data, and for a grid that is too large for a mesh.
 pub fn decimate(path: &Path, grid: &Grid, limits: &MeshLimits) -> Result<Decimation, DemError> {
     Decimation::new(grid, limits).map_err(|refusal| refusal.unfit(path))
 }
 
-/// Most memory that [`write()`] takes for a GeoTIFF beside its grid, bytes.
+/// Upper bound on the memory that [`write()`] needs for a GeoTIFF in addition to the grid, bytes.
 pub fn writing_bytes(cells: u64) -> u64 {
     tiff_writer::MEMORY_PER_CELL * cells
 }
 
-/// The bytes that [`write()`] would put into a file of that name, and sentences on what the format lost.
+/// The bytes that [`write()`] would write to a file of that name, and notes on what the format loses.
 ///
 /// # Errors
-/// [`DemError::Unfit`] when the format cannot hold the grid.
+/// [`DemError::Unfit`] if the format cannot represent the grid.
 pub fn encode(name: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<(Vec<u8>, Vec<String>), DemError> {
     render(name, grid, crs, options).map_err(|refusal| refusal.unfit(name))
 }
 
-/// The bytes of a file, and sentences on what the format lost.
+/// The bytes of a file, and notes on what the format loses.
 fn render(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<(Vec<u8>, Vec<String>), Refusal> {
-    let unknown = || Refusal::new(format!("the ending names no DEM format; {WRITTEN_ENDINGS} do"));
+    let unknown = || Refusal::new(format!("the ending names no DEM format; use {WRITTEN_ENDINGS}"));
     let codec = formats::of_name(path).ok_or_else(unknown)?;
-    let render = codec.render.ok_or_else(|| Refusal::new("point clouds are read, not written"))?;
+    let render = codec.render.ok_or_else(|| Refusal::new("point clouds can be read but not written"))?;
     render(path, grid, crs, options)
 }

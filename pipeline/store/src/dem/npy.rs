@@ -1,4 +1,4 @@
-//! NumPy arrays, versions 1 to 3 (Kern, NumPy Enhancement Proposal 1): two dimensions of real numbers, row 0 north.
+//! NumPy arrays, versions 1 to 3 (Kern, NumPy Enhancement Proposal 1): two-dimensional, real, row 0 north.
 
 use super::band::Values;
 use super::checks::{cell_count, unplaced_claim};
@@ -14,8 +14,8 @@ pub(super) fn looks_like(bytes: &[u8]) -> bool {
 
 /// Reads an array.
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal> {
-    let (header, data) = split(bytes).ok_or_else(|| Refusal::new("its NumPy header breaks off"))?;
-    let field = |name| field(header, name).ok_or_else(|| Refusal::new(format!("its NumPy header lacks {name}")));
+    let (header, data) = split(bytes).ok_or_else(|| Refusal::new("its NumPy header is truncated or invalid"))?;
+    let field = |name| field(header, name).ok_or_else(|| Refusal::new(format!("its NumPy header has no {name}")));
     let descr = field("descr")?.trim_matches(['\'', '"']);
     let (element, big_endian) = element(descr)?;
     let (rows, cols) = shape(field("shape")?)?;
@@ -27,7 +27,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
     let cells = cell_count(rows, cols)?;
     if data.len() != cells * element.bytes {
         let expected = cells * element.bytes;
-        return Err(Refusal::new(format!("holds {} bytes of data; {rows} x {cols} need {expected}", data.len())));
+        return Err(Refusal::new(format!("holds {} bytes of data; {rows} x {cols} cells need {expected}", data.len())));
     }
     let (rows, cols) = (rows as usize, cols as usize);
     let stored: Vec<f64> = data.chunks_exact(element.bytes).map(|v| (element.decode)(v, big_endian)).collect();
@@ -47,10 +47,10 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
     Ok(Dem { grid: Grid::new(geometry, values), info })
 }
 
-/// Most bytes of a header that are looked at for what it claims; NumPy's own have 128.
+/// Most bytes read for a header; NumPy's own headers have 128.
 const HEADER_BYTES_MAX: u64 = 1 << 16;
 
-/// What the header says.
+/// Size according to the header.
 pub(super) fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     let head = crate::file::head(path, HEADER_BYTES_MAX).ok()?;
     let (header, _) = split(&head)?;
@@ -71,7 +71,7 @@ fn split(bytes: &[u8]) -> Option<(&str, &[u8])> {
     Some((std::str::from_utf8(bytes.get(start..end)?).ok()?, bytes.get(end..)?))
 }
 
-/// Text of a field of the header, which is a Python literal written by a machine.
+/// Text of a field of the header, which is a machine-written Python literal.
 fn field<'a>(header: &'a str, name: &str) -> Option<&'a str> {
     let at = [format!("'{name}':"), format!("\"{name}\":")].iter().find_map(|k| Some(header.find(k)? + k.len()))?;
     let rest = header.get(at..)?.trim_start();
@@ -84,7 +84,7 @@ fn shape(text: &str) -> Result<(u64, u64), Refusal> {
     let parsed: Option<Vec<u64>> = sizes.iter().map(|s| s.parse().ok()).collect();
     match parsed.as_deref() {
         Some(&[rows, cols]) => Ok((rows, cols)),
-        _ => Err(Refusal::new(format!("is an array of shape {text}; heights have two dimensions"))),
+        _ => Err(Refusal::new(format!("is an array of shape {text}; heights must have two dimensions"))),
     }
 }
 
@@ -121,7 +121,7 @@ fn element(descr: &str) -> Result<(Element, bool), Refusal> {
         "u4" => element!(u32, "uint32"),
         "i8" => element!(i64, "int64"),
         "u8" => element!(u64, "uint64"),
-        _ => return Err(Refusal::new(format!("holds elements of type {descr}; heights are real numbers"))),
+        _ => return Err(Refusal::new(format!("holds elements of type {descr}; heights must be real numbers"))),
     };
     Ok((element, descr.starts_with('>')))
 }
@@ -130,11 +130,11 @@ fn transposed(columns: &[f64], rows: usize, cols: usize) -> Vec<f64> {
     (0..rows).flat_map(|r| (0..cols).map(move |c| columns[c * rows + r])).collect()
 }
 
-/// The heights as a float64 array, `NaN` without data, and a sentence on what is lost.
+/// The heights as a float64 array, `NaN` for no data, and a note on what is lost.
 pub(super) fn render(grid: &Grid) -> (Vec<u8>, Vec<String>) {
     let shape = format!("({}, {})", grid.rows(), grid.cols());
     let dictionary = format!("{{'descr': '<f8', 'fortran_order': False, 'shape': {shape}, }}");
-    // Magic, version and length take 10 bytes; header and all fill a multiple of 64 and end in a line feed.
+    // Magic, version and length take 10 bytes; with the header they fill a multiple of 64 bytes and end in a line feed.
     let padding = 63 - (10 + dictionary.len()) % 64;
     let header = format!("{dictionary}{}\n", " ".repeat(padding));
     let mut bytes = Vec::with_capacity(10 + header.len() + grid.values.len() * 8);
@@ -142,5 +142,5 @@ pub(super) fn render(grid: &Grid) -> (Vec<u8>, Vec<String>) {
     bytes.extend((header.len() as u16).to_le_bytes());
     bytes.extend(header.as_bytes());
     bytes.extend(grid.values.iter().flat_map(|v| v.to_le_bytes()));
-    (bytes, vec!["a .npy file keeps no cell size, place or CRS".to_owned()])
+    (bytes, vec!["a .npy file does not store cell size, position or CRS".to_owned()])
 }

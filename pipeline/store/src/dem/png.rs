@@ -9,7 +9,7 @@ use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::io::{Cursor, Read};
 
-/// Keyword of the text that tells how to turn levels into heights.
+/// Keyword of the text chunk with the scale from levels to heights.
 const KEYWORD: &str = "sastrugi.height";
 
 /// How levels of a 16-bit PNG become heights: `offset_m + step_m * level`; level 0 is no data.
@@ -37,7 +37,7 @@ impl HeightScale {
         if level == 0.0 { f64::NAN } else { self.offset_m + self.step_m * level }
     }
 
-    /// The scale of some values as a sentence.
+    /// The scale as a sentence.
     pub fn sentence(self, values: &Values) -> String {
         let what = if *values == Values::Heights { "heights" } else { "values" };
         let unit = values.unit().filter(|unit| *unit != "1").map_or_else(String::new, |unit| format!(" {unit}"));
@@ -56,8 +56,8 @@ pub(super) fn looks_like(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x89PNG")
 }
 
-/// What the header says, from after the first four bytes of the file: the rest of the signature, the length and the name of
-/// the first chunk, width, height.
+/// Size according to the header. `file` is positioned after the first four bytes; then follow the rest of the signature, length
+/// and name of the first chunk, width and height.
 pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> {
     let mut header = [0; 20];
     file.read_exact(&mut header).ok()?;
@@ -68,7 +68,7 @@ pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> 
     Some(Claimed { geometry: unplaced_claim(rows, cols, options), ..size })
 }
 
-/// Writes levels as they are.
+/// Writes levels unscaled.
 ///
 /// # Errors
 /// The grid is too large for a PNG, or the file cannot be written.
@@ -77,13 +77,13 @@ pub fn write_png16<'a>(target: impl Into<Target<'a>>, grid: &Grid<u16>) -> Resul
     save(target, &levels(grid).map_err(|refusal| refusal.unfit(target.path))?)
 }
 
-/// The bytes of levels as they are.
+/// The bytes of unscaled levels.
 pub(super) fn levels(grid: &Grid<u16>) -> Result<Vec<u8>, Refusal> {
     encode(grid, None)
 }
 
-/// Writes heights as levels from the lowest (1) to the highest (65535) and returns the scale, which is also in the
-/// file's text.
+/// Writes heights as levels from the lowest (1) to the highest (65535), and returns the scale, which is also stored in a text
+/// chunk of the file.
 ///
 /// # Errors
 /// As [`write_png16`].
@@ -94,7 +94,7 @@ pub fn write_png_heights<'a>(target: impl Into<Target<'a>>, grid: &Grid) -> Resu
     Ok(scale)
 }
 
-/// The bytes of values as levels, and the sentence on their scale.
+/// The bytes of values as levels, and a note on their scale.
 pub(super) fn render(grid: &Grid, values: &Values) -> Result<(Vec<u8>, Vec<String>), Refusal> {
     scaled(grid).map(|(bytes, scale)| (bytes, vec![scale.sentence(values)]))
 }
@@ -106,7 +106,7 @@ fn scaled(grid: &Grid) -> Result<(Vec<u8>, HeightScale), Refusal> {
 
 fn encode(grid: &Grid<u16>, scale: Option<HeightScale>) -> Result<Vec<u8>, Refusal> {
     let side =
-        |n: usize| u32::try_from(n).map_err(|_| Refusal::new(format!("{n} pixels a side are too many for a PNG")));
+        |n: usize| u32::try_from(n).map_err(|_| Refusal::new(format!("{n} pixels per side are too many for a PNG")));
     let mut bytes = Vec::new();
     let mut encoder = png::Encoder::new(&mut bytes, side(grid.cols())?, side(grid.rows())?);
     encoder.set_color(png::ColorType::Grayscale);
@@ -123,11 +123,11 @@ fn encode(grid: &Grid<u16>, scale: Option<HeightScale>) -> Result<Vec<u8>, Refus
     Ok(bytes)
 }
 
-/// Reads a greyscale PNG: heights where the text gives a scale, levels otherwise.
+/// Reads a greyscale PNG: heights if a text chunk gives the scale, levels otherwise.
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal> {
-    let refused = |e: png::DecodingError| Refusal::new(format!("is no PNG that can be read: {e}"));
+    let refused = |e: png::DecodingError| Refusal::new(format!("is not a readable PNG: {e}"));
     let mut strict = png::DecodeOptions::default();
-    // A text that is damaged is not left out: it may hold the scale of the heights.
+    // A damaged text chunk must not be skipped: it may hold the scale of the heights.
     strict.set_skip_ancillary_crc_failures(false);
     let mut reader = png::Decoder::new_with_options(Cursor::new(bytes), strict).read_info().map_err(refused)?;
     let info = reader.info();
@@ -136,17 +136,17 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
         (png::ColorType::Grayscale, png::BitDepth::Sixteen) => true,
         (png::ColorType::Grayscale, png::BitDepth::Eight) => false,
         (colour, depth) => {
-            return Err(Refusal::new(format!("is a PNG of {colour:?} {depth:?}; heights are 8- or 16-bit grey")));
+            return Err(Refusal::new(format!("is a {colour:?} {depth:?} PNG; heights must be 8- or 16-bit greyscale")));
         }
     };
     let scale = info.uncompressed_latin1_text.iter().find(|t| t.keyword == KEYWORD).map(|t| {
         let wrong =
-            || format!("its text `{KEYWORD}` is {:?}; it must be an offset and a step above 0, both in metres", t.text);
+            || format!("text `{KEYWORD}` must be an offset and a step above 0, both in metres, got {:?}", t.text);
         HeightScale::parse(&t.text).ok_or_else(|| Refusal::new(wrong()))
     });
     let scale = scale.transpose()?;
     let cells = cell_count(rows, cols)?;
-    // Deflate stores at best 1032 bytes in one.
+    // Deflate compresses by a factor of at most 1032.
     if cells as u64 > (bytes.len() as u64).saturating_mul(1032) {
         return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
     }
@@ -160,7 +160,7 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
     };
     let mut notes = vec![];
     if scale.is_none() {
-        notes.push("the PNG states no height scale; levels are taken as metres".to_owned());
+        notes.push("the PNG has no height scale; levels are treated as metres".to_owned());
     }
     let values = levels.into_iter().map(|level| scale.map_or(level, |s| s.height(level))).collect();
     let geometry = unplaced(rows as usize, cols as usize, options, &mut notes);
@@ -182,7 +182,7 @@ mod tests {
     use super::*;
     use sastrugi_numeric::Geometry;
 
-    /// A text that is damaged anywhere is refused: without it levels would pass for metres.
+    /// A text chunk damaged anywhere is refused: without it, levels would be read as metres.
     #[test]
     fn val_damaged_scales_are_refused() {
         let g = Geometry::square(8, 9, 1.0);
@@ -202,7 +202,7 @@ mod tests {
     }
 
     #[test]
-    fn val_scales_that_are_none_are_refused() {
+    fn val_invalid_scales_are_refused() {
         for text in ["1.0", "1.0 zero", "1.0 0", "1.0 -2", "inf 1.0", "1.0 1.0 1.0"] {
             assert_eq!(HeightScale::parse(text), None, "{text}");
         }

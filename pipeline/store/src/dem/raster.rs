@@ -1,4 +1,4 @@
-//! A raster of heights: what all formats read to and write from, and why one does not.
+//! The common form of a raster of heights, with its options and errors.
 
 use super::band::Values;
 use super::crs::Crs;
@@ -10,40 +10,40 @@ use std::path::{Path, PathBuf};
 
 /// Most cells of a raster: 2 GiB of heights in memory.
 pub const MAX_CELLS: u64 = 1 << 28;
-/// Heights without data in the formats that need a number for it.
+/// Value for no data in formats that need a number.
 pub const NO_DATA: f64 = -9999.0;
 
 /// A raster that was read.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Dem {
-    /// Heights, m; `NaN` without data.
+    /// Heights, m; `NaN` means no data.
     pub grid: Grid,
-    /// What the file says about them.
+    /// Metadata of the file.
     pub info: DemInfo,
 }
 
-/// What a raster file says beside its heights.
+/// Metadata of a raster file.
 #[derive(Clone, Debug, PartialEq)]
 pub struct DemInfo {
     /// File format.
     pub format: Format,
     /// Type of the stored values, as rasterio and numpy name it: `float32`, `int16` ...
     pub dtype: &'static str,
-    /// Value that stands for no data, when the file names one.
+    /// Value for no data, if the file defines one.
     pub nodata: Option<f64>,
     /// Coordinate reference system.
     pub crs: Crs,
-    /// What the values are, as the file says.
+    /// Kind of values, as stated in the file.
     pub values: Values,
-    /// True when the file says where the raster lies; the south-western corner of others is (0, 0).
+    /// True if the file is georeferenced; otherwise the south-western corner is (0, 0).
     pub placed: bool,
-    /// True when the file places its values at points (and the grid was shifted by half a cell to centre them).
+    /// True if the values of the file are at points; the grid is then shifted by half a cell to centre them.
     pub pixel_is_point: bool,
-    /// Sentences a user must know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
-/// Raster formats; `formats.rs` says what each can do.
+/// Raster formats; `formats.rs` lists the capabilities of each.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
     /// TIFF with or without GeoTIFF tags.
@@ -66,16 +66,16 @@ pub enum Format {
     Las,
 }
 
-/// Why a raster was not read or written.
+/// Failure to read or write a raster.
 #[derive(Debug, thiserror::Error)]
 pub enum DemError {
-    /// There is no such file.
+    /// The file does not exist.
     #[error("{}: no such file", path.display())]
     Missing {
         /// The file.
         path: PathBuf,
     },
-    /// The file is not a raster of heights, or not a whole one.
+    /// The file is not a complete raster of heights.
     #[error("{}: {reason}", path.display())]
     Unusable {
         /// The file.
@@ -86,7 +86,7 @@ pub enum DemError {
     /// The grid does not fit the format, or a setting is out of range.
     #[error("{}: {reason}", path.display())]
     Unfit {
-        /// The file that was asked for.
+        /// The requested file.
         path: PathBuf,
         /// What does not fit.
         reason: String,
@@ -102,7 +102,7 @@ pub enum DemError {
 }
 
 impl DemError {
-    /// True when the data that was given is the cause (missing or unusable), not the file system.
+    /// True if the cause is the given data (missing or unusable), not the file system.
     pub fn unusable_input(&self) -> bool {
         matches!(self, Self::Missing { .. } | Self::Unusable { .. })
     }
@@ -117,7 +117,7 @@ impl DemError {
     }
 }
 
-/// Why bytes are no usable raster.
+/// Reason why input or a request is unusable.
 #[derive(Debug, thiserror::Error)]
 #[error("{0}")]
 pub(crate) struct Refusal(String);
@@ -127,42 +127,43 @@ impl Refusal {
         Self(reason.into())
     }
 
-    /// The file is at fault.
+    /// Error that blames the file.
     pub(crate) fn about(self, path: &Path) -> DemError {
         DemError::Unusable { path: path.to_owned(), reason: self.0 }
     }
 
-    /// What was asked for is at fault.
+    /// Error that blames the request.
     pub(crate) fn unfit(self, path: &Path) -> DemError {
         DemError::Unfit { path: path.to_owned(), reason: self.0 }
     }
 }
 
-/// What a caller knows about a file that the file does not say.
+/// Information that the file itself does not contain.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct ReadOptions {
-    /// Cell size east-west and north-south, m, for formats that carry none (.npy, .png, TIFF without GeoTIFF tags), and
-    /// the size of the square cells of a gridded point cloud.
+    /// Cell size east-west and north-south, m, for formats without one (.npy, .png, TIFF without GeoTIFF tags), and the size
+    /// of the square cells of a gridded point cloud.
     pub cell_m: Option<[f64; 2]>,
 }
 
-/// What the header of a raster or a point cloud says of its size, nothing decoded.
+/// Size of a raster or point cloud according to its header, before decoding.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Claimed {
     /// Number of cells.
     pub cells: u64,
     /// Number of points; 0 for a raster.
     pub points: u64,
-    /// Smaller side of a cell, m, where the header or the caller says.
+    /// Smaller side of a cell, m, if known from the header or the caller.
     pub cell_m: Option<f64>,
-    /// Shape and place of a raster, in its own units, where the header or the caller says: those that reading it gives.
+    /// Shape and position of a raster, in its own units, if known from the header or the caller; identical to those obtained by
+    /// reading it.
     pub geometry: Option<Geometry>,
-    /// True when coordinates are degrees.
+    /// True if coordinates are in degrees.
     pub geographic: bool,
 }
 
 impl Claimed {
-    /// A raster whose header says where it lies.
+    /// A raster with a georeferenced header.
     pub(super) fn raster(geometry: Geometry, geographic: bool) -> Self {
         let cell_m = (!geographic).then(|| geometry.cell[0].min(geometry.cell[1]));
         Self { cells: geometry.len() as u64, points: 0, cell_m, geometry: Some(geometry), geographic }
@@ -177,7 +178,7 @@ impl Claimed {
 /// Compression of a written GeoTIFF.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Compression {
-    /// As they are.
+    /// Uncompressed.
     None,
     /// Deflate with predictor.
     #[default]
@@ -189,26 +190,26 @@ pub enum Compression {
 /// How a raster is written.
 #[derive(Clone, Debug, Default)]
 pub struct WriteOptions {
-    /// Compression of a GeoTIFF; other formats have one way.
+    /// Compression of a GeoTIFF; ignored for other formats.
     pub compression: Compression,
-    /// A GeoTIFF with overviews, laid out so that a part can be read over a network (COG).
+    /// Cloud-optimised GeoTIFF (COG): with overviews, laid out so that parts can be read over a network.
     pub cloud_optimised: bool,
-    /// What its values are.
+    /// Kind of values.
     pub values: Values,
-    /// A decimation of the grid that is written, for meshes ([`super::decimate`]).
+    /// For meshes, the decimation of the grid ([`super::decimate`]).
     pub decimation: Option<Decimation>,
 }
 
-/// Geometry of a raster that does not say where it lies, with a note where nobody knows the size of its cells.
+/// Geometry of a raster without georeferencing, with a note if its cell size is unknown.
 pub(super) fn unplaced(rows: usize, cols: usize, options: &ReadOptions, notes: &mut Vec<String>) -> Geometry {
     let cell = options.cell_m.unwrap_or_else(|| {
-        notes.push("the file states no cell size; 1 m is assumed".to_owned());
+        notes.push("the file has no cell size; 1 m is assumed".to_owned());
         [1.0; 2]
     });
     Geometry { rows, cols, cell, origin: [0.0; 2] }
 }
 
-/// Writes the whole of a file.
+/// Writes a complete file.
 pub(super) fn save(target: Target<'_>, bytes: &[u8]) -> Result<(), DemError> {
     atomic::write(target, bytes).map_err(|source| DemError::Io { path: target.path.to_owned(), source })
 }

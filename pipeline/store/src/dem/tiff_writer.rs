@@ -1,12 +1,13 @@
-//! GeoTIFF as releases hold it: one band, little-endian, tiles of 256 x 256, directory first, PixelIsArea.
+//! GeoTIFF writer for releases: one band, little-endian, tiles of 256 x 256, directory first, PixelIsArea.
 //!
-//! A cloud-optimised one holds overviews as well, each cell the mean of up to 2 x 2 finite ones of the level before (of
-//! codes one of them), down to one tile: directories first, from the largest level to the smallest, then tiles, those of the smallest level first.
+//! A cloud-optimised file also contains overviews down to one tile; each cell is the mean of up to 2 x 2 finite cells of the
+//! level before (for codes, one of them). Directories come first, from the largest level to the smallest; then the tiles,
+//! smallest level first.
 //!
-//! A writer of our own, because what is needed is small and its bytes must follow from the grid alone: no clock, no
-//! host, no CPU. Deflate runs in `flate2`; whichever pure-Rust backend it is built with chooses its output without
-//! regard to the CPU (vector code there compares and sums, with the same result), and a golden hash in the tests holds
-//! the bytes. Predictor 3 is that of Adobe Photoshop TIFF Technical Note 3 (2005).
+//! The writer is our own because the need is small and the bytes must depend on the grid alone, not on clock, host or CPU.
+//! Deflate runs in `flate2`; the output of its pure-Rust backends does not depend on the CPU (their vector code only compares
+//! and sums, with the same result), and a golden hash in the tests pins the bytes. Predictor 3 is that of Adobe Photoshop TIFF
+//! Technical Note 3 (2005).
 
 use super::band::{self, Values};
 use super::checks::{check_single_precision, free_of_no_data_value};
@@ -21,18 +22,18 @@ use std::io::Write;
 const TILE: usize = 256;
 /// Bytes before the first directory.
 const HEADER: usize = 8;
-/// What an image of the file is: the raster itself, or one of its overviews.
+/// Tag for the kind of an image: the full raster, or one of its overviews.
 const SUBFILE: u16 = 254;
-const WHOLE: u32 = 0;
+const FULL: u32 = 0;
 const REDUCED: u32 = 1;
-/// Most bytes that writing takes for a cell: it in single precision, and it and its share of the overviews where deflate gains nothing, in tiles
-/// and in the file.
+/// Upper bound on memory per cell while writing, bytes: the cell in single precision; and, if deflate gains nothing, the cell with its
+/// share of the overviews, once in tiles and once in the file.
 pub(super) const MEMORY_PER_CELL: u64 = 16;
-/// Level of deflate: the usual compromise.
+/// Deflate level: the usual compromise.
 const LEVEL: u32 = 6;
 const COMPRESSION_NONE: u16 = 1;
 const COMPRESSION_DEFLATE: u16 = 8;
-/// As GDAL writes it.
+/// As written by GDAL.
 const COMPRESSION_ZSTD: u16 = 50000;
 /// zstd's own default.
 const ZSTD_LEVEL: i32 = 3;
@@ -41,7 +42,7 @@ const PREDICTOR_FLOAT: u16 = 3;
 const SAMPLE_UNSIGNED: u16 = 1;
 const SAMPLE_FLOAT: u16 = 3;
 const RASTER_PIXEL_IS_AREA: u16 = 1;
-/// Heights as float32. Beside the grid it takes [`MEMORY_PER_CELL`] bytes a cell.
+/// Heights as float32. In addition to the grid it needs [`MEMORY_PER_CELL`] bytes per cell.
 pub(super) fn heights(grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<Vec<u8>, Refusal> {
     let compression = options.compression;
     check_single_precision(grid.values.iter().copied())?;
@@ -64,38 +65,38 @@ pub(super) fn heights(grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<
         let tags = [sample_tags(code, predictor, 32, SAMPLE_FLOAT), vec![Tag::long(SUBFILE, &[subfile])]].concat();
         image(tags, level, NO_DATA as f32, encode)
     };
-    let mut whole = image(WHOLE, &level)?;
-    whole.tags.push(Tag::ascii(band::TAG, &options.values.metadata()));
-    whole.tags.extend(georeference(&grid.geometry, crs)?);
-    let mut images = vec![whole];
-    let less = if matches!(options.values, Values::Codes { .. }) { thinned } else { halved };
+    let mut full = image(FULL, &level)?;
+    full.tags.push(Tag::ascii(band::TAG, &options.values.metadata()));
+    full.tags.extend(georeference(&grid.geometry, crs)?);
+    let mut images = vec![full];
+    let reduced = if matches!(options.values, Values::Codes { .. }) { thinned } else { halved };
     while options.cloud_optimised && level.rows().max(level.cols()) > TILE {
-        level = less(&level);
+        level = reduced(&level);
         images.push(image(REDUCED, &level)?);
     }
     assemble(images)
 }
 
-/// Cells of the level after.
+/// Geometry of the next level.
 fn doubled(g: Geometry) -> Geometry {
     Geometry { rows: g.rows.div_ceil(2), cols: g.cols.div_ceil(2), cell: g.cell.map(|c| 2.0 * c), ..g }
 }
 
-/// The level after of codes: the north-western one of 2 x 2.
+/// The next level for codes: the north-western of 2 x 2 cells.
 fn thinned(grid: &Grid<f32>) -> Grid<f32> {
     let geometry = doubled(grid.geometry);
     let code = |at: usize| grid.at(2 * (at / geometry.cols), 2 * (at % geometry.cols));
     Grid::new(geometry, (0..geometry.len()).map(code).collect())
 }
 
-/// The level after: half as many cells, each the mean of the finite ones among 2 x 2.
+/// The next level: half as many rows and columns, each cell the mean of the finite ones among 2 x 2.
 fn halved(grid: &Grid<f32>) -> Grid<f32> {
     let g = grid.geometry;
     let geometry = doubled(g);
     let mean = |at: usize| {
         let (row, col) = (2 * (at / geometry.cols), 2 * (at % geometry.cols));
-        let beside = (row..(row + 2).min(g.rows)).flat_map(|r| (col..(col + 2).min(g.cols)).map(move |c| (r, c)));
-        let finite = beside.map(|(r, c)| f64::from(grid.values[r * g.cols + c])).filter(|v| v.is_finite());
+        let block = (row..(row + 2).min(g.rows)).flat_map(|r| (col..(col + 2).min(g.cols)).map(move |c| (r, c)));
+        let finite = block.map(|(r, c)| f64::from(grid.values[r * g.cols + c])).filter(|v| v.is_finite());
         let (count, sum) = finite.fold((0.0, -0.0), |(count, sum), v| (count + 1.0, sum + v));
         (sum / count) as f32
     };
@@ -105,10 +106,10 @@ fn halved(grid: &Grid<f32>) -> Grid<f32> {
 /// Classes as 8-bit codes.
 pub(super) fn classes(grid: &Grid<u8>, crs: &Crs) -> Result<Vec<u8>, Refusal> {
     let mut tags = sample_tags(COMPRESSION_DEFLATE, PREDICTOR_NONE, 8, SAMPLE_UNSIGNED);
-    tags.push(Tag::long(SUBFILE, &[WHOLE]));
-    let mut whole = image(tags, grid, RoughnessClass::NO_DATA, |tile| deflated(&tile))?;
-    whole.tags.extend(georeference(&grid.geometry, crs)?);
-    assemble(vec![whole])
+    tags.push(Tag::long(SUBFILE, &[FULL]));
+    let mut full = image(tags, grid, RoughnessClass::NO_DATA, |tile| deflated(&tile))?;
+    full.tags.extend(georeference(&grid.geometry, crs)?);
+    assemble(vec![full])
 }
 
 fn sample_tags(compression: u16, predictor: u16, bits: u16, format: u16) -> Vec<Tag> {
@@ -126,7 +127,7 @@ struct Image {
     tiles: Vec<Vec<u8>>,
 }
 
-/// A level from the tags that describe samples, and the samples.
+/// A level, from the tags that describe its samples and the samples themselves.
 fn image<T: Copy + Send + Sync + std::fmt::Display>(
     mut tags: Vec<Tag>,
     grid: &Grid<T>,
@@ -154,7 +155,7 @@ fn to_u32(n: usize) -> Result<u32, Refusal> {
     u32::try_from(n).map_err(|_| Refusal::new("the raster does not fit in a TIFF of 4 GiB"))
 }
 
-/// Tile `(down, across)`, filled up with no data.
+/// Tile `(down, across)`, padded with no data.
 fn cut<T: Copy>(grid: &Grid<T>, down: usize, across: usize, no_data: T) -> Vec<T> {
     let mut tile = vec![no_data; TILE * TILE];
     let (row0, col0) = (down * TILE, across * TILE);
@@ -186,12 +187,12 @@ fn deflated(bytes: &[u8]) -> Result<Vec<u8>, Refusal> {
     written.map_err(|e| Refusal::new(format!("deflate failed: {e}")))
 }
 
-/// One frame, one thread: the same bytes everywhere.
+/// A single frame from a single thread, for identical bytes everywhere.
 fn zstandard(bytes: &[u8]) -> Result<Vec<u8>, Refusal> {
     zstd::bulk::compress(bytes, ZSTD_LEVEL).map_err(|e| Refusal::new(format!("zstd failed: {e}")))
 }
 
-/// Place and coordinates of the whole level.
+/// Position and reference system of the full level.
 fn georeference(g: &Geometry, crs: &Crs) -> Result<Vec<Tag>, Refusal> {
     Ok(place_tags(g).into_iter().chain(key_tags(crs)?).collect())
 }
@@ -201,7 +202,7 @@ fn place_tags(g: &Geometry) -> [Tag; 2] {
     [Tag::double(33550, &[g.cell[0], g.cell[1], 0.0]), Tag::double(33922, &[0.0, 0.0, 0.0, g.origin[0], north, 0.0])]
 }
 
-/// The key directory with its two stores of values; none for a local plane (PixelIsArea is what its absence means).
+/// The key directory with its two value stores; none for a local plane (without it, PixelIsArea is implied).
 fn key_tags(crs: &Crs) -> Result<Vec<Tag>, Refusal> {
     if crs.keys.is_empty() {
         return Ok(vec![]);
@@ -239,7 +240,7 @@ fn key_tags(crs: &Crs) -> Result<Vec<Tag>, Refusal> {
     Ok(tags)
 }
 
-/// One entry of the directory.
+/// An entry of the directory.
 #[derive(Clone)]
 struct Tag {
     id: u16,
@@ -263,13 +264,13 @@ impl Tag {
         Self { id, kind: 12, count: values.len(), bytes: values.iter().flat_map(|v| v.to_le_bytes()).collect() }
     }
 
-    /// Bytes outside of the entry, padded to an even number.
+    /// Bytes stored outside the entry, padded to an even number.
     fn outside(&self) -> usize {
         if self.bytes.len() > 4 { self.bytes.len().next_multiple_of(2) } else { 0 }
     }
 }
 
-/// Header; directory and its values, image by image; tiles, those of the last image first.
+/// Writes the header, the directory and values of each image, and the tiles, those of the last image first.
 fn assemble(mut images: Vec<Image>) -> Result<Vec<u8>, Refusal> {
     const OFFSETS: u16 = 324;
     for Image { tags, tiles } in &mut images {
@@ -300,7 +301,7 @@ fn assemble(mut images: Vec<Image>) -> Result<Vec<u8>, Refusal> {
         let next = if number + 1 < images.len() { out.len() + image.directory() } else { 0 };
         image.write_directory(&mut out, next);
     }
-    // Each is forgotten once it is in the file.
+    // Each tile is dropped once it is in the output.
     for tile in images.into_iter().rev().flat_map(|image| image.tiles) {
         out.extend(tile);
         out.resize(out.len().next_multiple_of(2), 0);
@@ -309,17 +310,17 @@ fn assemble(mut images: Vec<Image>) -> Result<Vec<u8>, Refusal> {
 }
 
 impl Image {
-    /// Bytes of the entries, their number and the place of the next directory.
+    /// Bytes of the entries, their count and the offset of the next directory.
     fn entries(&self) -> usize {
         2 + 12 * self.tags.len() + 4
     }
 
-    /// Bytes of the directory with its values.
+    /// Bytes of the directory including its values.
     fn directory(&self) -> usize {
         self.entries() + self.tags.iter().map(Tag::outside).sum::<usize>()
     }
 
-    /// Appends the directory; `next` is the place of the next one, 0 for none.
+    /// Appends the directory; `next` is the offset of the next one, 0 for none.
     fn write_directory(&self, out: &mut Vec<u8>, next: usize) {
         let mut at = out.len() + self.entries();
         out.extend((self.tags.len() as u16).to_le_bytes());

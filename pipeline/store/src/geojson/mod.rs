@@ -1,11 +1,12 @@
-//! GeoJSON in a DEM's own coordinates: polygons in (for masks and obstacles), routes out.
+//! GeoJSON in a DEM's own coordinates: reads polygons (for masks and obstacles), writes routes.
 //!
-//! RFC 7946 knows longitudes and latitudes on WGS 84 only. Files here hold the DEM's x and y, as those of its predecessor (GeoJSON 1.0,
-//! 2008) may; what is written names the coordinate reference system the same way (`crs`), which GDAL and QGIS read.
+//! RFC 7946 only allows longitudes and latitudes on WGS 84. Files here hold the DEM's x and y, as its predecessor (GeoJSON 1.0,
+//! 2008) allows. Written files name the coordinate reference system as that version does (`crs`), which GDAL and QGIS read.
 
+#[cfg(test)]
+pub(crate) mod documents;
 pub(crate) mod polygons;
 mod routes;
-
 #[cfg(test)]
 mod tests;
 
@@ -14,10 +15,10 @@ pub use routes::{Route, write_routes};
 use std::io;
 use std::path::PathBuf;
 
-/// Why GeoJSON was not read or written.
+/// Failure to read or write GeoJSON.
 #[derive(Debug, thiserror::Error)]
 pub enum GeoJsonError {
-    /// The routes cannot be put into GeoJSON.
+    /// The routes cannot be written as GeoJSON.
     #[error("{reason}")]
     Unfit {
         /// What does not fit.

@@ -1,10 +1,16 @@
 //! Polygons of GeoJSON (RFC 7946: Polygon, MultiPolygon, Feature, FeatureCollection); a third coordinate is dropped.
+//!
+//! RFC 7946 repeats the first position of a ring as the last, which makes at least 4. As in GDAL, a ring that is not closed is also
+//! accepted, and its last position is joined to the first: it needs at least 3 corners.
 
 use serde_json::Value;
 
-/// A ring of positions, closed or not.
+/// Fewest corners of a ring, without the repetition of the first.
+const CORNERS_MIN: usize = 3;
+
+/// A ring of at least 3 corners; the first may be repeated as the last.
 pub type Ring = Vec<[f64; 2]>;
-/// Rings that take part in the even-odd rule together.
+/// Rings to which the even-odd rule applies together.
 pub type Polygon = Vec<Ring>;
 
 /// Reads every polygon of a GeoJSON text.
@@ -14,13 +20,13 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<Polygon>, String> {
     let mut polygons = vec![];
     object(&root, &mut polygons)?;
     if polygons.is_empty() {
-        return Err("holds no polygon".to_owned());
+        return Err("contains no polygons".to_owned());
     }
     Ok(polygons)
 }
 
 fn object(value: &Value, polygons: &mut Vec<Polygon>) -> Result<(), String> {
-    let kind = value.get("type").and_then(Value::as_str).ok_or("is not GeoJSON: an object lacks its \"type\"")?;
+    let kind = value.get("type").and_then(Value::as_str).ok_or("is not GeoJSON: an object has no \"type\"")?;
     match kind {
         "FeatureCollection" => list(value, "features")?.iter().try_for_each(|feature| object(feature, polygons)),
         "Feature" => match value.get("geometry") {
@@ -32,10 +38,10 @@ fn object(value: &Value, polygons: &mut Vec<Polygon>) -> Result<(), String> {
             Ok(())
         }
         "MultiPolygon" => list(value, "coordinates")?.iter().try_for_each(|polygon| {
-            polygons.push(rings(polygon.as_array().ok_or("a polygon of its MultiPolygon is not a list of rings")?)?);
+            polygons.push(rings(polygon.as_array().ok_or("a polygon of a MultiPolygon is not a list of rings")?)?);
             Ok(())
         }),
-        other => Err(format!("holds a {other}; only Polygon and MultiPolygon are read")),
+        other => Err(format!("contains a {other}; only Polygon and MultiPolygon are supported")),
     }
 }
 
@@ -57,10 +63,11 @@ fn ring(value: &Value) -> Result<Ring, String> {
     };
     let positions: Option<Ring> = value.as_array().and_then(|all| all.iter().map(position).collect());
     let positions = positions.ok_or("a ring of a polygon is not a list of [x, y] positions")?;
-    if positions.len() < 3 {
+    let closed = positions.len() > 1 && positions.first() == positions.last();
+    let corners = positions.len() - usize::from(closed);
+    if corners < CORNERS_MIN {
         return Err(format!(
-            "a ring of a polygon has {} positions; it needs 4, the first one again as the last",
-            positions.len()
+            "a ring of a polygon has {corners} corners; it needs at least {CORNERS_MIN} (the first may be repeated as the last)"
         ));
     }
     Ok(positions)

@@ -5,26 +5,47 @@ use crate::atomic::{self, Target};
 use crate::dem::Crs;
 use serde_json::{Map, Value, json};
 
-/// What a reader of RFC 7946 must know, as a foreign member of the collection.
-const NOTE: &str = "coordinates are x and y in the DEM's own coordinate reference system and the height in m, not longitude and \
+/// Note for readers that expect RFC 7946, as a foreign member of the collection.
+const NOTE: &str = "coordinates are x and y in the DEM's own coordinate reference system, and height in m; not longitude and \
                     latitude on WGS 84 (RFC 7946)";
-/// WGS 84, whose EPSG name puts the latitude first.
+/// WGS 84, whose EPSG definition puts the latitude first.
 const WGS84: u16 = 4326;
 
-/// A line and what is said of it.
+/// A line with its properties.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Route {
-    /// Positions `[x, y, z]`: x and y in the DEM's own coordinates, z in m; at least 2.
+    /// At least 2 positions `[x, y, z]`: x and y in the DEM's own coordinates, z in m.
     pub positions: Vec<[f64; 3]>,
     /// Properties of the feature.
     pub properties: Map<String, Value>,
 }
 
-/// Writes routes, one feature a line; numbers have the digits that read back as the same 64-bit ones. The member `crs` is there for a
-/// system with an EPSG code.
+/// Writes routes, one feature per line; numbers are the shortest that read back as the same 64-bit numbers. The member `crs` is
+/// written if the system has an EPSG code.
 ///
 /// # Errors
 /// [`GeoJsonError::Unfit`] for a route of fewer than 2 positions, or with a number that is not finite; [`GeoJsonError::Io`].
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_store::dem::Crs;
+/// use sastrugi_store::geojson::{Route, write_routes};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("routes.geojson");
+/// let mut route = Route { positions: vec![[0.5, 1.0, 2.0], [3.0, 4.0, 5.25]], properties: Default::default() };
+/// route.properties.insert("cost".to_owned(), serde_json::json!(12.5));
+/// let crs = Crs { epsg: Some(32633), ..Crs::default() };
+/// write_routes(&path, Some(&crs), &[route])?;
+///
+/// let written: serde_json::Value = serde_json::from_slice(&std::fs::read(&path)?)?;
+/// assert_eq!(written["crs"]["properties"]["name"], "urn:ogc:def:crs:EPSG::32633");
+/// assert_eq!(written["features"][0]["geometry"]["coordinates"][1][2], 5.25);
+/// assert_eq!(written["features"][0]["properties"]["cost"], 12.5);
+/// # Ok(())
+/// # }
+/// ```
 pub fn write_routes<'a>(
     target: impl Into<Target<'a>>,
     crs: Option<&Crs>,
@@ -44,7 +65,7 @@ fn text(crs: Option<&Crs>, routes: &[Route]) -> Result<String, GeoJsonError> {
     Ok(format!("{{\"type\": \"FeatureCollection\",\n{crs}\"note\": {note},\n\"features\": [\n{features}\n]}}\n"))
 }
 
-/// A named system of GeoJSON 1.0, with x before y.
+/// A named system as in GeoJSON 1.0, with x before y.
 fn named(epsg: u16) -> Value {
     let name = match epsg {
         WGS84 => "urn:ogc:def:crs:OGC:1.3:CRS84".to_owned(),
@@ -59,7 +80,7 @@ fn feature(route: &Route, number: usize) -> Result<String, GeoJsonError> {
         return unfit(format!("route {number} needs at least 2 positions, got {}", route.positions.len()));
     }
     if let Some(value) = route.positions.as_flattened().iter().find(|value| !value.is_finite()) {
-        return unfit(format!("route {number} holds {value}; every number must be finite"));
+        return unfit(format!("route {number} contains {value}; every number must be finite"));
     }
     let geometry = json!({ "type": "LineString", "coordinates": route.positions });
     Ok(json!({ "type": "Feature", "properties": route.properties, "geometry": geometry }).to_string())

@@ -1,6 +1,7 @@
 use super::polygons::{inside, oracle};
 use super::*;
 use crate::dem::{Crs, WriteOptions};
+use crate::geojson::documents::documents;
 use crate::geojson::polygons::Polygon;
 use proptest::prelude::*;
 use sha2::{Digest, Sha256};
@@ -26,15 +27,15 @@ fn count(cells: &[bool]) -> usize {
     cells.iter().filter(|kept| **kept).count()
 }
 
-/// A square of whole metres: centres on its western and southern sides are inside, those on the others are not.
+/// A rectangle: centres on its western and southern sides are inside, those on the other sides are not.
 fn square(x0: f64, y0: f64, x1: f64, y1: f64) -> Polygon {
     vec![vec![[x0, y0], [x1, y0], [x1, y1], [x0, y1], [x0, y0]]]
 }
 
 /// A lake with an island and a MultiPolygon that reaches beyond the grid, as `rasterio.features.rasterize` (GDAL) marks
-/// the cells whose centres it finds inside: their number, and the SHA-256 of one byte a cell.
+/// the cells whose centres it finds inside: their number, and the SHA-256 of one byte per cell.
 #[test]
-fn val_an_independent_reader_finds_the_same_cells() {
+fn val_cells_agree_with_an_independent_reader() {
     let expected: serde_json::Value = serde_json::from_str(include_str!("island.json")).unwrap();
     let grid = &expected["grid"];
     let (number, pair) =
@@ -71,7 +72,7 @@ fn val_holes_and_islands_in_holes() {
     let cells = inside(std::slice::from_ref(&island), &g);
     assert_eq!(count(&cells), 81 - 25 + 1);
     assert!(cells[4 * 9 + 4] && !cells[3 * 9 + 4] && cells[9 + 1]);
-    // The direction of a ring says nothing, and a ring need not be closed.
+    // The direction of a ring does not matter, and a ring need not be closed.
     let turned: Polygon = island.iter().map(|ring| ring.iter().rev().skip(1).copied().collect()).collect();
     assert_eq!(inside(&[turned], &g), cells);
     // A polygon in the hole of another is a union, not a difference.
@@ -125,19 +126,22 @@ fn val_every_kind_of_geojson() {
 }
 
 #[test]
-fn val_what_is_no_mask_is_refused() {
+fn val_unusable_masks_are_refused() {
     let g = Geometry::square(4, 4, 1.0);
     let far = polygon_text("[[50, 50], [60, 50], [60, 60], [50, 50]]");
     let all = polygon_text("[[-1, -1], [9, -1], [9, 9], [-1, 9], [-1, -1]]");
     let refused = [
         ("{", "is not GeoJSON"),
-        ("{\"a\": 1}", "lacks its \"type\""),
-        ("{\"type\": \"Topology\"}", "holds a Topology"),
-        ("{\"type\": \"Point\", \"coordinates\": [1, 2]}", "holds a Point; only Polygon and MultiPolygon are read"),
+        ("{\"a\": 1}", "has no \"type\""),
+        ("{\"type\": \"Topology\"}", "contains a Topology"),
+        (
+            "{\"type\": \"Point\", \"coordinates\": [1, 2]}",
+            "contains a Point; only Polygon and MultiPolygon are supported",
+        ),
         ("{\"type\": \"FeatureCollection\"}", "\"features\" is missing"),
-        ("{\"type\": \"FeatureCollection\", \"features\": []}", "holds no polygon"),
+        ("{\"type\": \"FeatureCollection\", \"features\": []}", "contains no polygons"),
         ("{\"type\": \"Polygon\", \"coordinates\": 3}", "\"coordinates\" is missing or not a list"),
-        (&polygon_text("[[0, 0], [1, 1]]"), "has 2 positions"),
+        (&polygon_text("[[0, 0], [1, 1]]"), "has 2 corners"),
         (&polygon_text("[[0, 0], [1, \"a\"], [2, 2]]"), "not a list of [x, y] positions"),
         (&far, "keeps none of the DEM's cells (x 0 to 4, y 0 to 4)"),
     ];
@@ -150,12 +154,12 @@ fn val_what_is_no_mask_is_refused() {
     let missing = read(Path::new("nothing.geojson"), &g).unwrap_err();
     assert!(missing.unusable_input() && missing.to_string().contains("no such file"), "{missing}");
     let text = mask_of("mask.txt", b"keep the west", &g, &MaskOptions::default()).unwrap_err();
-    assert!(text.unusable_input() && text.to_string().contains("no raster"), "{text}");
+    assert!(text.unusable_input() && text.to_string().contains("not a supported raster"), "{text}");
 }
 
-/// A raster with a place: each cell of the DEM asks the cell of the mask under its centre; beyond the mask nothing is kept.
+/// A georeferenced raster: each cell of the DEM takes the mask cell under its centre; beyond the mask nothing is kept.
 #[test]
-fn val_a_placed_raster_is_asked_under_each_centre() {
+fn val_a_georeferenced_raster_is_sampled_at_each_centre() {
     let folder = tempfile::tempdir().unwrap();
     let marks = Geometry { rows: 2, cols: 2, cell: [2.0, 1.5], origin: [101.0, 50.0] };
     let grid = Grid::new(marks, vec![1.0, 0.0, f64::NAN, -3.0]);
@@ -185,7 +189,7 @@ fn val_a_placed_raster_is_asked_under_each_centre() {
 }
 
 #[test]
-fn val_a_raster_without_a_place_is_taken_cell_by_cell() {
+fn val_a_raster_without_georeferencing_is_applied_cell_by_cell() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("mask.npy");
     let marks = Grid::new(Geometry::square(2, 3, 1.0), vec![1.0, 0.0, f64::NAN, 0.0, 2.0, 0.5]);
@@ -193,11 +197,11 @@ fn val_a_raster_without_a_place_is_taken_cell_by_cell() {
     let far = Geometry { rows: 2, cols: 3, cell: [10.0, 20.0], origin: [5e5, 6e6] };
     assert_eq!(read(&path, &far).unwrap(), [true, false, false, false, true, true]);
     let error = read(&path, &Geometry::square(3, 2, 1.0)).unwrap_err();
-    let words = "states no place, so it needs the DEM's 3 x 2 cells; it has 2 x 3";
+    let words = "has no georeferencing, so it must have the DEM's 3 x 2 cells; it has 2 x 3";
     assert!(error.unusable_input() && error.to_string().contains(words), "{error}");
 }
 
-/// Rings of which many positions fall on centres of cells, and edges on rows and columns of them.
+/// Rings with many positions on cell centres, and many edges along rows and columns of centres.
 fn rings() -> impl Strategy<Value = Polygon> {
     let position = (-4i32..44, -4i32..44).prop_map(|(i, j)| [f64::from(i) * 0.25, f64::from(j) * 0.25]);
     prop::collection::vec(prop::collection::vec(position, 3..9), 1..4)
@@ -206,7 +210,7 @@ fn rings() -> impl Strategy<Value = Polygon> {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 
-    /// The rows' sweep against the definition, point by point; self-crossing rings and empty spikes included.
+    /// The row sweep agrees with the definition at every point, also for self-crossing rings and empty spikes.
     #[test]
     fn prop_cells_are_those_of_the_definition(
         polygons in prop::collection::vec(rings(), 1..3),
@@ -223,7 +227,7 @@ proptest! {
         }
     }
 
-    /// Triangles of a fan cover their polygon once, whatever lies on their edges.
+    /// The triangles of a fan cover their polygon exactly once, also where centres lie on their edges.
     #[test]
     fn prop_parts_add_up(x in -2i32..26, y in -2i32..26) {
         let g = Geometry::square(12, 12, 1.0);
@@ -240,9 +244,25 @@ proptest! {
         prop_assert_eq!(times, BTreeSet::from([1]));
     }
 
-    /// Whatever a file holds, reading it as a mask ends in a mask or an error.
+    /// A mask keeps the cells whose centres are inside its polygons, or says that there are none; a damaged one is refused with the
+    /// reason.
     #[test]
-    fn prop_any_text_is_read_or_refused(text in "[\\[\\]{}\":,0-9a-zA-Z.\\-]{0,60}") {
-        let _ = of_text(&format!("{{{text}"), &Geometry::square(3, 3, 1.0));
+    fn prop_documents_are_masks_or_refused_with_the_reason(document in documents()) {
+        let g = Geometry { rows: 15, cols: 12, cell: [2e5, 1.6e5], origin: [-1.2e6; 2] };
+        let within = |polygons: &[Polygon], k: usize| {
+            polygons.iter().any(|p| oracle::contains(p, g.x(k % g.cols), g.y(k / g.cols)))
+        };
+        match (of_text(&document.text, &g), &document.expected) {
+            (Ok(keep), Ok(polygons)) => {
+                let expected: Vec<bool> = (0..g.len()).map(|k| within(polygons, k)).collect();
+                prop_assert_eq!(keep, expected);
+            }
+            (Err(message), Ok(polygons)) => {
+                prop_assert!(message.contains("keeps none of the DEM's cells"), "{}", message);
+                prop_assert!((0..g.len()).all(|k| !within(polygons, k)));
+            }
+            (Err(message), Err(words)) => prop_assert!(message.contains(words), "{}", message),
+            (Ok(_), Err(words)) => prop_assert!(false, "not refused: {}", words),
+        }
     }
 }

@@ -1,4 +1,4 @@
-//! What recordings of every flavour draw alike: frames, where the ground is drawn in full, colours.
+//! Common to recordings of both flavours: frames, colours, and where the ground is drawn at full resolution.
 
 use super::MissionMcap;
 use super::mesh::Square;
@@ -15,7 +15,7 @@ pub(super) const IDENTITY: [f64; 4] = [0.0, 0.0, 0.0, 1.0];
 pub(super) const START: [u8; 3] = [0x2c, 0xa0, 0x5a];
 /// Colour of a goal.
 pub(super) const GOAL: [u8; 3] = [0xc8, 0x32, 0x32];
-/// Class code of sand where ground is told by what it is, not by its roughness; beyond the codes of [`RoughnessClass`].
+/// Class code of sand, for ground classified by material instead of roughness; outside the codes of [`RoughnessClass`].
 pub const SAND: u8 = 100;
 /// Class code of rock.
 pub const ROCK: u8 = 101;
@@ -23,7 +23,7 @@ pub const ROCK: u8 = 101;
 const SAND_RGB: [u8; 3] = [0xc8, 0x9b, 0x6c];
 /// Colour of rock.
 const ROCK_RGB: [u8; 3] = [0x5e, 0x4b, 0x45];
-/// Ground without a class.
+/// Colour of ground without a class.
 const GREY: [u8; 3] = [0x9a, 0x9a, 0x94];
 
 /// Quaternion of a wheel in base_link: steering turns its axle about z, forward rolling turns z towards x about the axle.
@@ -32,7 +32,7 @@ pub(super) fn wheel_rotation(steering_rad: f64, angle_rad: f64) -> [f64; 4] {
     [-steer_sin * sin, steer_cos * sin, steer_sin * cos, steer_cos * cos]
 }
 
-/// Where the terrain is drawn in full: under the wheels at every sample, and a cell around.
+/// Where the terrain is drawn at full resolution: under the wheels at every sample, with a margin of one cell.
 pub(super) fn corridor(mission: &MissionMcap) -> Vec<Square> {
     let Recording { vehicle, states, wheels, .. } = mission.recording;
     let [dx, dy] = mission.terrain.dem.geometry.cell;
@@ -54,7 +54,7 @@ pub(super) fn corridor(mission: &MissionMcap) -> Vec<Square> {
     near
 }
 
-/// `v` turned by a unit quaternion `[x, y, z, w]`: v + 2 w (q x v) + 2 q x (q x v).
+/// `v` rotated by a unit quaternion `[x, y, z, w]`: v + 2 w (q x v) + 2 q x (q x v).
 pub(super) fn rotated([qx, qy, qz, qw]: [f64; 4], v: [f64; 3]) -> [f64; 3] {
     let cross =
         |a: [f64; 3], b: [f64; 3]| [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]];

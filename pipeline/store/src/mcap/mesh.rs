@@ -1,46 +1,46 @@
-//! The terrain as triangles: every cell along the path, coarser elsewhere, without gaps.
+//! Terrain mesh for viewers: every cell along the path, coarser elsewhere, without gaps.
 //!
-//! A quadtree over the cells is split down to tiles of [`TILE`] cells wherever the vehicle comes near. A tile near the
-//! path is drawn cell by cell. Any other leaf is drawn as a fan from its centre to every vertex that it or a neighbour
-//! has on its edge, so that surfaces of different resolution meet without gap or overlap.
+//! A quadtree over the cells is split down to tiles of [`TILE`] cells near the path of the vehicle. A tile near the path is drawn
+//! cell by cell. Any other leaf is drawn as a fan from its centre to every vertex that it or a neighbour has on its edge, so
+//! that surfaces of different resolution meet without gap or overlap.
 //!
-//! Patches of one shape share their list of indices and their plan coordinates, so that they compress to little more
-//! than their heights: tiles, fans, and the largest leaves, of which a whole row makes one patch.
+//! Patches of equal shape share their indices and plan coordinates, so that they compress to little more than their heights: tiles,
+//! fans, and the largest leaves, which are combined row by row into one patch.
 
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::RoughnessClass;
 use std::collections::BTreeMap;
 
-/// Cells along the side of a tile drawn in full.
+/// Cells along the side of a tile drawn at full resolution.
 const TILE: usize = 8;
 /// Most leaves along a side before any is split.
 const COARSE_LEAVES: usize = 32;
-/// Heights are stored in steps of 2^-7 m: 4 mm off at most.
+/// Heights are stored in steps of 2^-7 m, which gives an error of at most 4 mm.
 const HEIGHT_STEPS_PER_M: f64 = 128.0;
-/// Least depth of the point that heights count from: a whole byte of a double then holds their place within a metre.
+/// Smallest depth of the reference level for heights: a whole byte of a double then holds the fraction of a metre.
 const DEPTH_M: f64 = 16.0;
 
 /// A part of the terrain's surface.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Patch {
-    /// Where its points count from, in the map frame, m.
+    /// Origin of its points, in the map frame, m.
     pub origin: [f64; 3],
-    /// Points, m.
+    /// Points relative to the origin, m.
     pub points: Vec<[f64; 3]>,
     /// Class code of each point.
     pub codes: Vec<u8>,
-    /// Triangles as triples of points, counterclockwise from above.
+    /// Triangles as triples of point indices, counter-clockwise from above.
     pub triangles: Vec<[u32; 3]>,
 }
 
-/// A square of the plane, by its centre and half its side, m.
+/// A square in plan view, by its centre and half its side, m.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Square {
     pub centre: [f64; 2],
     pub half_side: f64,
 }
 
-/// The surface, in full wherever one of the squares lies. Heights count from `base_m`, see [`base`].
+/// The surface, at full resolution wherever one of the squares lies. Heights are relative to `base_m`, see [`base`].
 pub(super) fn terrain(dem: &Grid, classes: Option<&Grid<u8>>, base_m: f64, near: &[Square]) -> Vec<Patch> {
     let g = &dem.geometry;
     if g.rows < 2 || g.cols < 2 {
@@ -61,7 +61,7 @@ pub(super) fn terrain(dem: &Grid, classes: Option<&Grid<u8>>, base_m: f64, near:
     tiles.chain(fans).chain(strips).filter(|patch| !patch.triangles.is_empty()).collect()
 }
 
-/// Row and column of every corner of that surface, row by row.
+/// Row and column of every vertex of that surface, row by row.
 pub(super) fn nodes(g: &Geometry, near: &[Square]) -> Vec<(usize, usize)> {
     if g.rows < 2 || g.cols < 2 {
         return vec![];
@@ -80,8 +80,8 @@ pub(super) fn nodes(g: &Geometry, near: &[Square]) -> Vec<(usize, usize)> {
     (0..g.len()).filter(|&at| taken[at]).map(|at| (at / g.cols, at % g.cols)).collect()
 }
 
-/// Where heights count from, for heights from `low_m` to `high_m`: a whole number of metres, so far below that all heights
-/// lie within one power of two. As floating-point numbers they then share their exponent and differ in a byte or two.
+/// Reference level for heights from `low_m` to `high_m`: a whole number of metres, far enough below that all heights lie within one
+/// power of two. As floating-point numbers they then share their exponent and differ in a byte or two.
 pub(super) fn base(low_m: f64, high_m: f64) -> f64 {
     let low_m = low_m.floor();
     let mut depth_m = DEPTH_M;
@@ -111,24 +111,24 @@ struct Leaf {
 }
 
 impl Leaf {
-    /// A leaf cut at the grid's edge; one without a node inside has no centre for a fan and is drawn in full.
+    /// A leaf, clipped at the edge of the grid; without an interior node it has no centre for a fan and is drawn cell by cell.
     fn new(g: &Geometry, row: usize, col: usize, side: usize, near: bool) -> Self {
         let (row_end, col_end) = ((row + side).min(g.rows - 1), (col + side).min(g.cols - 1));
         Self { row, col, row_end, col_end, fine: near || row_end - row < 2 || col_end - col < 2 }
     }
 
-    /// The node of its centre.
+    /// The node at its centre.
     fn centre(&self) -> (usize, usize) {
         (self.row.midpoint(self.row_end), self.col.midpoint(self.col_end))
     }
 
-    /// True for one of the largest leaves (cut at the grid's edge or not) with no vertex but its corners.
+    /// True for one of the largest leaves (clipped at the edge of the grid or not) with no vertices except its corners.
     fn is_plain(&self, g: &Geometry, side: usize, outline: &[(usize, usize)]) -> bool {
-        let whole = |start: usize, end: usize, n: usize| start.is_multiple_of(side) && end == (start + side).min(n - 1);
-        outline.len() == 4 && whole(self.row, self.row_end, g.rows) && whole(self.col, self.col_end, g.cols)
+        let full = |start: usize, end: usize, n: usize| start.is_multiple_of(side) && end == (start + side).min(n - 1);
+        outline.len() == 4 && full(self.row, self.row_end, g.rows) && full(self.col, self.col_end, g.cols)
     }
 
-    /// Nodes around it that are vertices, counterclockwise from above from the north-west corner.
+    /// Nodes on its border that are vertices, counter-clockwise from above, starting at the north-west corner.
     fn outline(&self, vertices: &[bool], cols: usize) -> Vec<(usize, usize)> {
         let &Self { row, col, row_end, col_end, .. } = self;
         let west = (row..row_end).map(|r| (r, col));
@@ -148,7 +148,7 @@ struct Tiles {
 fn marked_tiles(g: &Geometry, near: &[Square]) -> Tiles {
     let (rows, cols) = ((g.rows - 1).div_ceil(TILE), (g.cols - 1).div_ceil(TILE));
     let mut tiles = Tiles { cols, marked: vec![false; rows * cols] };
-    // Position in tiles from the north-western node; a value beyond the grid is held at its edge.
+    // Position in tiles from the north-western node; a value beyond the grid is clamped to its edge.
     let tile = |cells: f64, n: usize| ((cells - 0.5) / TILE as f64).clamp(0.0, (n - 1) as f64) as usize;
     for Square { centre: [x, y], half_side } in near.iter().filter(|s| s.centre.iter().all(|v| v.is_finite())) {
         let col = |x: f64| tile((x - g.origin[0]) / g.cell[0], cols);
@@ -161,7 +161,7 @@ fn marked_tiles(g: &Geometry, near: &[Square]) -> Tiles {
 }
 
 impl Tiles {
-    /// True when a tile of the square block with its north-western node at `(row, col)` is marked.
+    /// True if any tile of the square block with its north-western node at `(row, col)` is marked.
     fn any_in(&self, row: usize, col: usize, side: usize) -> bool {
         let (first, count) = (col / TILE, side / TILE);
         let rows = self.marked.chunks(self.cols).skip(row / TILE).take(count);
@@ -194,7 +194,7 @@ fn split(g: &Geometry, tiles: &Tiles, row: usize, col: usize, side: usize, leave
     }
 }
 
-/// Marks every node that is a vertex of some leaf: the corners of coarse ones, the outline of fine ones.
+/// Marks every node that is a vertex of some leaf: the corners of coarse leaves and the outline of fine ones.
 fn vertices(g: &Geometry, fine: &[Leaf], coarse: &[Leaf]) -> Vec<bool> {
     let mut vertices = vec![false; g.len()];
     for leaf in coarse {
@@ -228,12 +228,12 @@ impl Drawing<'_> {
         self.classes.map_or(RoughnessClass::NO_DATA, |classes| classes.at(row, col))
     }
 
-    /// Height over the base in whole steps.
+    /// Height above the base, rounded to whole steps.
     fn height(&self, row: usize, col: usize) -> f64 {
         ((self.dem.at(row, col) - self.base) * HEIGHT_STEPS_PER_M).round() / HEIGHT_STEPS_PER_M
     }
 
-    /// A patch of these nodes, none of which lies west of `west` or south of `south`.
+    /// A patch of the given nodes, none of which lies west of `west` or south of `south`.
     fn patch(
         &self,
         (south, west): (usize, usize),
@@ -250,7 +250,7 @@ impl Drawing<'_> {
         without_holes(patch)
     }
 
-    /// A leaf cell by cell.
+    /// A leaf drawn cell by cell.
     fn tile(&self, leaf: &Leaf) -> Patch {
         let nodes = (leaf.row..=leaf.row_end).flat_map(|row| (leaf.col..=leaf.col_end).map(move |col| (row, col)));
         let width = (leaf.col_end - leaf.col + 1) as u32;
@@ -260,7 +260,7 @@ impl Drawing<'_> {
         self.patch((leaf.row_end, leaf.col), nodes, halves.collect())
     }
 
-    /// A leaf from its centre to its outline.
+    /// A leaf drawn as a fan from its centre to its outline.
     fn fan(&self, leaf: &Leaf, outline: &[(usize, usize)]) -> Patch {
         let nodes = std::iter::once(leaf.centre()).chain(outline.iter().copied());
         let n = outline.len() as u32;
@@ -268,8 +268,8 @@ impl Drawing<'_> {
         self.patch((leaf.row_end, leaf.col), nodes, triangles)
     }
 
-    /// Plain leaves of one row. Its points are the corners and centres of all leaves that could be there, so that the
-    /// strips of a terrain have the same ones.
+    /// Plain leaves of one row. The points are the corners and centres of all possible leaves in the row, so that all strips of a
+    /// terrain share them.
     fn strip(&self, leaves: &[&Leaf], side: usize) -> Option<Patch> {
         let g = &self.dem.geometry;
         let &&Leaf { row, row_end, .. } = leaves.first()?;
@@ -286,7 +286,7 @@ impl Drawing<'_> {
     }
 }
 
-/// Drops triangles with a corner without data, and puts such corners at the base.
+/// Drops triangles with a corner without data, and moves such corners to the base.
 fn without_holes(mut patch: Patch) -> Patch {
     if patch.points.iter().all(|p| p[2].is_finite()) {
         return patch;

@@ -1,8 +1,8 @@
-//! MCAP recordings of missions, of teams and of rovers in two flavours, which never mix in a file: for viewers (Foxglove's messages and our own, in
-//! protobuf) and for ROS 2 (CDR). The topics are those of `sastrugi_schemas::topics`.
+//! MCAP recordings of missions, teams and rovers in two flavours, which are never mixed in a file: for viewers (Foxglove's messages
+//! and our own, in protobuf) and for ROS 2 (CDR). The topics are those of `sastrugi_schemas::topics`.
 //!
-//! Messages stand in the order of their time; chunks are compressed with Zstandard on one thread and carry checksums;
-//! bytes follow from the recording alone. The map frame is the terrain's own coordinates.
+//! Messages are ordered by time; chunks are compressed with Zstandard on one thread and carry checksums; the bytes depend on the
+//! recording alone. The map frame is the terrain's own coordinates.
 
 mod frames;
 mod log;
@@ -35,26 +35,26 @@ use std::io::{self, Cursor};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
-/// Panels of Foxglove and Lichtblick for recordings of the viewer flavour: a layout file to import.
+/// Layout file with panels for Foxglove and Lichtblick, to import for recordings of the viewer flavour.
 pub const VIEWER_LAYOUT: &str = include_str!("viewer-layout.json");
 
-/// What makes a bag of a folder.
+/// File that makes a folder a ROS 2 bag.
 pub const BAG: &str = "metadata.yaml";
-/// Level of Zstandard.
+/// Zstandard level.
 const ZSTD_LEVEL: u32 = 1;
 /// Uncompressed size of a chunk, bytes.
 const CHUNK_BYTES: u64 = 4 << 20;
 
-/// Why a recording was not written or read.
+/// Failure to write or read a recording.
 #[derive(Debug, thiserror::Error)]
 pub enum McapError {
-    /// The recording cannot be put into messages.
+    /// The recording cannot be expressed in messages.
     #[error("the recording cannot be written: {reason}")]
     Unfit {
         /// What does not fit.
         reason: String,
     },
-    /// The file is no MCAP file, or not a whole one.
+    /// The file is not a complete MCAP file.
     #[error("{}: {reason}", path.display())]
     Unusable {
         /// The file.
@@ -63,7 +63,7 @@ pub enum McapError {
         reason: String,
     },
     /// The MCAP writer failed.
-    #[error("the recording could not be encoded: {0}")]
+    #[error("could not encode the recording: {0}")]
     Encoding(#[from] mcap::McapError),
     /// The file system failed.
     #[error("{}: {source}", path.display())]
@@ -81,7 +81,7 @@ impl McapError {
     }
 }
 
-/// A terrain as the recordings on it show it: what is the same for all of them is worked out once.
+/// A terrain for the recordings on it; parts common to all recordings are computed once.
 #[derive(Clone, Debug)]
 pub struct TerrainView<'a> {
     dem: &'a Grid,
@@ -98,16 +98,16 @@ impl<'a> TerrainView<'a> {
     /// The view of a terrain and, on the same cells, its roughness classes.
     ///
     /// # Errors
-    /// [`McapError::Unfit`] for a class map of another shape than the terrain.
+    /// [`McapError::Unfit`] for a class map that differs in shape from the terrain.
     pub fn new(dem: &'a Grid, classes: Option<&'a Grid<u8>>) -> Result<Self, McapError> {
         if classes.is_some_and(|c| (c.rows(), c.cols()) != (dem.rows(), dem.cols())) {
-            return Err(McapError::unfit("the class map has another shape than the terrain"));
+            return Err(McapError::unfit("the class map differs in shape from the terrain"));
         }
         let range_m = dem.range().unwrap_or((0.0, 0.0));
         Ok(Self { dem, classes, range_m, grid: OnceLock::new(), grid_map: OnceLock::new() })
     }
 
-    /// Whole metres near the south-west corner and the lowest height.
+    /// South-west corner and lowest height, rounded down to whole metres.
     fn origin_m(&self) -> [f64; 3] {
         let [x, y] = self.dem.geometry.origin;
         [x, y, self.range_m.0].map(f64::floor)
@@ -127,9 +127,9 @@ impl<'a> TerrainView<'a> {
 pub struct MissionMcap<'a> {
     /// Messages and their encoding.
     pub flavour: McapFlavour,
-    /// What happened.
+    /// Recording.
     pub recording: &'a Recording,
-    /// Terrain it happened on.
+    /// Terrain of the recording.
     pub terrain: &'a TerrainView<'a>,
     /// Start point, m.
     pub start_m: [f64; 2],
@@ -137,17 +137,17 @@ pub struct MissionMcap<'a> {
     pub goal_m: [f64; 2],
     /// Start of the mission's clock, ns since 1970-01-01 UTC.
     pub epoch_ns: u64,
-    /// Metadata records by name: `study`, `terrain`, `mission`, `vehicle`, `outcome`, `hashes` (with the terrain's
-    /// SHA-256 in place of an attachment).
+    /// Metadata records by name: `study`, `terrain`, `mission`, `vehicle`, `outcome`, `hashes` (with the terrain's SHA-256
+    /// instead of an attachment).
     pub metadata: &'a BTreeMap<String, BTreeMap<String, String>>,
 }
 
-/// What was written.
+/// Summary of a written recording.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct McapSummary {
     /// Number of messages.
     pub messages: u64,
-    /// The channels with their numbers of messages.
+    /// Channels with their numbers of messages.
     pub channels: Vec<ChannelSummary>,
     /// Time of the first message, ns since 1970-01-01 UTC.
     pub start_ns: u64,
@@ -159,7 +159,7 @@ pub struct McapSummary {
     pub content_sha256: String,
 }
 
-/// What was written on a channel.
+/// Summary of a channel.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct ChannelSummary {
     /// Name of the topic in the file.
@@ -170,7 +170,7 @@ pub struct ChannelSummary {
     pub messages: u64,
 }
 
-/// How a flavour puts messages into a file.
+/// How a flavour encodes messages.
 struct Flavour {
     profile: &'static str,
     message_encoding: &'static str,
@@ -189,7 +189,7 @@ impl Flavour {
     }
 }
 
-/// A topic under the name that it has in a file.
+/// A topic with its name in the file.
 struct Channel {
     name: String,
     topic: &'static Topic,
@@ -206,9 +206,9 @@ impl Channel {
     }
 }
 
-/// A message before it gets its place in the file.
+/// A message before it is ordered and written.
 struct Pending {
-    /// Position of its channel in the list.
+    /// Index of its channel in the list.
     channel: usize,
     log_time: u64,
     data: Vec<u8>,
@@ -226,7 +226,7 @@ impl Timeline {
         Self { channels, epoch_ns, pending: vec![] }
     }
 
-    /// Adds a message at a time since the recording's start, made for its time in ns since 1970-01-01 UTC.
+    /// Adds a message at a time since the start of the recording; `data` receives its time in ns since 1970-01-01 UTC.
     fn add(
         &mut self,
         topic: &Topic,
@@ -244,14 +244,14 @@ impl Timeline {
         data: impl FnOnce(u64) -> Result<Vec<u8>, McapError>,
     ) -> Result<(), McapError> {
         let channel = self.channels.iter().position(|channel| channel.name == name);
-        let channel = channel.ok_or_else(|| McapError::unfit("a topic is not listed"))?;
+        let channel = channel.ok_or_else(|| McapError::unfit("a topic is not in the list of channels"))?;
         let log_time = log_time(self.epoch_ns, time_s);
         self.pending.push(Pending { channel, log_time, data: data(log_time)? });
         Ok(())
     }
 }
 
-/// A time since the recording's start in ns since 1970-01-01 UTC; a negative or NaN one becomes the start.
+/// Converts a time since the start of the recording to ns since 1970-01-01 UTC; a negative or NaN time becomes the start.
 fn log_time(epoch_ns: u64, time_s: f64) -> u64 {
     epoch_ns.saturating_add((time_s * 1e9).round() as u64)
 }
@@ -269,28 +269,28 @@ fn write(target: Target<'_>, (bytes, summary): (Vec<u8>, McapSummary)) -> Result
     Ok(summary)
 }
 
-/// The MCAP files of a ROS 2 bag, in the order in which they were recorded.
+/// The MCAP files of a ROS 2 bag, in recording order.
 ///
 /// # Errors
-/// [`McapError::Unusable`] for a folder that is no bag, or a bag of other files; [`McapError::Io`].
+/// [`McapError::Unusable`] for a folder that is not a bag, or a bag of other files; [`McapError::Io`].
 pub fn bag_files(folder: &Path) -> Result<Vec<PathBuf>, McapError> {
     let unusable = |reason: String| McapError::Unusable { path: folder.to_owned(), reason };
     let path = folder.join(BAG);
     let text = crate::file::read_text(&path).map_err(|source| match source.kind() {
-        io::ErrorKind::NotFound => unusable(format!("the folder is no bag, it has no {BAG}; name an .mcap file")),
+        io::ErrorKind::NotFound => unusable(format!("the folder is not a bag: it has no {BAG}; give an .mcap file")),
         _ => McapError::Io { path, source },
     })?;
     let names = ros2::bag_names(&text);
     match names.iter().find(|name| !name.ends_with(".mcap")) {
         Some(other) => Err(unusable(format!(
-            "the bag holds {other}; `ros2 bag convert` makes MCAP without file compression of it"
+            "the bag contains {other}; convert it to MCAP without file compression with `ros2 bag convert`"
         ))),
-        None if names.is_empty() => Err(unusable(format!("its {BAG} names no files; name an .mcap file"))),
+        None if names.is_empty() => Err(unusable(format!("{BAG} lists no files; give an .mcap file"))),
         None => Ok(names.iter().map(|name| folder.join(name)).collect()),
     }
 }
 
-/// What a ROS 2 bag is, for people: its files in order, each as [`describe_file`] does.
+/// Human-readable description of a ROS 2 bag: its files in order, each as in [`describe_file`].
 ///
 /// # Errors
 /// As [`bag_files`] and [`describe_file`].
@@ -303,16 +303,15 @@ pub fn describe_bag(folder: &Path) -> Result<serde_json::Value, McapError> {
     Ok(described.into())
 }
 
-/// What an MCAP file is, for people: its topics with their message counts, and its length in time.
+/// Human-readable description of an MCAP file: its topics with message counts, and its duration.
 ///
 /// # Errors
 /// [`McapError::Unusable`] for a file without a readable summary, [`McapError::Io`] for one that cannot be read.
 pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
     let bytes = crate::file::read(path).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
     let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
-    let summary =
-        mcap::Summary::read(&bytes).map_err(|e| unusable(format!("no MCAP file, or not a whole one: {e}")))?;
-    let summary = summary.ok_or_else(|| unusable("the file has no summary: it was not finished".to_owned()))?;
+    let summary = mcap::Summary::read(&bytes).map_err(|e| unusable(format!("not a complete MCAP file: {e}")))?;
+    let summary = summary.ok_or_else(|| unusable("the file has no summary: it is incomplete".to_owned()))?;
     let stats = summary.stats.ok_or_else(|| unusable("the summary has no statistics".to_owned()))?;
     let count = |id: &u16| stats.channel_message_counts.get(id).copied().unwrap_or(0);
     let topics: BTreeMap<&str, u64> = summary.channels.iter().map(|(id, c)| (c.topic.as_str(), count(id))).collect();
@@ -326,7 +325,7 @@ pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
     }))
 }
 
-/// The text of `metadata.yaml`, which makes a bag of the folder that holds a ROS 2 recording.
+/// The text of `metadata.yaml`, which makes the folder of a ROS 2 recording a bag.
 pub fn bag_metadata(file: &str, summary: &McapSummary) -> String {
     ros2::bag_metadata(file, summary)
 }
@@ -365,7 +364,7 @@ fn encode(
     let ids = channels.iter().map(|channel| add_channel(&mut writer, flavour, channel));
     let ids = ids.collect::<Result<Vec<_>, _>>()?;
     let mut content = ContentHash::new("messages");
-    // Counted by channel: the messages of one instant then differ in little but their data.
+    // Counted per channel, so that simultaneous messages differ in little but their data, and compress well.
     let mut counts = vec![0; channels.len()];
     for Pending { channel, log_time, data } in &messages {
         let (channel_id, sequence) = (ids[*channel], counts[*channel] as u32);
@@ -396,11 +395,14 @@ fn encode(
 fn check(mission: &MissionMcap) -> Result<(), McapError> {
     let recording = mission.recording;
     if recording.states.is_empty() {
-        return Err(McapError::unfit("it holds no state"));
+        return Err(McapError::unfit("it has no states"));
     }
     let wheels = recording.vehicle.wheels.len();
     if let Some(sample) = recording.wheels.iter().find(|sample| sample.wheels.len() != wheels) {
-        return Err(McapError::unfit(format!("{} of {wheels} wheels at {} s", sample.wheels.len(), sample.time_s)));
+        let (found, time_s) = (sample.wheels.len(), sample.time_s);
+        return Err(McapError::unfit(format!(
+            "the vehicle has {wheels} wheels, but the sample at {time_s} s has {found}"
+        )));
     }
     Ok(())
 }

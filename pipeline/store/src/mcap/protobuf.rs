@@ -1,4 +1,4 @@
-//! Own protobuf messages: encoding and descriptors from the field lists of `sastrugi-schemas`.
+//! Our own protobuf messages: encoding, and descriptors from the field lists of `sastrugi-schemas`.
 
 use super::McapError;
 use foxglove::Encode;
@@ -10,11 +10,11 @@ use prost_types::source_code_info::Location;
 use prost_types::{DescriptorProto, FieldDescriptorProto, FileDescriptorProto, FileDescriptorSet, SourceCodeInfo};
 use sastrugi_schemas::topics::{FieldKind, Topic};
 
-/// Number of the field `timestamp`; those of the list follow.
+/// Number of the field `timestamp`; the listed fields follow.
 const TIMESTAMP: u32 = 1;
 const TIMESTAMP_FILE: &str = "google/protobuf/timestamp.proto";
 
-/// Value of a field.
+/// Field value.
 pub(super) enum Value {
     Double(f64),
     Float(f64),
@@ -52,8 +52,8 @@ impl Value {
     }
 }
 
-/// A message from its values in the order of the topic's fields. Zeros are written out: messages of one length
-/// compress better.
+/// Encodes a message from its values, in the order of the topic's fields. Zeros are written explicitly, because messages of equal
+/// length compress better.
 pub(super) fn encode(timestamp: &Timestamp, values: &[Value]) -> Vec<u8> {
     let mut out = Vec::with_capacity(256);
     wire::message::encode(TIMESTAMP, timestamp, &mut out);
@@ -129,10 +129,10 @@ fn locations(message: &str, fields: impl Iterator<Item = String>) -> Vec<Locatio
     std::iter::once(location(vec![4, 0], message.to_owned(), 0)).chain(fields).collect()
 }
 
-/// The description of google.protobuf.Timestamp, the one that Foxglove's messages bring, so that a reader meets one.
+/// The descriptor of google.protobuf.Timestamp, taken from Foxglove's messages, so that a file contains only one.
 fn timestamp_file() -> Result<FileDescriptorProto, McapError> {
     let schema = Log::get_schema().map(|s| s.data.into_owned()).unwrap_or_default();
     let set = FileDescriptorSet::decode(schema.as_slice()).unwrap_or_default();
     let file = set.file.into_iter().find(|f| f.name.as_deref() == Some(TIMESTAMP_FILE));
-    file.ok_or_else(|| McapError::unfit("the description of google.protobuf.Timestamp is not to be found"))
+    file.ok_or_else(|| McapError::unfit("the descriptor of google.protobuf.Timestamp is missing"))
 }

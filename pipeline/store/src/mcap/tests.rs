@@ -49,7 +49,7 @@ fn outline() -> VehicleOutline {
     }
 }
 
-/// A straight drive eastwards over the ground, level, with contact points on the bilinear surface under the wheels.
+/// A straight, level drive eastwards over the ground, with contact points on the bilinear surface under the wheels.
 fn drive(dem: &Grid, start: [f64; 2], seconds: usize) -> Recording {
     let vehicle = outline();
     let mut stream = Streams::for_seed(12, "test").stream("imu");
@@ -177,7 +177,7 @@ impl Scene {
 }
 
 #[test]
-fn val_messages_come_back_in_order_with_every_checksum() {
+fn val_messages_are_read_back_in_order_with_every_checksum() {
     let scene = Scene::new(160, 3);
     let (bytes, summary) = encode_mission(&scene.mission(&scene.terrain())).unwrap();
     let messages: Vec<_> = MessageStream::new(&bytes).unwrap().collect::<Result<_, _>>().unwrap();
@@ -192,7 +192,7 @@ fn val_messages_come_back_in_order_with_every_checksum() {
     assert_eq!(encode_mission(&scene.mission(&scene.terrain())).unwrap().0, bytes);
 }
 
-/// Bytes of a mission in both flavours: a change of the encoder or of the shared writer must not pass unnoticed.
+/// Bytes of a mission in both flavours, to detect changes of the encoder or of the shared writer.
 #[test]
 fn gold_bytes_of_a_mission() {
     let scene = Scene::new(160, 3);
@@ -202,12 +202,12 @@ fn gold_bytes_of_a_mission() {
     assert_eq!(found, GOLD_MISSIONS);
 }
 const GOLD_MISSIONS: [&str; 2] = [
-    "7a785c4975b2a1161848ab7e20af45def82865c015ce35bb6a0d9d387223e3b3",
-    "92ff8d46d9d25b3528d9efdff72dcd945f0341ef47f0049e111d0b3a44a74da8",
+    "d3bdd4135caa9aeaf50095c13116a991e130072783c8d0e42a9e78d5a04aa1c1",
+    "dfdaadb6ecb37ce96b0ee3ed069c2caeadd09b8ee569e167c123e67fe3dc350b",
 ];
 
 #[test]
-fn val_own_messages_are_as_described() {
+fn val_own_messages_match_their_descriptions() {
     let scene = Scene::new(120, 1);
     let r = &scene.recording;
     let names = vec![String::new(); 4];
@@ -225,18 +225,20 @@ fn val_own_messages_are_as_described() {
     }
 }
 
-/// Every topic and field that the layout's panels of a mission name is there, and every panel it arranges is described.
+/// Every topic and field named in the mission panels of the layout is recorded, and every panel that it arranges is defined.
 #[test]
-fn val_the_layout_names_what_is_recorded() {
+fn val_the_layout_matches_the_recorded_topics() {
     let layout: serde_json::Value = serde_json::from_str(VIEWER_LAYOUT).unwrap();
     let topic = |name: &str| VIEWER.into_iter().find(|t| t.name == name).unwrap_or_else(|| panic!("{name}"));
     let panels = layout["configById"].as_object().unwrap();
-    for name in panels["3D!terrain"]["topics"].as_object().unwrap().keys() {
-        topic(name);
-    }
+    let shown = panels["3D!terrain"]["topics"].as_object().unwrap();
+    assert!(!shown.is_empty());
+    shown.keys().for_each(|name| assert_eq!(topic(name).name, name));
     topic(panels["RosOut!events"]["topicToRender"].as_str().unwrap());
     for panel in ["Plot!attitude", "Plot!acceleration", "Plot!speed"] {
-        for path in panels[panel]["paths"].as_array().unwrap() {
+        let paths = panels[panel]["paths"].as_array().unwrap();
+        assert!(!paths.is_empty(), "{panel}");
+        for path in paths {
             let (name, field) = path["value"].as_str().unwrap().split_once('.').unwrap();
             assert!(topic(name).fields.iter().any(|f| f.name == field), "{name} has no {field}");
         }
@@ -246,9 +248,9 @@ fn val_the_layout_names_what_is_recorded() {
     assert!(panels.keys().all(|panel| panel == "Tab!recording" || tabs.contains(panel.as_str())), "{tabs}");
 }
 
-/// The angles of a state turn as the tables' do: nose down is a positive pitch, left side up a positive roll.
+/// The angles of a state have the same signs as in the tables: nose down is positive pitch, left side up is positive roll.
 #[test]
-fn val_states_tell_roll_and_pitch() {
+fn val_states_have_roll_and_pitch() {
     let scene = Scene::new(120, 1);
     let half = |degrees: f64| libm::sincos(0.5 * degrees.to_radians());
     for (orientation, roll_deg, pitch_deg) in [
@@ -285,7 +287,7 @@ fn prop_the_mesh_covers_the_terrain_once_and_has_no_gaps() {
         let area: f64 = triangles.iter().map(plan_area).sum();
         let expected = (rows - 1) as f64 * (cols - 1) as f64 * 0.25;
         assert!((area - expected).abs() < 1e-9 * expected, "{rows} x {cols}: {area} of {expected}");
-        // An edge inside has two triangles, one on the border has one.
+        // An interior edge has two triangles, a border edge has one.
         let key = |p: &[f64; 3]| [0, 1, 2].map(|axis| (p[axis] * 1024.0).round() as i64);
         let mut edges: Map<_, u32> = Map::new();
         for t in &triangles {
@@ -303,9 +305,9 @@ fn prop_the_mesh_covers_the_terrain_once_and_has_no_gaps() {
     }
 }
 
-/// Heights over their base share their exponent as floating-point numbers, whatever the relief; absurd heights end as well.
+/// Heights above their base share their floating-point exponent, whatever the relief; the search also ends for absurd heights.
 #[test]
-fn prop_heights_count_from_one_power_of_two() {
+fn prop_heights_lie_within_one_power_of_two() {
     let exponent = |v: f64| v.to_bits() >> 52;
     for (low, high) in [(0.0, 0.0), (-0.3, 0.4), (-1.0, 15.0), (3.2, 19.9), (1234.5, 2600.0), (-8000.0, 8848.0)] {
         let base = base(low, high);
@@ -314,7 +316,7 @@ fn prop_heights_count_from_one_power_of_two() {
     assert!(!base(f64::MIN, f64::MAX).is_finite());
 }
 
-/// Largest distance in height between contact points and the mesh: 1 cm allowed.
+/// Largest vertical distance between contact points and the mesh: at most 1 cm.
 #[test]
 fn val_wheels_stand_on_the_mesh() {
     let scene = Scene::new(400, 12);
@@ -342,10 +344,10 @@ fn off_mesh(triangles: &[[[f64; 3]; 3]], p: [f64; 3]) -> f64 {
     triangles.iter().find_map(height).map_or(f64::INFINITY, |z| (z - p[2]).abs())
 }
 
-/// The axle of a wheel that is steered to the left points left and back, however far the wheel has rolled; a quarter of a
-/// turn forward brings the top of a straight wheel to the front.
+/// The axle of a wheel steered to the left points left and back, however far the wheel has rolled; a quarter turn forward moves the
+/// top of a straight wheel to the front.
 #[test]
-fn val_wheels_are_steered_and_turned() {
+fn val_wheels_are_steered_and_rolled() {
     let near = |a: [f64; 3], b: [f64; 3]| (0..3).all(|i| (a[i] - b[i]).abs() < 1e-12);
     let quarter = std::f64::consts::FRAC_PI_2;
     assert!(near(frames::rotated(frames::wheel_rotation(0.0, quarter), [0.0, 0.0, 1.0]), [1.0, 0.0, 0.0]));
@@ -355,7 +357,7 @@ fn val_wheels_are_steered_and_turned() {
     }
 }
 
-/// A mission of 37 s on a terrain of 1009 x 1009 cells: the size of a file is a stated figure.
+/// A mission of 37 s on a terrain of 1009 x 1009 cells stays within the documented file size.
 #[test]
 fn val_a_mission_is_small() {
     let scene = Scene::new(1009, 37);
@@ -390,10 +392,10 @@ fn val_impossible_recordings_are_refused() {
     assert!(matches!(encode_mission(&scene.mission(&scene.terrain())), Err(McapError::Unfit { .. })));
 }
 
-/// What a recording holds comes back bit for bit (the unit's figures in the steps of their topic), also from the part of a file
-/// that was cut off; any cut and any flipped byte is named or harmless, never a panic.
+/// A recording is read back bit for bit (values of the inertial unit in the steps of their topic), also from a truncated file; any
+/// truncation and any flipped byte is reported or harmless, never a panic.
 #[test]
-fn prop_logs_come_back() {
+fn prop_logs_are_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("log.mcap");
     let scene = Scene::new(160, 3);
@@ -415,8 +417,8 @@ fn prop_logs_come_back() {
     for cut in (0..bytes.len()).step_by(bytes.len() / 97 + 1) {
         std::fs::write(&path, &bytes[..cut]).unwrap();
         match read_log(&path) {
-            Ok(part) => assert!(part.broken.unwrap().contains("breaks off after"), "{cut}"),
-            Err(error) => assert!(error.to_string().contains("no MCAP file"), "{cut}: {error}"),
+            Ok(part) => assert!(part.broken.unwrap().contains("is truncated after"), "{cut}"),
+            Err(error) => assert!(error.to_string().contains("not an MCAP file"), "{cut}: {error}"),
         }
         let mut flipped = bytes.clone();
         flipped[cut] ^= 0x55;
@@ -425,9 +427,9 @@ fn prop_logs_come_back() {
     }
 }
 
-/// A ROS 2 recording holds the numbers of the recording themselves, and its file nothing of the other flavour.
+/// A ROS 2 recording has the exact numbers of the recording, and its file nothing of the other flavour.
 #[test]
-fn prop_ros2_recordings_come_back() {
+fn prop_ros2_recordings_are_read_back() {
     let folder = tempfile::tempdir().unwrap();
     let path = folder.path().join("bag.mcap");
     let scene = Scene::new(160, 3);
@@ -453,8 +455,8 @@ fn prop_ros2_recordings_come_back() {
     assert_eq!(encode_mission(&scene.ros2(&scene.terrain())).unwrap().0, bytes);
 }
 
-/// The grid map has the terrain's own heights where its cells are the terrain's, from the north-east corner westward, and
-/// heights between them where they are not; cells without data are NaN.
+/// The grid map has the terrain's own heights if its cells coincide with the terrain's, from the north-east corner westward, and
+/// interpolated heights otherwise; cells without data are NaN.
 #[test]
 fn val_a_grid_map_has_the_heights() {
     let mut dem = rough(90, 70, 0.5, [500_000.3, 4_000_000.7], 6);
@@ -479,14 +481,14 @@ fn val_a_grid_map_has_the_heights() {
     }
 }
 
-/// A cell beside the hole of [`val_a_grid_map_has_the_heights`].
+/// A cell next to the hole of [`val_a_grid_map_has_the_heights`].
 fn near_hole(row: usize, col: usize) -> bool {
     row <= 1 && col.abs_diff(5) <= 1
 }
 
-/// The points of the cloud are the corners of the mesh.
+/// The points of the cloud are the vertices of the mesh.
 #[test]
-fn prop_points_are_the_corners_of_the_mesh() {
+fn prop_points_are_the_vertices_of_the_mesh() {
     let scene = Scene::new(160, 3);
     let near = frames::corridor(&scene.mission(&scene.terrain()));
     let key = |x: f64, y: f64| ((x * 1000.0).round() as i64, (y * 1000.0).round() as i64);

@@ -1,4 +1,4 @@
-//! Viewer flavour of missions: the topics of `sastrugi_schemas::topics::VIEWER` in protobuf.
+//! Viewer flavour of missions: the topics of `sastrugi_schemas::topics::VIEWER`, in protobuf.
 
 use super::frames::{BASE, GOAL, IDENTITY, MAP, START, class_rgb, corridor, rotated, wheel_rotation};
 use super::mesh::{self, Patch, Square};
@@ -19,7 +19,7 @@ use std::collections::BTreeMap;
 const GRID_CELLS: usize = 64;
 /// Poses per second of `/vehicle/path`.
 const PATH_RATE_HZ: f64 = 2.0;
-/// Steps per unit in which sensor-like values are stored: finer than any sensor's noise, and short to compress.
+/// Quantisation of sensor-like values, steps per unit: finer than any sensor's noise, but compresses well.
 /// Angles, rates, lengths.
 const FINE: f64 = 1024.0;
 /// Slip ratios.
@@ -30,9 +30,9 @@ const MEDIUM: f64 = 128.0;
 const TORQUE: f64 = 64.0;
 /// Forces.
 const COARSE: f64 = 4.0;
-/// Where wheels are drawn: quaternions and hubs in base_link.
+/// Drawn wheel poses: quaternions and hubs in base_link.
 const DRAWN: f64 = 4096.0;
-/// Angles for plots, in degrees.
+/// Plotted angles, in degrees.
 const DEGREES: f64 = 64.0;
 /// Elevation of `/terrain/grid`.
 const ELEVATION: f64 = 256.0;
@@ -50,7 +50,7 @@ fn schema(topic: &Topic) -> Result<Vec<u8>, McapError> {
     public_schema(topic).map_or_else(|| protobuf::descriptor_set(topic), Ok)
 }
 
-/// The schema of a topic that carries one of Foxglove's messages.
+/// The schema of a topic with one of Foxglove's messages.
 pub(super) fn public_schema(topic: &Topic) -> Option<Vec<u8>> {
     let schema = match topic.schema {
         "foxglove.FrameTransforms" => fox::FrameTransforms::get_schema(),
@@ -64,7 +64,7 @@ pub(super) fn public_schema(topic: &Topic) -> Option<Vec<u8>> {
     schema.map(|s| s.data.into_owned())
 }
 
-/// Puts all messages of a mission on the timeline.
+/// Adds all messages of a mission to the timeline.
 pub(super) fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> {
     let recording = mission.recording;
     out.add(&topics::terrain_mesh::TOPIC, 0.0, |t| {
@@ -109,7 +109,7 @@ pub(super) fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), 
 
 pub(super) fn timestamp(log_time: u64) -> Result<Timestamp, McapError> {
     let seconds = u32::try_from(log_time / 1_000_000_000);
-    let seconds = seconds.map_err(|_| McapError::unfit(format!("{log_time} ns is beyond the year 2106")))?;
+    let seconds = seconds.map_err(|_| McapError::unfit(format!("a time of {log_time} ns is beyond the year 2106")))?;
     Ok(Timestamp::new(seconds, (log_time % 1_000_000_000) as u32))
 }
 
@@ -119,7 +119,7 @@ pub(super) fn state_values(s: &StateSample) -> Vec<Value> {
     parts.concat().into_iter().map(Value::Double).chain(angles).collect()
 }
 
-/// Roll and pitch (nose down positive) in rad, of the order yaw, pitch, roll: viewers do not work them out.
+/// Roll and pitch (nose down positive) in rad, in the order yaw, pitch, roll; recorded because viewers do not compute them.
 fn roll_and_pitch(orientation: [f64; 4]) -> [f64; 2] {
     let up = |axis| rotated(orientation, axis)[2];
     let roll = libm::atan2(up([0.0, 1.0, 0.0]), up([0.0, 0.0, 1.0]));
@@ -229,7 +229,7 @@ fn vehicle_shape(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
     let wheels = vehicle.wheels.iter().map(|wheel| {
         let half = std::f64::consts::FRAC_1_SQRT_2;
         let cylinder = fox::CylinderPrimitive {
-            // A cylinder stands along z; turned by a right angle about x it lies along the axle.
+            // A cylinder's axis is z; rotated by a right angle about x it lies along the axle.
             pose: Some(pose([0.0; 3], [half, 0.0, 0.0, half])),
             size: Some(vector([2.0 * wheel.radius_m, 2.0 * wheel.radius_m, wheel.width_m])),
             bottom_scale: 1.0,
@@ -250,7 +250,7 @@ fn vehicle_shape(mission: &MissionMcap, time: Timestamp) -> fox::SceneUpdate {
     fox::SceneUpdate { deletions: vec![], entities: std::iter::once(body).chain(wheels).chain(markers).collect() }
 }
 
-/// The terrain as triangles, in full wherever one of the squares lies.
+/// The terrain as triangles, at full resolution wherever one of the squares lies.
 pub(super) fn terrain_mesh(terrain: &TerrainView<'_>, near: &[Square], time: Timestamp) -> fox::SceneUpdate {
     let &TerrainView { dem, classes, range_m: (low_m, high_m), .. } = terrain;
     let patches = mesh::terrain(dem, classes, mesh::base(low_m, high_m), near);
@@ -271,19 +271,19 @@ fn triangle_list(patch: Patch) -> fox::TriangleListPrimitive {
     }
 }
 
-/// The terrain seen from above.
+/// The terrain from above, as a grid.
 pub(super) fn terrain_from_above(terrain: &TerrainView<'_>, time: Timestamp) -> fox::Grid {
     fox::Grid { timestamp: Some(time), ..terrain.grid().clone() }
 }
 
-/// The terrain seen from above, without its time.
+/// The terrain from above, as a grid without a timestamp.
 pub(super) fn terrain_grid(dem: &Grid, classes: Option<&Grid<u8>>, low_m: f64) -> fox::Grid {
     use fox::packed_element_field::NumericType;
     let g = &dem.geometry;
     let step = g.rows.max(g.cols).div_ceil(GRID_CELLS).max(1);
     let (rows, cols) = (g.rows.div_ceil(step), g.cols.div_ceil(step));
     let mut data = Vec::with_capacity(rows * cols * 8);
-    // The message's rows run from south to north.
+    // Rows of the message run from south to north.
     for (row, col) in (0..rows).rev().flat_map(|r| (0..cols).map(move |c| (r, c))) {
         let (row, col) = ((row * step + step / 2).min(g.rows - 1), (col * step + step / 2).min(g.cols - 1));
         let z = in_steps(dem.at(row, col), ELEVATION);
@@ -311,7 +311,7 @@ pub(super) fn terrain_grid(dem: &Grid, classes: Option<&Grid<u8>>, low_m: f64) -
     }
 }
 
-/// South-west corner of a thinned grid whose rows count from the north.
+/// South-west corner of a thinned grid whose rows are counted from the north.
 fn grid_corner(g: &Geometry, rows: usize, step: usize, z: f64) -> [f64; 3] {
     let north = g.origin[1] + g.rows as f64 * g.cell[1];
     [g.origin[0], north - (rows * step) as f64 * g.cell[1], z]

@@ -1,8 +1,8 @@
 //! MJCF, the model files of MuJoCo.
 //!
-//! A wheel may have several joints, so that no link without mass is needed between them. `priority` lets the friction of the
-//! vehicle count, not the ground's. `condim` 6 adds rolling friction, a length: rolling resistance times radius. The file holds no
-//! ground: include it beside a terrain, or attach it.
+//! A wheel may have several joints, so no massless links are needed between them. `priority` makes the friction of the vehicle
+//! override the ground's. `condim` 6 adds rolling friction, which is a length: rolling resistance times radius. The file contains
+//! no ground: include it next to a terrain, or attach it.
 
 use super::{axis, children, escaped, head, numbers};
 use sastrugi_schemas::mechanism::{GroundFriction, Joint, Link, Mechanism, Motion, Motor, Servo, Shape};
@@ -16,7 +16,7 @@ pub(super) fn render(mechanism: &Mechanism) -> String {
     }
     let _ = write!(
         text,
-        "  The friction of the vehicle counts, whatever the ground's (priority 1). No ground: include this file beside a terrain.\n-->\n\
+        "  The friction of the vehicle overrides that of the ground (priority 1). No ground: include this file next to a terrain.\n-->\n\
          <mujoco model=\"{}\">\n  <compiler angle=\"radian\" autolimits=\"true\"/>\n  \
          <option gravity=\"0 0 -9.80665\" timestep=\"0.002\" integrator=\"implicitfast\" cone=\"elliptic\" impratio=\"10\"/>\n  <worldbody>\n",
         escaped(&mechanism.name)
@@ -31,7 +31,7 @@ pub(super) fn render(mechanism: &Mechanism) -> String {
     text
 }
 
-/// A link with all that hangs on it.
+/// A link with all its descendants.
 fn body(text: &mut String, mechanism: &Mechanism, number: usize, link: &Link, depth: usize) {
     let indent = "  ".repeat(depth);
     let origin = match link.parent {
@@ -94,7 +94,7 @@ fn geom(name: &str, shape: &Shape, friction: &GroundFriction) -> String {
     }
 }
 
-/// Wheels may reach into the box of the chassis.
+/// Excludes contacts between wheels and chassis box, which may overlap.
 fn contacts(text: &mut String, mechanism: &Mechanism) {
     let Some(chassis) = mechanism.links.first() else { return };
     text.push_str("  <contact>\n");
@@ -105,12 +105,12 @@ fn contacts(text: &mut String, mechanism: &Mechanism) {
     text.push_str("  </contact>\n");
 }
 
-/// Motors that turn several wheels.
+/// Motors that drive several wheels.
 fn shared(mechanism: &Mechanism) -> impl Iterator<Item = &Motor> {
     mechanism.motors.iter().filter(|motor| motor.joints.len() > 1)
 }
 
-/// The mean of the joints of each motor that turns several.
+/// The mean of the joints of each motor that drives several.
 fn tendons(text: &mut String, mechanism: &Mechanism) {
     if shared(mechanism).next().is_none() {
         return;
@@ -127,7 +127,7 @@ fn tendons(text: &mut String, mechanism: &Mechanism) {
     text.push_str("  </tendon>\n");
 }
 
-/// Joints that move together: those of a motor that turns several, and those of a differential.
+/// Coupled joints: those of a motor that drives several, and those of a differential.
 fn equalities(text: &mut String, mechanism: &Mechanism) {
     let driven = shared(mechanism).flat_map(|motor| {
         let first = motor.joints.first();

@@ -1,12 +1,12 @@
-//! Vehicles for other simulators: MJCF, the model files of MuJoCo, and URDF, which ROS, Gazebo, Isaac Sim and others read.
+//! Vehicle models for other simulators: MJCF for MuJoCo, and URDF for ROS, Gazebo, Isaac Sim and others.
 //!
-//! Both hold the same bodies, joints and names, in SI units; every number that a format cannot hold stands in a comment. The same
-//! vehicle gives the same bytes.
+//! Both contain the same bodies, joints and names, in SI units; values that a format cannot express are given in comments. The
+//! same vehicle gives the same bytes.
 //!
-//! * MJCF (MuJoCo XML reference): springs, dampers and stops, the differential of rockers as an equality constraint, motors as
+//! * MJCF (MuJoCo XML reference): springs, dampers and stops, the rocker differential as an equality constraint, motors as
 //!   servos, rolling resistance as rolling friction.
-//! * URDF (ROS, `urdf/XML`): damping and stops; the differential as `mimic`; springs and rolling resistance as comments; friction as
-//!   the `gazebo` elements that Gazebo reads.
+//! * URDF (ROS, `urdf/XML`): damping and stops; the differential as `mimic`; springs and rolling resistance as comments; friction
+//!   in `gazebo` elements.
 
 mod mjcf;
 mod urdf;
@@ -22,20 +22,20 @@ use std::path::Path;
 /// Formats of vehicle files.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Format {
-    /// MuJoCo's.
+    /// MuJoCo model.
     Mjcf,
-    /// That of ROS.
+    /// ROS robot description.
     Urdf,
 }
 
-/// Endings of names that [`write()`] takes.
+/// File name endings that [`write()`] supports.
 pub const WRITTEN_ENDINGS: &str = ".xml (MJCF) and .urdf";
 
 impl Format {
-    /// Every format.
+    /// All formats.
     pub const ALL: [Self; 2] = [Self::Mjcf, Self::Urdf];
 
-    /// The format of a file name's ending.
+    /// The format with the ending of a file name.
     pub fn of_name(path: &Path) -> Option<Self> {
         let ending = path.extension()?.to_str()?.to_ascii_lowercase();
         Self::ALL.into_iter().find(|format| format.ending() == ending)
@@ -58,7 +58,7 @@ impl Format {
     }
 }
 
-/// The text of a vehicle's file.
+/// The text of a vehicle file.
 pub fn render(mechanism: &Mechanism, format: Format) -> String {
     match format {
         Format::Mjcf => mjcf::render(mechanism),
@@ -69,33 +69,33 @@ pub fn render(mechanism: &Mechanism, format: Format) -> String {
 /// Writes the file of a vehicle.
 ///
 /// # Errors
-/// When the file system refuses.
+/// The file system failed.
 pub fn write<'a>(target: impl Into<Target<'a>>, mechanism: &Mechanism, format: Format) -> io::Result<()> {
     atomic::write(target.into(), render(mechanism, format).as_bytes())
 }
 
-/// Sentences a user must know before a file of this format is loaded.
+/// Notes for the user on a file of this format.
 pub fn notes(mechanism: &Mechanism, format: Format) -> Vec<String> {
     let springs = mechanism.links.iter().flat_map(|link| &link.joints).any(|joint| joint.spring.is_some());
     let lost = (format == Format::Urdf && springs)
-        .then(|| "URDF has no springs; the file states them in comments, to be set in the simulator".to_owned());
+        .then(|| "URDF has no springs; set them in the simulator from the comments in the file".to_owned());
     mechanism.links.iter().filter_map(impossible).chain(lost).collect()
 }
 
-/// What is wrong with the moments of inertia of a link, if anything.
+/// Reports moments of inertia of a link that are physically impossible.
 fn impossible(link: &Link) -> Option<String> {
     let [x, y, z] = link.inertia_kg_m2;
     let largest = x.max(y).max(z);
     (2.0 * largest > x + y + z).then(|| {
         format!(
-            "the largest moment of inertia of {}, {largest} kg m2, exceeds the sum of the other two, which no rigid body has; \
-             MuJoCo refuses to load it",
+            "the largest moment of inertia of {}, {largest} kg m2, exceeds the sum of the other two, which is impossible for a rigid \
+             body; MuJoCo refuses to load it",
             link.name
         )
     })
 }
 
-/// What both formats state at their head, a line each.
+/// Header lines common to both formats.
 fn head(mechanism: &Mechanism) -> Vec<String> {
     let friction = &mechanism.friction;
     let mass_kg: f64 = mechanism.links.iter().map(|link| link.mass_kg).sum();
@@ -106,21 +106,21 @@ fn head(mechanism: &Mechanism) -> Vec<String> {
             mechanism.name
         ),
         format!(
-            "{mass_kg:.3} kg. On level ground base_link stands {:.4} m high, all joints at zero.",
+            "{mass_kg:.3} kg. On level ground, with all joints at zero, base_link is {:.4} m above the ground.",
             mechanism.standing_height_m
         ),
         format!(
-            "Wheels are rigid here. In the model of sastrugi tyres give way by {:.4} m under the weight.",
+            "Wheels are rigid here; in sastrugi's own model the tyres sag by {:.4} m under the weight.",
             mechanism.tyre_sag_m
         ),
         format!(
-            "Friction of the surface {}: wheels {}, chassis {}, rolling resistance {}.",
+            "Friction on surface {}: wheels {}, chassis {}, rolling resistance {}.",
             friction.surface, friction.wheel, friction.belly, friction.rolling
         ),
     ]
 }
 
-/// Children of a link, by number.
+/// Children of a link, with their indices.
 fn children(mechanism: &Mechanism, parent: Option<usize>) -> impl Iterator<Item = (usize, &Link)> {
     mechanism.links.iter().enumerate().filter(move |(_, link)| link.parent == parent)
 }
@@ -135,11 +135,11 @@ const fn axis(motion: Motion) -> &'static str {
 
 /// Numbers with spaces between them.
 fn numbers(values: &[f64]) -> String {
-    // No minus sign before zero.
+    // Adding zero turns -0 into 0.
     values.iter().map(|v| (v + 0.0).to_string()).collect::<Vec<_>>().join(" ")
 }
 
-/// Text inside of an attribute in double quotes.
+/// Text escaped for an attribute in double quotes.
 fn escaped(text: &str) -> String {
     text.replace('&', "&amp;").replace('<', "&lt;").replace('"', "&quot;")
 }

@@ -55,7 +55,7 @@ fn has(text: &str, parts: &[&str]) {
     }
 }
 
-/// Elements that are opened are closed, in order.
+/// Every opened element is closed, in order.
 fn is_balanced(text: &str) {
     let mut open = Vec::new();
     for tag in text.split('<').skip(1).map(|rest| rest.split('>').next().unwrap()) {
@@ -70,7 +70,7 @@ fn is_balanced(text: &str) {
 }
 
 #[test]
-fn val_mjcf_says_it_all() {
+fn val_mjcf_is_complete() {
     let text = render(&mechanism(), Format::Mjcf);
     is_balanced(&text);
     has(
@@ -87,9 +87,9 @@ fn val_mjcf_says_it_all() {
     );
 }
 
-/// One joint a link: carriers take a hundredth of the wheel's mass each, and all of it is there.
+/// One joint per link: each carrier takes a hundredth of the wheel's mass, and the total mass is unchanged.
 #[test]
-fn val_urdf_says_what_it_can() {
+fn val_urdf_has_carriers_limits_and_comments() {
     let text = render(&mechanism(), Format::Urdf);
     is_balanced(&text);
     has(
@@ -101,7 +101,7 @@ fn val_urdf_says_what_it_can() {
             "<joint name=\"wheel_spin\" type=\"continuous\">",
             "<limit effort=\"40\" velocity=\"5\"/>",
             "<mimic joint=\"left_pivot\" multiplier=\"-1\" offset=\"0\"/>",
-            "<!-- spring: stiffness 5000 N/m, without load at -0.05 m; damping 100 N s/m -->",
+            "<!-- spring: stiffness 5000 N/m, unloaded at -0.05 m; damping 100 N s/m -->",
         ],
     );
     let masses =

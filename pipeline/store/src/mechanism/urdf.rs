@@ -1,18 +1,18 @@
 //! URDF, the robot description of ROS.
 //!
-//! A joint of URDF has one degree of freedom: between two joints of a wheel stands a carrier, a link with [`CARRIER_SHARE`] of the
-//! wheel's mass, because engines drop or refuse links without. `effort` and `velocity` are what the motor gives; of a passive joint
-//! the largest force of its spring, and [`PASSIVE_SPEED`].
+//! A URDF joint has one degree of freedom. Between two joints of a wheel there is a carrier, a link with [`CARRIER_SHARE`] of the
+//! wheel's mass, because engines drop or refuse massless links. `effort` and `velocity` are the limits of the motor; for a passive
+//! joint, the largest force of its spring and [`PASSIVE_SPEED`].
 
 use super::{axis, children, escaped, head, numbers};
 use sastrugi_schemas::mechanism::{GroundFriction, Joint, Link, Mechanism, Motion, Motor, Servo, Shape};
 use std::fmt::Write;
 
-/// Share of a link's mass that goes to each carrier before it.
+/// Share of a link's mass assigned to each carrier before it.
 const CARRIER_SHARE: f64 = 0.01;
-/// Limit of speed of joints that nothing drives, m/s or rad/s: URDF asks for one, the model has none.
+/// Speed limit of passive joints, m/s or rad/s: URDF requires one, the model has none.
 const PASSIVE_SPEED: f64 = 100.0;
-/// Turns the axis of a cylinder, z, to y.
+/// Rotates the axis of a cylinder from z to y.
 const ABOUT_Y: &str = "1.5707963267948966 0 0";
 
 pub(super) fn render(mechanism: &Mechanism) -> String {
@@ -22,13 +22,13 @@ pub(super) fn render(mechanism: &Mechanism) -> String {
         let _ = writeln!(text, "  {line}");
     }
     text.push_str(
-        "  URDF has no springs and no rolling resistance: comments state them. Friction stands in gazebo elements.\n  \
-         base_link moves freely. Wheels may reach into the box of the chassis: switch collisions within the vehicle off.\n",
+        "  URDF has no springs and no rolling resistance: both are given in comments. Friction is given in gazebo elements.\n  \
+         base_link moves freely. Wheels may overlap the chassis box: disable self-collision of the vehicle.\n",
     );
     if !mechanism.couplings.is_empty() {
         text.push_str(
-            "  The differential between the rockers closes a loop, which URDF cannot hold: mimic states it. An engine that ignores\n  \
-             mimic lets the chassis swing freely.\n",
+            "  The differential between the rockers closes a loop, which URDF cannot express; mimic replaces it. In an engine that\n  \
+             ignores mimic the chassis swings freely.\n",
         );
     }
     let _ = writeln!(text, "-->\n<robot name=\"{}\">", escaped(&mechanism.name));
@@ -41,7 +41,7 @@ pub(super) fn render(mechanism: &Mechanism) -> String {
     text
 }
 
-/// All that hangs on a link.
+/// All descendants of a link.
 fn below(text: &mut String, mechanism: &Mechanism, number: usize, parent: &Link) {
     for (child, link) in children(mechanism, Some(number)) {
         hang(text, mechanism, &parent.name, link);
@@ -49,7 +49,7 @@ fn below(text: &mut String, mechanism: &Mechanism, number: usize, parent: &Link)
     }
 }
 
-/// A link on its parent, with a carrier between two joints.
+/// A link with its joints to the parent, and a carrier between two joints.
 fn hang(text: &mut String, mechanism: &Mechanism, parent: &str, child: &Link) {
     let carriers = child.joints.len().saturating_sub(1);
     let mut above = parent.to_owned();
@@ -69,7 +69,7 @@ fn hang(text: &mut String, mechanism: &Mechanism, parent: &str, child: &Link) {
     }
 }
 
-/// What a link weighs.
+/// Mass properties of a link.
 struct Mass {
     kg: f64,
     centre_m: [f64; 3],
@@ -77,12 +77,13 @@ struct Mass {
 }
 
 impl Mass {
-    /// A share of a link's mass, with all of its moments of inertia.
+    /// A share of a link's mass, with its full moments of inertia.
     fn of(link: &Link, share: f64) -> Self {
         Self { kg: share * link.mass_kg, centre_m: link.centre_of_mass_m, inertia_kg_m2: link.inertia_kg_m2 }
     }
 
-    /// Of a carrier: as heavy and as hard to turn, about any axis, as its share of the link is about the easiest.
+    /// Mass properties of a carrier: its share of the link's mass, and about every axis its share of the link's smallest moment of
+    /// inertia.
     fn carrier(link: &Link) -> Self {
         let [x, y, z] = link.inertia_kg_m2;
         Self {
@@ -105,8 +106,8 @@ fn link(text: &mut String, name: &str, mass: &Mass, shape: Option<&Shape>) {
     );
     if let Some(shape) = shape {
         let geometry = geometry(shape);
-        for what in ["visual", "collision"] {
-            let _ = writeln!(text, "    <{what}>\n{geometry}    </{what}>");
+        for element in ["visual", "collision"] {
+            let _ = writeln!(text, "    <{element}>\n{geometry}    </{element}>");
         }
     }
     text.push_str("  </link>\n");
@@ -153,14 +154,14 @@ fn joint(text: &mut String, mechanism: &Mechanism, joint: &Joint, [parent, child
     if let Some(spring) = &joint.spring {
         let _ = writeln!(
             text,
-            "    <!-- spring: stiffness {} N/m, without load at {} m; damping {} N s/m -->",
+            "    <!-- spring: stiffness {} N/m, unloaded at {} m; damping {} N s/m -->",
             spring.stiffness_n_m, spring.unloaded_m, joint.damping
         );
     }
     text.push_str("  </joint>\n");
 }
 
-/// Largest force or torque, and speed, of a joint.
+/// Largest force or torque, and largest speed, of a joint.
 fn limits(mechanism: &Mechanism, joint: &Joint) -> [f64; 2] {
     let is_driven = |motor: &&Motor| motor.joints.contains(&joint.name);
     match mechanism.motors.iter().find(is_driven).map(|motor| (motor.servo, motor.joints.len())) {

@@ -1,4 +1,4 @@
-//! Assembly of a release in a folder of its own, and its sealing.
+//! Assembly of a release in a temporary folder, and sealing.
 
 use super::{MANIFEST, Release, ReleaseError, SUMS, TABLES, check_path};
 use crate::atomic::sync_folder;
@@ -14,7 +14,7 @@ use std::fs::{self, File};
 use std::io::{BufWriter, ErrorKind, Write as _};
 use std::path::{Path, PathBuf};
 
-/// What a release says of itself.
+/// Identity of a release.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Head {
     /// Name of the study.
@@ -30,7 +30,7 @@ pub struct Head {
 }
 
 impl Head {
-    /// The same in the metadata of tables.
+    /// The same information for the metadata of tables.
     pub fn table_metadata(&self) -> TableMetadata {
         TableMetadata {
             study_sha256: self.study_sha256.clone(),
@@ -41,7 +41,7 @@ impl Head {
     }
 }
 
-/// A release under construction. What grows with it in memory is the manifest, whose list of files has one line for each.
+/// A release under construction. Only the manifest, with one line per file, is held in memory.
 #[derive(Debug)]
 pub struct ReleaseBuilder {
     staging: Staging,
@@ -55,14 +55,14 @@ pub struct ReleaseBuilder {
 pub struct TablePart {
     /// The table.
     pub table: &'static Table,
-    /// Its name: the file is `part-<name>.parquet`.
+    /// Name of the part; the file is `part-<name>.parquet`.
     pub name: String,
-    /// Where it comes from.
+    /// Origin.
     pub origin: Origin,
 }
 
 impl TablePart {
-    /// The one file of a table that is not parted.
+    /// Name of the part of a table that is a single file.
     pub const WHOLE: &str = "0000";
 
     fn path(&self) -> String {
@@ -70,7 +70,7 @@ impl TablePart {
     }
 }
 
-/// Writes the rows of a part. Its file appears with the first of them.
+/// Writes the rows of a part. The file is created with the first row.
 pub struct PartWriter<'a> {
     table: &'static Table,
     target: &'a Path,
@@ -79,7 +79,7 @@ pub struct PartWriter<'a> {
 }
 
 impl PartWriter<'_> {
-    /// Appends a row, which must come after the one before it in the order of the keys.
+    /// Appends a row; its key must be greater than that of the row before.
     ///
     /// # Errors
     /// The rows are not sorted, or the file cannot be written.
@@ -99,7 +99,7 @@ pub struct Incoming {
     pub path: String,
     /// File to copy.
     pub source: PathBuf,
-    /// Where it comes from.
+    /// Origin.
     pub origin: Origin,
 }
 
@@ -110,10 +110,10 @@ fn copy(source: &Path, target: &Path) -> Result<(u64, String), ReleaseError> {
 }
 
 impl ReleaseBuilder {
-    /// Starts a release beside its place: in `.sastrugi-assembling-<dest>`, which is emptied when a killed run left it.
+    /// Starts a release next to its destination, in `.sastrugi-assembling-<dest>`, which is emptied if a killed run left it.
     ///
     /// # Errors
-    /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the folder cannot be made.
+    /// [`ReleaseError::Occupied`] if `dest` holds files that are not a release; the folder cannot be created.
     pub fn beside(dest: &Path, head: Head) -> Result<Self, ReleaseError> {
         check_dest(dest)?;
         let staging = Staging::beside(dest)?;
@@ -149,7 +149,7 @@ impl ReleaseBuilder {
     /// Copies files into the release, several at a time; returns their SHA-256 in the same order.
     ///
     /// # Errors
-    /// A path is not usable, or a file cannot be read or written.
+    /// A path is not allowed, or a file cannot be read or written.
     pub fn add_files(&mut self, files: Vec<Incoming>) -> Result<Vec<String>, ReleaseError> {
         let targets = files.iter().map(|file| self.claim(&file.path)).collect::<Result<Vec<PathBuf>, _>>()?;
         let copied: Result<Vec<(u64, String)>, ReleaseError> =
@@ -178,7 +178,7 @@ impl ReleaseBuilder {
         Ok(())
     }
 
-    /// Lists a file that was written into [`ReleaseBuilder::staging`] by someone else (the report).
+    /// Lists a file that other code (the report) wrote into [`ReleaseBuilder::staging`].
     ///
     /// # Errors
     /// As [`ReleaseBuilder::add_files`].
@@ -189,11 +189,11 @@ impl ReleaseBuilder {
         Ok(())
     }
 
-    /// Writes files of tables, several at a time; `fill` pushes the rows of a part, sorted by key. A part without rows has no
+    /// Writes the files of tables, several at a time; `fill` pushes the rows of a part, sorted by key. A part without rows has no
     /// file.
     ///
     /// # Errors
-    /// Those of `fill`; a file cannot be written, or its path is taken.
+    /// Those of `fill`; a file cannot be written, or its path is already listed.
     pub fn write_tables<E: From<ReleaseError> + Send>(
         &mut self,
         parts: Vec<TablePart>,
@@ -221,12 +221,12 @@ impl ReleaseBuilder {
         self.manifest.failed.push(item);
     }
 
-    /// Names the measured data that files come from.
+    /// Sets the measured data that files derive from.
     pub fn name_sources(&mut self, sources: Vec<Source>) {
         self.manifest.sources = sources;
     }
 
-    /// Lists a sentence that readers of an item's files must know.
+    /// Lists a note for readers of an item's files.
     pub fn note(&mut self, note: ItemNote) {
         self.manifest.notes.push(note);
     }
@@ -236,15 +236,14 @@ impl ReleaseBuilder {
         self.manifest.artifacts.push(artifact);
     }
 
-    /// Where a file goes that is listed later.
+    /// Reserves the path of a file that is listed later.
     fn claim(&mut self, path: &str) -> Result<PathBuf, ReleaseError> {
         let target = self.target(path)?;
         self.paths.insert(path.to_owned());
         Ok(target)
     }
 
-    /// Writes the manifest as far as it goes, for readers of the folder under construction (the report); sealing writes it
-    /// again.
+    /// Writes the manifest so far, for readers of the folder under construction (the report); sealing rewrites it.
     ///
     /// # Errors
     /// The file system failed.
@@ -252,7 +251,7 @@ impl ReleaseBuilder {
         self.write_manifest().map(drop)
     }
 
-    /// Writes the manifest in order, and gives its SHA-256.
+    /// Sorts and writes the manifest, and returns its SHA-256.
     fn write_manifest(&mut self) -> Result<String, ReleaseError> {
         self.manifest.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
         self.manifest.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
@@ -265,11 +264,11 @@ impl ReleaseBuilder {
         Ok(written.finish().2)
     }
 
-    /// Where a file of the release goes; its folder is made.
+    /// Location of a file of the release; creates its folder.
     fn target(&self, path: &str) -> Result<PathBuf, ReleaseError> {
         check_path(path)?;
         if self.paths.contains(path) {
-            return Err(ReleaseError::Path { path: path.to_owned(), reason: "it is there twice" });
+            return Err(ReleaseError::Path { path: path.to_owned(), reason: "it is already listed" });
         }
         let target = self.staging().join(path);
         if let Some(folder) = target.parent() {
@@ -278,11 +277,11 @@ impl ReleaseBuilder {
         Ok(target)
     }
 
-    /// Writes manifest and checksums, brings everything to disk and gives the release its name. A release that is
-    /// there already is replaced.
+    /// Writes manifest and checksums, syncs everything to disk and gives the release its name. An existing release is
+    /// replaced.
     ///
     /// # Errors
-    /// [`ReleaseError::Occupied`] when `dest` holds something that is no release; the file system failed.
+    /// [`ReleaseError::Occupied`] if `dest` holds files that are not a release; the file system failed.
     pub fn seal(mut self, dest: &Path) -> Result<Release, ReleaseError> {
         check_dest(dest)?;
         remove_empty_folders(self.staging())?;
@@ -308,7 +307,7 @@ pub(super) fn sums(manifest: &Manifest, manifest_sha256: &str) -> String {
     })
 }
 
-/// Refuses a place that holds something that is no release.
+/// Refuses a destination that holds files that are not a release.
 fn check_dest(dest: &Path) -> Result<(), ReleaseError> {
     let occupied = || ReleaseError::Occupied { path: dest.to_owned() };
     match fs::read_dir(dest).map(|mut entries| entries.next().is_none()) {
@@ -320,7 +319,7 @@ fn check_dest(dest: &Path) -> Result<(), ReleaseError> {
     }
 }
 
-/// `.sastrugi-<role>-<name of dest>` in the same folder: a name that nobody's own folder has.
+/// `.sastrugi-<role>-<name of dest>` in the same folder: a name that no user's folder should have.
 pub fn beside(dest: &Path, role: &str) -> PathBuf {
     let mut name = OsString::from(format!(".sastrugi-{role}-"));
     name.push(dest.file_name().unwrap_or_else(|| "release".as_ref()));
@@ -334,7 +333,7 @@ fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
     }
 }
 
-/// Removes the folders below a folder that hold nothing, as those of tables without rows.
+/// Removes empty subfolders, such as those of tables without rows.
 fn remove_empty_folders(folder: &Path) -> Result<(), ReleaseError> {
     for entry in fs::read_dir(folder).map_err(ReleaseError::io(folder))? {
         let entry = entry.map_err(ReleaseError::io(folder))?;
@@ -350,15 +349,15 @@ fn remove_empty_folders(folder: &Path) -> Result<(), ReleaseError> {
     Ok(())
 }
 
-/// A folder under construction, `.sastrugi-assembling-<dest>`: removed on drop unless it was put in place.
+/// A folder under construction, `.sastrugi-assembling-<dest>`: removed on drop unless it has been put in place.
 #[derive(Debug)]
 pub struct Staging(PathBuf);
 
 impl Staging {
-    /// An empty folder beside its place; what a killed run left there is removed.
+    /// Creates an empty folder next to the destination; remains of a killed run are removed.
     ///
     /// # Errors
-    /// The file system refused.
+    /// The file system failed.
     pub fn beside(dest: &Path) -> Result<Self, ReleaseError> {
         let staging = Self(beside(dest, "assembling"));
         remove_folder(staging.path())?;
@@ -371,10 +370,10 @@ impl Staging {
         &self.0
     }
 
-    /// Gives the finished folder its name. It replaces what has that name, which stays until then.
+    /// Renames the finished folder to its final name, replacing a previous one, which stays until then.
     ///
     /// # Errors
-    /// The file system refused.
+    /// The file system failed.
     pub fn put_in_place(&self, dest: &Path) -> Result<(), ReleaseError> {
         let aside = beside(dest, "replaced");
         remove_folder(&aside)?;
@@ -382,7 +381,7 @@ impl Staging {
             fs::rename(dest, &aside).map_err(ReleaseError::io(dest))?;
         }
         fs::rename(self.path(), dest).map_err(|e| {
-            // Where this fails as well, the release that was there keeps the other name.
+            // If this fails as well, the previous release keeps its temporary name.
             let _ = fs::rename(&aside, dest);
             ReleaseError::io(dest)(e)
         })?;
@@ -397,12 +396,12 @@ impl Staging {
 
 impl Drop for Staging {
     fn drop(&mut self) {
-        // What cannot be removed is removed when the next run begins.
+        // If this fails, the next run removes the folder.
         let _ = fs::remove_dir_all(&self.0);
     }
 }
 
-/// Brings every file and folder of a tree to disk.
+/// Syncs every file and folder of a tree to disk.
 fn sync_tree(folder: &Path) -> Result<(), ReleaseError> {
     let entries =
         fs::read_dir(folder).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(ReleaseError::io(folder))?;

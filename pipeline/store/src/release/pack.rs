@@ -1,6 +1,6 @@
-//! A release as one tar archive whose bytes follow from the release's files and date alone: files in order of their paths,
-//! below a folder with the study's name, mode 644, owner and group 0, one date. Written with GNU headers, whose sizes know no
-//! bound that matters; a name of more than 100 bytes has an entry of its own before it.
+//! A release as one tar archive whose bytes depend only on the release's files and date: files in order of their paths, below a
+//! folder with the study's name, mode 644, owner and group 0, one date. Uses GNU headers, which have no relevant size limit; a
+//! name of more than 100 bytes is stored in an entry of its own before the file.
 
 use super::{MANIFEST, Release, ReleaseError, SUMS};
 use crate::atomic::AtomicFile;
@@ -8,23 +8,23 @@ use crate::digest::Hashed;
 use std::io::{Read, Write};
 use std::path::Path;
 
-/// An archive that was written.
+/// Summary of a written archive.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Packed {
-    /// Files in it.
+    /// Number of files.
     pub files: u64,
-    /// Its length, bytes.
+    /// Length, bytes.
     pub bytes: u64,
-    /// SHA-256 of its bytes.
+    /// SHA-256 of the archive.
     pub sha256: String,
 }
 
-/// Writes a release that was found whole ([`super::verify`]) to the archive `target`; `time_s` is the date of every file, s
-/// since 1970-01-01 UTC. Calls `added` with the path and the bytes of every file.
+/// Writes a verified release ([`super::verify`]) to the archive `target`; `time_s` is the date of every file, s since 1970-01-01
+/// UTC. Calls `added` with the path and length of every file.
 ///
 /// # Errors
-/// [`ReleaseError::Changed`] for a file that is no longer the one that was sealed; the file system failed. There is no new
-/// archive then.
+/// [`ReleaseError::Changed`] for a file that has changed since it was sealed; the file system failed. No archive is written
+/// in either case.
 pub fn pack(release: &Release, target: &Path, time_s: u64, added: &dyn Fn(&str, u64)) -> Result<Packed, ReleaseError> {
     let artifacts = release.manifest.artifacts.iter().map(|a| (a.path.as_str(), Some(a.sha256.as_str())));
     let mut files: Vec<(&str, Option<&str>)> = artifacts.chain([(MANIFEST, None), (SUMS, None)]).collect();

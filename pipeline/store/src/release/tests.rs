@@ -29,17 +29,17 @@ fn sealed(dest: &Path) -> Release {
     let mut builder = ReleaseBuilder::beside(dest, head()).unwrap();
     builder.write_text("README.md", "# Demo\n", Origin::default()).unwrap();
     builder.write_text("fit/a.json", "{}\n", Origin { stage: "fit".to_owned(), ..Origin::default() }).unwrap();
-    let whole = |table| TablePart { table, name: TablePart::WHOLE.to_owned(), origin: Origin::default() };
+    let single = |table| TablePart { table, name: TablePart::WHOLE.to_owned(), origin: Origin::default() };
     let fill = |part: &TablePart, writer: &mut PartWriter<'_>| {
         let rows = if part.table.name == PsdRow::TABLE.name { rows(9000) } else { Vec::new() };
         rows.iter().try_for_each(|row| writer.push(row.cells()))
     };
-    builder.write_tables(vec![whole(&PsdRow::TABLE), whole(&CovarianceRow::TABLE)], fill).unwrap();
+    builder.write_tables(vec![single(&PsdRow::TABLE), single(&CovarianceRow::TABLE)], fill).unwrap();
     builder.seal(dest).unwrap()
 }
 
 #[test]
-fn val_a_release_opens_verifies_and_gives_its_rows_back() {
+fn val_a_release_opens_verifies_and_returns_its_rows() {
     let folder = tempfile::tempdir().unwrap();
     let dest = folder.path().join("release");
     sealed(&dest);
@@ -50,7 +50,7 @@ fn val_a_release_opens_verifies_and_gives_its_rows_back() {
     assert!(back[3].psd_m4.is_nan());
     assert_eq!(back[8999], rows(9000)[8999]);
     assert!(release.table_files("covariance").is_empty());
-    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left beside the release");
+    assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "nothing is left next to the release");
 }
 
 #[test]
@@ -90,7 +90,7 @@ fn flip(path: &Path, at: u64) {
     file.write_all(&[byte[0] ^ 1]).unwrap();
 }
 
-/// Places outside the release are neither read nor looked at, whoever wrote its lists; a list has a file once; a folder without files is extra.
+/// Paths outside the release are never accessed, whatever its lists contain; a list has each file once; an empty folder is extra.
 #[test]
 fn val_hostile_folders_are_refused() {
     let root = tempfile::tempdir().unwrap();
@@ -103,14 +103,14 @@ fn val_hostile_folders_are_refused() {
     for path in ["../secret", outside.as_str(), "a/../../secret", ".hidden", MANIFEST] {
         fs::write(dest.join(MANIFEST), manifest.replacen(&first, path, 1)).unwrap();
         let refused = Release::open(&dest).unwrap_err();
-        assert!(refused.unusable_input() && refused.to_string().contains("cannot be"), "{path}: {refused}");
+        assert!(refused.unusable_input() && refused.to_string().contains("invalid path"), "{path}: {refused}");
         let problems = verify(&dest).unwrap().problems;
         assert!(problems.iter().any(|p| p.path == MANIFEST && p.kind == ProblemKind::Inconsistent), "{problems:?}");
     }
     let second = Release::open(&rebuilt(&dest, &manifest)).unwrap().manifest().artifacts[1].path.clone();
     fs::write(dest.join(MANIFEST), manifest.replacen(&second, &first, 1)).unwrap();
     assert!(Release::open(&dest).unwrap_err().to_string().contains("twice"));
-    // Without a manifest the checksums count.
+    // Without a manifest the checksums are used.
     let sums = fs::read_to_string(dest.join(SUMS)).unwrap();
     fs::remove_file(dest.join(MANIFEST)).unwrap();
     fs::write(dest.join(SUMS), sums.replacen(&first, "../secret", 1)).unwrap();
@@ -151,7 +151,7 @@ fn val_missing_extra_and_truncated_files_are_named() {
 }
 
 #[test]
-fn val_other_folders_are_left_alone() {
+fn val_other_folders_are_left_untouched() {
     let folder = tempfile::tempdir().unwrap();
     let dest = folder.path().join("mine");
     fs::create_dir(&dest).unwrap();

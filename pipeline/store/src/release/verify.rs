@@ -1,4 +1,4 @@
-//! Checking a release against its own checksums, manifest and table descriptions.
+//! Verification of a release against its own checksums, manifest and table descriptions.
 
 use super::builder::sums;
 use super::{MANIFEST, ReleaseError, SUMS, check_path, parse_manifest, table_of};
@@ -13,25 +13,25 @@ use std::fs;
 use std::io;
 use std::path::Path;
 
-/// What [`verify`] found.
+/// Result of [`verify`].
 #[derive(Clone, Debug, Default, PartialEq, Eq)]
 pub struct VerifyReport {
     /// Files checked.
     pub files: u64,
     /// Bytes checked.
     pub bytes: u64,
-    /// What is wrong, by path; empty for a good release.
+    /// Problems by path; empty for an intact release.
     pub problems: Vec<Problem>,
 }
 
-/// Something wrong with a file of a release.
+/// A problem with a file of a release.
 #[derive(Clone, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub struct Problem {
     /// Path in the release.
     pub path: String,
-    /// What kind.
+    /// Kind of problem.
     pub kind: ProblemKind,
-    /// One fragment with the figures.
+    /// Sentence fragment with the offending values.
     pub message: String,
 }
 
@@ -44,15 +44,15 @@ impl fmt::Display for Problem {
 /// Kinds of problems.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum ProblemKind {
-    /// Listed, but not there.
+    /// Listed, but missing.
     Missing,
-    /// There, but not listed.
+    /// Present, but not listed.
     Extra,
-    /// Of another size than listed.
+    /// Size differs from the listed one.
     Size,
-    /// Of another hash than listed.
+    /// Hash differs from the listed one.
     Checksum,
-    /// A table with other columns, types, units or number of rows.
+    /// A table with different columns, types, units or number of rows.
     Table,
     /// Manifest and checksums contradict each other, or cannot be read.
     Inconsistent,
@@ -62,12 +62,39 @@ pub enum ProblemKind {
 /// that manifest and checksums agree.
 ///
 /// # Errors
-/// [`ReleaseError::NotARelease`] when the folder holds neither manifest nor checksums; the file system failed.
+/// [`ReleaseError::NotARelease`] if the folder has neither manifest nor checksums; the file system failed.
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_schemas::manifest::Origin;
+/// use sastrugi_store::release::{Head, ProblemKind, ReleaseBuilder, verify};
+///
+/// let folder = tempfile::tempdir()?;
+/// let dest = folder.path().join("demo");
+/// let head = Head {
+///     name: "demo".to_owned(),
+///     study_sha256: "ab".repeat(32),
+///     seed: 7,
+///     version: "0.1.0".to_owned(),
+///     license: "CC-BY-4.0".to_owned(),
+/// };
+/// let mut builder = ReleaseBuilder::beside(&dest, head)?;
+/// builder.write_text("README.md", "# Demo\n", Origin::default())?;
+/// builder.seal(&dest)?;
+/// assert_eq!(verify(&dest)?.problems, []);
+///
+/// std::fs::write(dest.join("README.md"), "# Fake\n")?;
+/// let problems = verify(&dest)?.problems;
+/// assert_eq!((problems[0].path.as_str(), problems[0].kind), ("README.md", ProblemKind::Checksum));
+/// # Ok(())
+/// # }
+/// ```
 pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
     let manifest_text = read_if_there(&folder.join(MANIFEST))?;
     let sums_text = read_if_there(&folder.join(SUMS))?;
     if manifest_text.is_none() && sums_text.is_none() {
-        return Err(ReleaseError::not_a_release(folder, format!("there is neither {MANIFEST} nor {SUMS} in it")));
+        return Err(ReleaseError::not_a_release(folder, format!("it has neither {MANIFEST} nor {SUMS}")));
     }
     let mut report = VerifyReport::default();
     let mut problem = |path: &str, kind, message: String| {
@@ -96,14 +123,14 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
     if let (Some(manifest), Some(bytes), Some(text)) = (&manifest, &manifest_text, &sums_text)
         && sums(manifest, &digest::of_bytes(bytes)).as_bytes() != text
     {
-        problem(SUMS, ProblemKind::Inconsistent, format!("does not list what {MANIFEST} lists, line for line"));
+        problem(SUMS, ProblemKind::Inconsistent, format!("does not match {MANIFEST} line by line"));
     }
 
     let there = files_of(folder)?;
     let artifacts = expected(manifest.as_ref(), &listed);
     let names: BTreeSet<&str> = artifacts.keys().map(String::as_str).chain([MANIFEST, SUMS]).collect();
     for path in there.iter().filter(|path| !names.contains(path.as_str())) {
-        let what = if path.ends_with('/') { "the folder is empty" } else { "the file is not listed" };
+        let what = if path.ends_with('/') { "the folder is empty" } else { "the file is not listed in the manifest" };
         problem(path, ProblemKind::Extra, what.to_owned());
     }
     let checks: Vec<(u64, Option<Problem>)> =
@@ -123,14 +150,14 @@ fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, ReleaseError> {
     }
 }
 
-/// Hash by path; lines that are none of ours are left to the comparison with the manifest.
+/// Hash by path; malformed lines are left to the comparison with the manifest.
 fn parse_sums(text: &[u8]) -> BTreeMap<String, String> {
     let text = String::from_utf8_lossy(text);
     text.lines().filter_map(|line| line.split_once("  ")).map(|(sha, path)| (path.to_owned(), sha.to_owned())).collect()
 }
 
-/// What should be there: as the manifest says, or as the checksums say where the manifest is lost. The manifest's own
-/// line, which only the checksums have, comes along.
+/// Expected files: those of the manifest, or of the checksums if the manifest is missing. The manifest's own line, which only the
+/// checksums have, is included.
 fn expected(manifest: Option<&Manifest>, listed: &BTreeMap<String, String>) -> BTreeMap<String, Artifact> {
     let unsized_artifact = |(path, sha256): (&String, &String)| {
         let artifact = Artifact { path: path.clone(), sha256: sha256.clone(), bytes: u64::MAX, ..Artifact::default() };
@@ -145,25 +172,25 @@ fn expected(manifest: Option<&Manifest>, listed: &BTreeMap<String, String>) -> B
     }
 }
 
-/// Checks one file; returns its size and the first thing that is wrong.
+/// Checks one file; returns its size and the first problem found.
 fn check(folder: &Path, artifact: &Artifact) -> Result<(u64, Option<Problem>), ReleaseError> {
     let path = folder.join(&artifact.path);
     let problem = |kind, message| Some(Problem { path: artifact.path.clone(), kind, message });
     let size = match fs::symlink_metadata(&path) {
         Ok(found) if found.is_file() => found.len(),
-        Ok(_) => return Ok((0, problem(ProblemKind::Missing, "is not a plain file".to_owned()))),
+        Ok(_) => return Ok((0, problem(ProblemKind::Missing, "is not a regular file".to_owned()))),
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => {
             return Ok((0, problem(ProblemKind::Missing, "the file is missing".to_owned())));
         }
         Err(e) => return Err(ReleaseError::io(&path)(e)),
     };
     if artifact.bytes != u64::MAX && size != artifact.bytes {
-        let message = format!("has {size} bytes instead of {}", artifact.bytes);
+        let message = format!("has {size} bytes, expected {}", artifact.bytes);
         return Ok((size, problem(ProblemKind::Size, message)));
     }
     let (_, sha256) = digest::of_file(&path).map_err(ReleaseError::io(&path))?;
     if sha256 != artifact.sha256 {
-        let message = format!("has the SHA-256 {sha256} instead of {}", artifact.sha256);
+        let message = format!("has SHA-256 {sha256}, expected {}", artifact.sha256);
         return Ok((size, problem(ProblemKind::Checksum, message)));
     }
     let table = check_rows(&path, artifact).err().and_then(|message| problem(ProblemKind::Table, message));
@@ -173,15 +200,15 @@ fn check(folder: &Path, artifact: &Artifact) -> Result<(u64, Option<Problem>), R
 /// Checks a table's columns and number of rows.
 fn check_rows(path: &Path, artifact: &Artifact) -> Result<(), String> {
     let Some(name) = table_of(&artifact.path) else { return Ok(()) };
-    let table = tables::by_name(name).ok_or_else(|| format!("there is no table {name} in this version"))?;
+    let table = tables::by_name(name).ok_or_else(|| format!("table {name} does not exist in this version"))?;
     let rows = check_table(path, table).map_err(|e| e.to_string())?;
     match artifact.origin.records {
-        Some(expected) if expected != rows => Err(format!("has {rows} rows instead of {expected}")),
+        Some(expected) if expected != rows => Err(format!("has {rows} rows, expected {expected}")),
         _ => Ok(()),
     }
 }
 
-/// Paths of everything below a folder that is not a folder, with `/` between folders, and of folders without anything, with `/` at the end.
+/// Paths of all files below a folder, with `/` between folders, and of empty folders, with a trailing `/`.
 fn files_of(folder: &Path) -> Result<BTreeSet<String>, ReleaseError> {
     let mut files = BTreeSet::new();
     let mut folders = vec![(folder.to_owned(), String::new())];

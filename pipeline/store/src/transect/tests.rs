@@ -1,5 +1,6 @@
 use super::*;
 use proptest::prelude::*;
+use proptest::sample::Index;
 use std::fs;
 
 fn of(text: &str, options: &TransectOptions) -> Result<Transects, DemError> {
@@ -59,21 +60,21 @@ fn val_missing_heights() {
 }
 
 #[test]
-fn val_refusals_name_the_place() {
+fn val_errors_give_line_and_column() {
     for (text, words) in [
-        ("", "no line of heights"),
-        ("x,a\n", "no line of heights"),
-        ("x,a\n0,1\n1,two\n2,3\n", "line 3, column 2: \"two\" is no number"),
+        ("", "no lines of heights"),
+        ("x,a\n", "no lines of heights"),
+        ("x,a\n0,1\n1,two\n2,3\n", "line 3, column 2: \"two\" is not a number"),
         ("1,abc\n", "line 1, column 2: \"abc\""),
-        ("x;a\n0;1,5\n", "line 2, column 2: \"1,5\" is no number; decimals are written with a point"),
+        ("x;a\n0;1,5\n", "line 2, column 2: \"1,5\" is not a number; use a decimal point"),
         ("x,a\n0,inf\n1,2\n", "line 2, column 2: \"inf\" is not finite"),
-        ("x,a\n\n# rest\n0,1\n1,2,3\n", "line 5 has 3 columns; the lines before have 2"),
-        ("x,a,b\n0,1\n1,2\n", "names 3 columns; line 2 has 2"),
-        ("x,a\n0,1\n1,2\n3,4\n4,5\n", "line 3, column 1: the distance is off its even place"),
+        ("x,a\n\n# rest\n0,1\n1,2,3\n", "line 5 has 3 columns; the lines before it have 2"),
+        ("x,a,b\n0,1\n1,2\n", "names 3 columns, but line 2 has 2"),
+        ("x,a\n0,1\n1,2\n3,4\n4,5\n", "line 3, column 1: distances are not evenly spaced"),
         ("x,a\n0,1\nnan,2\n2,4\n", "line 3, column 1"),
         ("x,a\n5,1\n5,2\n5,4\n", "line 2, column 1"),
-        ("x,a\n0,1\n", "one line only"),
-        ("x,a,b\n0,1,\n1,2,\n", "profile 2 has no height"),
+        ("x,a\n0,1\n", "only one line"),
+        ("x,a,b\n0,1,\n1,2,\n", "profile 2 has no heights"),
     ] {
         let error = of(text, &TransectOptions::default()).unwrap_err();
         assert!(error.unusable_input() && error.to_string().contains(words), "{text:?}: {error}");
@@ -86,14 +87,14 @@ fn val_refusals_name_the_place() {
     assert!(of("x,a\n0,1\n1,2\n", &every(1.0)).is_ok());
     assert!(of("1\n2\n", &every(-1.0)).unwrap_err().to_string().contains("above 0"));
     let only = TransectOptions { distance_column: Some(true), ..TransectOptions::default() };
-    assert!(of("0\n1\n2\n", &only).unwrap_err().to_string().contains("distances only"));
+    assert!(of("0\n1\n2\n", &only).unwrap_err().to_string().contains("only distances"));
     assert!(
         read(Path::new("nothing.csv"), &TransectOptions::default()).unwrap_err().to_string().contains("no such file")
     );
 }
 
 #[test]
-fn val_what_may_be_a_transect() {
+fn val_transects_are_recognised_by_ending() {
     let folder = tempfile::tempdir().unwrap();
     let is = |name: &str, text: &str| {
         let path = folder.path().join(name);
@@ -104,27 +105,107 @@ fn val_what_may_be_a_transect() {
     assert!(!is("a.tif", "x") && !is("grid.txt", "ncols 2\nnrows 1\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n"));
 }
 
-/// Four profiles over ice, measured from the air: 200 heights every metre, first and last line as in the file.
+/// The form of a published table of four profiles: names separated by blanks, values by commas, distances that start half a spacing
+/// from zero, 15 digits.
 #[test]
-fn val_the_greenland_profiles() {
-    let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data/greenland_ice_profiles_S5_uav_1m.txt");
-    if !path.exists() {
-        eprintln!("skipped: ../shared/data/greenland_ice_profiles_S5_uav_1m.txt is absent");
-        return;
-    }
-    assert!(looks_like(&path));
-    let found = read(&path, &TransectOptions::default()).unwrap();
+fn val_a_table_in_its_published_form() {
+    let height = |profile: usize, k: usize| (1000 * profile + k) as f64 / 7.0 - 12.0;
+    let line = |k: usize| {
+        let heights = (0..4).map(|profile| format!("{:.15}", height(profile, k)));
+        [format!("{k}.5")].into_iter().chain(heights).collect::<Vec<_>>().join(",") + "\n"
+    };
+    let values: String = (0..200).map(line).collect();
+    let found = plain(&format!("Upwind_distance(m) WD90(m) WD120(m) WD150(m) WD186(m)\n{values}"));
     assert_eq!(found.spacing_m, 1.0);
     assert_eq!(found.names, ["WD90(m)", "WD120(m)", "WD150(m)", "WD186(m)"]);
-    assert!(found.profiles.iter().all(|p| p.len() == 200 && p.iter().all(|z| z.is_finite())));
-    assert_eq!(found.profiles[0][0], 0.564916968345642);
-    assert_eq!(found.profiles[3][199], -1.29122316837311);
+    assert_eq!(found.profiles.iter().map(Vec::len).collect::<Vec<_>>(), [200; 4]);
+    for (profile, heights) in found.profiles.iter().enumerate() {
+        assert!(heights.iter().enumerate().all(|(k, z)| (z - height(profile, k)).abs() < 1e-12), "{profile}");
+    }
+}
+
+/// What is wrong with a table.
+#[derive(Clone, Copy, Debug)]
+enum Damage {
+    Nothing,
+    /// A height that is a word.
+    Word(Index, Index),
+    /// A line with one field more than the others.
+    Field(Index),
+    /// A line that is missing.
+    Gap(Index),
+    /// A height that is marked as missing.
+    NoHeight(Index, Index),
+}
+
+/// A table whose first column holds distances half a metre apart.
+#[derive(Clone, Debug)]
+struct Table {
+    text: String,
+    /// The heights by profile, or words of the refusal.
+    expected: Result<Vec<Vec<f64>>, String>,
+}
+
+/// The table of some lines of heights, with or without names.
+fn table(mut heights: Vec<[f64; 3]>, mark: &str, named: bool, damage: Damage) -> Table {
+    let mut fields: Vec<Vec<String>> = heights
+        .iter()
+        .enumerate()
+        .map(|(k, heights)| [0.5 * k as f64].iter().chain(heights).map(f64::to_string).collect())
+        .collect();
+    // Number of the first line of values.
+    let first = 1 + usize::from(named);
+    let refusal = match damage {
+        Damage::Nothing => None,
+        Damage::NoHeight(line, column) => {
+            let (line, column) = (line.index(fields.len()), column.index(3));
+            fields[line][1 + column] = "NA".to_owned();
+            heights[line][column] = f64::NAN;
+            None
+        }
+        Damage::Word(line, column) => {
+            let (line, column) = (line.index(fields.len()), 1 + column.index(3));
+            fields[line][column] = "rock".to_owned();
+            Some(format!("line {}, column {}: \"rock\" is not a number", first + line, column + 1))
+        }
+        Damage::Field(line) => {
+            let line = 1 + line.index(fields.len() - 1);
+            fields[line].push("7".to_owned());
+            Some(format!("line {} has 5 columns; the lines before it have 4", first + line))
+        }
+        Damage::Gap(line) => {
+            fields.remove(1 + line.index(fields.len() - 2));
+            // Without a name, a column of uneven steps is not a column of distances.
+            Some(match named {
+                true => format!("line {}, column 1: distances are not evenly spaced", first + 1),
+                false => "has no column of distances".to_owned(),
+            })
+        }
+    };
+    let names = if named { vec![["x", "a", "b", "c"].map(str::to_owned).to_vec()] } else { vec![] };
+    let text: String = names.iter().chain(&fields).map(|fields| fields.join(mark) + "\n").collect();
+    let by_profile: Vec<Vec<f64>> = (0..3).map(|column| heights.iter().map(|line| line[column]).collect()).collect();
+    Table { text, expected: refusal.map_or(Ok(by_profile), Err) }
+}
+
+fn tables() -> impl Strategy<Value = Table> {
+    let heights = prop::collection::vec(prop::array::uniform3(-1e3..1e3f64), 4..30);
+    let mark = prop::sample::select(vec![",", ";", "\t", " ", " ; "]);
+    let damage = prop_oneof![
+        3 => Just(Damage::Nothing),
+        1 => any::<(Index, Index)>().prop_map(|(line, column)| Damage::Word(line, column)),
+        1 => any::<Index>().prop_map(Damage::Field),
+        1 => any::<Index>().prop_map(Damage::Gap),
+        2 => any::<(Index, Index)>().prop_map(|(line, column)| Damage::NoHeight(line, column)),
+    ];
+    (heights, mark, any::<bool>(), damage)
+        .prop_map(|(heights, mark, named, damage)| table(heights, mark, named, damage))
 }
 
 proptest! {
-    /// What is written is read back; whatever else is in the file, it is read or refused.
+    /// Written profiles are read back exactly.
     #[test]
-    fn prop_profiles_come_back(
+    fn prop_profiles_are_read_back(
         profiles in prop::collection::vec(prop::collection::vec(-1e3f64..1e3, 12), 1..5),
         spacing in prop::sample::select(vec![0.01, 0.1, 1.0 / 3.0, 1.0, 25.0]),
         mark in prop::sample::select(vec![",", ";", "\t", " "]),
@@ -138,9 +219,22 @@ proptest! {
         prop_assert_eq!(found.profiles, profiles);
     }
 
+    /// Heights are read back bit for bit, missing ones as NaN; a damaged table is refused with line and column.
     #[test]
-    fn prop_any_text_is_read_or_refused(text in "[0-9a-z,;.\\-# \t\n\"]{0,80}", cell in 0.0f64..2.0) {
-        let _ = of(&text, &every(cell));
-        let _ = of(&text, &TransectOptions::default());
+    fn prop_tables_are_read_back_or_refused_with_the_place(table in tables()) {
+        let bits = |profiles: &[Vec<f64>]| -> Vec<Vec<Option<u64>>> {
+            profiles.iter().map(|p| p.iter().map(|z| (!z.is_nan()).then_some(z.to_bits())).collect()).collect()
+        };
+        match (of(&table.text, &TransectOptions::default()), &table.expected) {
+            (Ok(found), Ok(profiles)) => {
+                prop_assert_eq!(found.spacing_m, 0.5);
+                prop_assert_eq!(bits(&found.profiles), bits(profiles));
+            }
+            (Err(error), Err(words)) => {
+                let message = error.to_string();
+                prop_assert!(message.contains(words.as_str()) && message.contains("profile.csv"), "{}", message);
+            }
+            (found, expected) => prop_assert!(false, "found {:?}, expected {:?}", found, expected),
+        }
     }
 }

@@ -3,14 +3,14 @@
 //! # What
 //! 1. A normal field with the spectral density (two-sided, over spatial frequency f in cycles/m)
 //!    $$ S(f) = \frac{C_1}{\pi f^2}, \quad 1 / L \le f \le f_N , $$
-//!    whose variance between two scales grows by `2 C1 ln(ratio)`;
-//! 2. the flux `e = exp(gamma - Var(gamma) / 2)`, of mean 1: a log-normal cascade continuous in scale, with moment scaling function
+//!    whose variance grows by `2 C1 ln(ratio)` between two scales of that ratio;
+//! 2. the flux `e = exp(gamma - Var(gamma) / 2)`, with mean 1: a log-normal cascade continuous in scale, with moment scaling function
 //!    $$ K(q) = C_1 (q^2 - q) ; $$
-//! 3. its fractional integral of order H: mode by mode times `max(f, 1 / L)^-H`;
-//! 4. heights about their mean, scaled to `rms_height_m`.
+//! 3. its fractional integral of order H: each mode multiplied by `max(f, 1 / L)^-H`;
+//! 4. heights: the integral less its mean, scaled to `rms_height_m`.
 //!
-//! Increments of the heights have the structure exponents `zeta(q) = q H - K(q)` (for the orders q at which moments over one surface
-//! settle, about `q < 1 / sqrt(C1)`).
+//! Increments of the heights have the structure exponents `zeta(q) = q H - K(q)` (for the orders q whose moments converge over one
+//! surface, about `q < 1 / sqrt(C1)`).
 //!
 //! C1 is the codimension of the mean flux (0: monofractal, no intermittency), H the exponent of the mean increment, L the outer scale
 //! in m, `f_N` the Nyquist frequency.
@@ -18,14 +18,14 @@
 //! # Source
 //! Schertzer and Lovejoy, J. Geophys. Res. 92 (1987) 9693: the fractionally integrated flux, here with Levy index 2. Gagnon, Lovejoy
 //! and Schertzer, Nonlin. Processes Geophys. 13 (2006) 541, find C1 = 0.12 and H = 0.66 for the Earth's topography (with Levy index
-//! 1.79); these are the defaults. It stands beside the `multifractal` of Majhor and Bos, a product of layers whose scaling is not that
-//! of a cascade (`docs/papers/majhor.md`).
+//! 1.79); these are the defaults. The `multifractal` of Majhor and Bos is different: a product of layers that does not scale like a
+//! cascade (`docs/papers/majhor.md`).
 //!
 //! # Map
-//! `flux`: the flux on the same cells, so that a reader can check K(q) (`sastrugi_roughness::trace_moments`).
+//! `flux`: the flux on the same cells, from which K(q) can be checked (`sastrugi_roughness::trace_moments`).
 //!
 //! # Cost
-//! The surface is cut from one that repeats and is an outer scale wider. Three transforms of that size; four grids of it.
+//! The surface is cut from a periodic one that is wider by one outer scale: three transforms and four grids of that size.
 
 mod params;
 #[cfg(test)]
@@ -46,7 +46,7 @@ pub const KIND: &str = "cascade";
 /// Name of the map of the flux.
 const FLUX: &str = "flux";
 
-/// Frequencies of the modes of the surface that repeats.
+/// Frequencies of the modes of the periodic surface.
 #[derive(Clone, Copy)]
 struct Modes {
     /// Its rows and columns.
@@ -82,7 +82,7 @@ impl Cascade {
         Modes { shape: self.shape, cell_m: self.size.cell_m, band }
     }
 
-    /// The flux on the whole of the surface that repeats, mean 1 in expectation.
+    /// The flux on the complete periodic surface; its expected mean is 1.
     fn flux(&self, transform: &RealFft2, streams: &Streams) -> Vec<f64> {
         let modes = self.modes();
         let [rows, cols] = self.shape;
@@ -118,20 +118,20 @@ impl Cascade {
         transform.inverse(spectrum)
     }
 
-    /// The part of the surface that repeats which is asked for.
+    /// The requested part of the periodic surface.
     fn cut(&self, values: &[f64]) -> Grid {
         let cols = self.shape[1];
         let rows = values.chunks_exact(cols).take(self.size.rows());
         Grid::new(self.size.geometry(), rows.flat_map(|row| &row[..self.size.cols()]).copied().collect())
     }
 
-    /// `zeta(q)` of the heights in expectation.
+    /// Expected `zeta(q)` of the heights.
     fn expected_zeta(&self, order: u32) -> f64 {
         let q = f64::from(order);
         q * self.raw.hurst_exponent - self.raw.codimension * (q * q - q)
     }
 
-    /// The sentence on the structure exponents, where the surface is wide enough to have some.
+    /// A note on the structure exponents, if the surface is wide enough to estimate them.
     fn exponents_note(&self, heights: &Grid) -> Option<String> {
         let found = scaling_exponents(heights)?;
         let one = |e: &sastrugi_roughness::multifractality::ScalingExponent| {
@@ -172,7 +172,7 @@ impl Generator for Cascade {
         if !(rms.is_finite() && rms > 0.0) {
             return Err(TerrainError::Unrepresentable {
                 part: "the cascade's heights",
-                figure: "their rms",
+                quantity: "their RMS",
                 value: rms,
             });
         }

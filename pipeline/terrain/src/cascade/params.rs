@@ -6,29 +6,33 @@ use sastrugi_schemas::{ParameterError, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Cells when no size is given.
+/// Cells if no size is given.
 const DEFAULT_SIZE_PX: [u32; 2] = [512, 512];
-/// Most cells of the surface that the heights are cut from.
+/// Maximum number of cells of the periodic surface.
 const REPEATED_CELLS_MAX: u64 = 1 << 29;
+/// Smallest outer scale, cells.
+const OUTER_MIN_PX: f64 = 3.0;
+/// Relative rounding error of a length in cells: three cells of 0.7 m are 2.9999999999999996 of them.
+const ROUNDING: f64 = 1e-9;
 
 /// True multifractal: fractionally integrated log-normal cascade.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawCascade {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 512 x 512 when no size is given.
+    /// Number of cells east and north; 512 x 512 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
     pub cell_m: f64,
-    /// Codimension C1 of the mean flux, 0 to 1: how patchy the roughness is (Gagnon et al., 2006: 0.12 for topography); 0 is a
-    /// flux without patches and has no relief.
+    /// Codimension C1 of the mean flux, above 0 and below 1: how patchy the roughness is (Gagnon et al., 2006: 0.12 for topography);
+    /// 0 would be a constant flux, which has no relief.
     pub codimension: f64,
     /// Exponent H of the mean increment, 0 to 1 (Gagnon et al., 2006: 0.66).
     pub hurst_exponent: f64,
-    /// Outer scale L where the cascade starts, m; the shorter side when absent.
+    /// Outer scale L at which the cascade starts, m; by default the shorter side.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outer_scale_m: Option<f64>,
     /// Standard deviation of the heights, m.
@@ -55,7 +59,7 @@ pub struct Cascade {
     pub(super) raw: RawCascade,
     pub(super) size: Size,
     pub(super) outer_scale_m: f64,
-    /// Rows and columns of the surface that repeats.
+    /// Rows and columns of the periodic surface.
     pub(super) shape: [usize; 2],
 }
 
@@ -73,14 +77,14 @@ impl TryFrom<RawCascade> for Cascade {
             None => width.min(height),
         };
         let outer_px = outer_scale_m / size.cell_m;
-        if outer_px < 3.0 {
+        if outer_px < OUTER_MIN_PX * (1.0 - ROUNDING) {
             let message = format!("is {outer_scale_m}; it must be at least three cells of {} m", size.cell_m);
             return Err(ParameterError::new("outer_scale_m", message));
         }
         let shape = repeated_shape(&size, outer_px).ok_or_else(|| {
             let message = format!(
-                "is {}, {} cells beyond {} x {}; that needs more memory than 2^29 cells; choose a smaller scale or larger \
-                 cells",
+                "is {}, which adds {} cells to each side of {} x {}; more than 2^29 cells in all do not fit in memory; choose a \
+                 smaller scale or larger cells",
                 shown(outer_scale_m),
                 shown(outer_px.ceil()),
                 size.cols(),
@@ -93,7 +97,7 @@ impl TryFrom<RawCascade> for Cascade {
     }
 }
 
-/// An outer scale wider than the surface, so that its opposite edges have nothing to do with each other.
+/// Wider than the surface by one outer scale, so that opposite edges of the surface are independent.
 fn repeated_shape(size: &Size, outer_px: f64) -> Option<[usize; 2]> {
     let sides = [size.rows(), size.cols()].map(|side| side as f64 + outer_px.ceil());
     let possible = sides[0] * sides[1] <= REPEATED_CELLS_MAX as f64;

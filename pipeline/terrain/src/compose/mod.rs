@@ -1,34 +1,52 @@
-//! Surfaces joined by an ordered list of processes.
+//! Surfaces combined by an ordered list of processes.
 //!
 //! # What
-//! Heights start at 0 m everywhere; each process changes what the ones before it left. With z the heights so far, o the operand (another
-//! generator on the same cells, or another surface of the study) times `factor`, and w the weight (0 to 1) of `region`, 1 without one:
+//! Heights start at 0 m everywhere; each process modifies the result of the previous ones. z are the heights so far, o is the operand
+//! (another generator on the same cells, or another surface of the study) times `factor`, and w the weight (0 to 1) of `region`, 1 without a
+//! region:
 //!
 //! | operation | result |
 //! |---|---|
 //! | `add` | `z + w o` |
 //! | `multiply` | `z (1 - w + w o)` |
-//! | `blend` | `(1 - w) z + w o`: the operand in place of z |
+//! | `blend` | `(1 - w) z + w o`: the operand replaces z |
 //! | `mask` | `w z + (1 - w) outside_m` |
-//! | `clip` | z between `low_m` and `high_m` |
-//! | `scale_to_relief` | z about its mean, scaled so that highest less lowest is `relief_m` |
+//! | `clip` | z limited to `low_m` to `high_m` |
+//! | `scale_to_relief` | z scaled about its mean so that highest minus lowest height is `relief_m` |
 //! | `trail` | z with a vehicle trail pressed into it: [`trail`] |
 //!
-//! A region is another generator or surface m: w rises as `3 t^2 - 2 t^3`, `t = (m - from) / (to - from)` kept to 0 to 1; `from` above
-//! `to` turns it round.
+//! A region is defined by another generator or surface m: w rises as `3 t^2 - 2 t^3`, with `t = (m - from) / (to - from)` limited to 0 to 1;
+//! `from` above `to` reverses it.
 //!
-//! Generators draw from streams of their own, named by the number of the process. Surfaces of the study are taken at the centres of the
-//! cells (bilinear) and must reach there.
+//! Each generator draws from its own streams, named by the number of the process. Surfaces of the study are interpolated bilinearly at the
+//! centres of the cells and must cover all of them.
 //!
-//! Maps of generators (`class`, `albedo` ...) go on where their process counts (w above 0), of two with one name the later; without data
-//! where no process has any, where a blend puts another operand in place (w = 1), and outside of a mask. Maps of roughness do not go on:
-//! they are those of the operand alone, as is what notes say that begin with `process k alone` (k from 1).
+//! Maps of generators (`class`, `albedo` ...) are kept where their process takes effect (w above 0); of two maps with the same name the
+//! later wins. They have no data where no process provides any, where a blend replaces the operand (w = 1), and outside a mask. Roughness
+//! maps are dropped, because they describe the operand alone; so do notes that begin with `process k alone` (k from 1).
 //!
-//! The centre line of every trail is a line of the surface (`trail`, `trail-2` ... in their order), its heights those of the finished
-//! surface; lines of operands go on.
+//! The centre line of every trail becomes a line of the surface (`trail`, `trail-2` ... in order), with the heights of the finished
+//! surface; lines of operands are kept.
+//!
+//! # Example
+//! ```
+//! use sastrugi_numeric::{Geometry, Grid, Streams};
+//! use sastrugi_terrain::{Input, prepare};
+//! use serde_json::json;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let processes = json!([{"of": "ramp"}, {"operation": "clip", "high_m": 2.0}]);
+//! let generator = prepare("compose", &json!({"size_px": [8, 6], "cell_m": 0.5, "processes": processes}))?;
+//! let cells = Geometry::square(6, 8, 0.5);
+//! let ramp = Grid::new(cells, (0..48).map(|k| cells.x(k % 8)).collect());
+//! let terrain = generator.generate(&Streams::for_seed(1, "terrain"), &[Input::from(ramp)])?;
+//! assert_eq!(terrain.heights.row(0), [0.25, 0.75, 1.25, 1.75, 2.0, 2.0, 2.0, 2.0]);
+//! # Ok(())
+//! # }
+//! ```
 //!
 //! # Cost
-//! The generators', one after the other; three grids more.
+//! That of the generators, run one after the other; three additional grids.
 
 mod params;
 #[cfg(test)]
@@ -37,7 +55,7 @@ pub mod trail;
 
 pub use params::{Compose, Operation, RawCompose, RawProcess, RawRegion};
 
-use crate::generator::{Generator, Input, Line, MAPS, Map, NamedInput, Terrain, TerrainError, told};
+use crate::generator::{Generator, Input, Line, MAPS, Map, NamedInput, Terrain, TerrainError, rounded_coordinate};
 use params::{COMMON, Operand, Part, Process, Region, Step};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, ops, sums};
 use sastrugi_schemas::ParameterError;
@@ -46,7 +64,7 @@ use serde_json::Value;
 /// Name in the registry.
 pub const KIND: &str = "compose";
 
-/// Rough time of a cell where a process joins, s.
+/// Rough time per cell and process to combine the heights, s.
 const SECONDS_PER_JOIN: f64 = 2e-8;
 
 impl Operand {
@@ -74,35 +92,35 @@ impl Operand {
         }
     }
 
-    /// Whether inputs of these shapes and places serve on the cells of `geometry`.
+    /// Whether inputs of these shapes and positions can be used on the cells of `geometry`.
     fn check_places(&self, geometry: &Geometry, places: &[Option<Geometry>]) -> Result<(), ParameterError> {
         match (self, places) {
             (Self::Surface(base), [Some(surface)]) => check_reach(surface, geometry)
-                .map_err(|reason| ParameterError::new(&base.key, format!("names \"{}\": it {reason}", base.name))),
+                .map_err(|reason| ParameterError::new(&base.key, format!("names \"{}\", which {reason}", base.name))),
             (Self::Surface(_), _) => Ok(()),
             (Self::Generator { generator, key }, places) => generator.check_places(places).map_err(|e| {
-                // Size and place are those of the whole.
+                // Size and position are set by the composition.
                 if COMMON.contains(&e.key.as_str()) { e } else { e.within(key) }
             }),
         }
     }
 
-    /// The values on the cells of `geometry`; takes its inputs off the front of `inputs`.
+    /// The values on the cells of `geometry`; removes its inputs from the front of `inputs`.
     fn values(&self, geometry: &Geometry, streams: &Streams, inputs: &mut &[Input]) -> Result<Terrain, TerrainError> {
         let (own, rest) = inputs.split_at(self.inputs().len().min(inputs.len()));
         *inputs = rest;
         match (self, own) {
             (Self::Generator { generator, .. }, own) => generator.generate(streams, own),
             (Self::Surface(base), [Input::Grid(surface)]) => sampled(base, surface, geometry).map(Terrain::from),
-            (Self::Surface(base), _) => Err(base.error("is not there")),
+            (Self::Surface(base), _) => Err(base.error("is missing")),
         }
     }
 }
 
-/// How far the centres of cells may lie beyond the outer ones of a surface, cells of it: coordinates are rounded.
+/// How far cell centres may lie beyond the outer centres of a surface, in cells of the surface: coordinates are rounded.
 const REACH_TOLERANCE: f64 = 1e-6;
 
-/// Whether a surface reaches all centres of some cells; the reason where it does not.
+/// Checks that a surface covers the centres of all `cells`; the reason if not.
 fn check_reach(surface: &Geometry, cells: &Geometry) -> Result<(), String> {
     let [has, needs] = [surface, cells].map(|g| [[g.x(0), g.x(g.cols - 1)], [g.y(g.rows - 1), g.y(0)]]);
     let reaches = |axis: usize| {
@@ -113,10 +131,10 @@ fn check_reach(surface: &Geometry, cells: &Geometry) -> Result<(), String> {
         return Ok(());
     }
     let [[[x0, x1], [y0, y1]], [[west, east], [south, north]]] =
-        [has, needs].map(|ends| ends.map(|axis| axis.map(told)));
+        [has, needs].map(|ends| ends.map(|axis| axis.map(rounded_coordinate)));
     Err(format!(
-        "covers x {x0} to {x1}, y {y0} to {y1} m (centres of its outer cells), but the cells to be made reach from x {west} to {east}, y {south} to \
-         {north} m: move `origin_m`, or make the surface smaller"
+        "covers x {x0} to {x1}, y {y0} to {y1} m (centres of its outer cells), but the new cells reach from x {west} to {east}, y {south} to \
+         {north} m; move `origin_m`, or make the new surface smaller"
     ))
 }
 
@@ -124,7 +142,7 @@ fn check_reach(surface: &Geometry, cells: &Geometry) -> Result<(), String> {
 fn sampled(base: &NamedInput, surface: &Grid, geometry: &Geometry) -> Result<Grid, TerrainError> {
     let has = &surface.geometry;
     check_reach(has, geometry).map_err(|reason| base.error(reason))?;
-    // Within rounding of the outer centres counts as on them.
+    // A point within rounding of an outer centre counts as lying on it.
     let (west, south) = (has.origin[0] + 0.5 * has.cell[0], has.origin[1] + 0.5 * has.cell[1]);
     let within =
         |v: f64, low: f64, count: usize, cell: f64| low + cell * ((v - low) / cell).clamp(0.0, (count - 1) as f64);
@@ -132,7 +150,7 @@ fn sampled(base: &NamedInput, surface: &Grid, geometry: &Geometry) -> Result<Gri
         let (x, y) = (geometry.x(k % geometry.cols), geometry.y(k / geometry.cols));
         let (x, y) = (within(x, west, has.cols, has.cell[0]), within(y, south, has.rows, has.cell[1]));
         surface.height(x, y).ok_or_else(|| {
-            let reason = format!("has no height at x = {x} m, y = {y} m; it must reach all centres of the cells");
+            let reason = format!("has no height at x = {x} m, y = {y} m; it must cover the centres of all cells");
             base.error(reason)
         })
     };
@@ -140,14 +158,14 @@ fn sampled(base: &NamedInput, surface: &Grid, geometry: &Geometry) -> Result<Gri
 }
 
 impl Region {
-    /// The weight of a value of the region's surface.
+    /// The weight for a value of the region's surface.
     fn weight(&self, value: f64) -> f64 {
         let t = ((value - self.from) / (self.to - self.from)).clamp(0.0, 1.0);
         t * t * (3.0 - 2.0 * t)
     }
 }
 
-/// What a process makes of the heights so far.
+/// State of a run: what the processes so far have produced.
 struct Running<'a> {
     geometry: Geometry,
     streams: Streams,
@@ -158,11 +176,11 @@ struct Running<'a> {
     notes: Vec<String>,
 }
 
-/// Maps that tell of an operand's own heights, not of what is made of them.
+/// Maps that describe an operand's own heights, not the composed ones.
 const MAPS_OF_HEIGHTS: [&str; 2] = ["rms-measured", "rms-predicted"];
 
 impl Running<'_> {
-    /// What an operand makes, on the cells of the whole: generators may place their samples elsewhere in theirs. Its notes go on.
+    /// The operand's result, placed on the cells of the composition: a generator may place its samples elsewhere in its own. Keeps its notes.
     fn made(
         &mut self,
         (part, number): (Part, usize),
@@ -176,7 +194,7 @@ impl Running<'_> {
         Ok(Terrain { heights: placed(made.heights), maps, lines: made.lines, notes: Vec::new() })
     }
 
-    /// The weights of a region, 1 everywhere without one.
+    /// The weights of a region; 1 everywhere without a region.
     fn weights(&mut self, region: Option<&Region>, streams: &Streams, number: usize) -> Result<Grid, TerrainError> {
         match region {
             None => Ok(Grid::filled(self.geometry, 1.0)),
@@ -187,15 +205,15 @@ impl Running<'_> {
         }
     }
 
-    /// Takes values off the maps so far, cell by cell, by the weight there.
+    /// Clears the maps so far in every cell whose weight is `cleared`.
     fn clear_maps(&mut self, weights: &Grid, cleared: fn(f64) -> bool) {
         for map in &mut self.maps {
             map.values = ops::combine(&map.values, weights, |v, w| if cleared(w) { f64::NAN } else { v });
         }
     }
 
-    /// Lays the maps of an operand over those so far, where it counts.
-    fn lay_maps(&mut self, maps: Vec<Map>, weights: &Grid) {
+    /// Merges the maps of an operand into those so far, where its weight is above 0.
+    fn merge_maps(&mut self, maps: Vec<Map>, weights: &Grid) {
         for map in maps.into_iter().filter(|map| !MAPS_OF_HEIGHTS.contains(&map.name)) {
             let values = ops::combine(&map.values, weights, |v, w| if w > 0.0 { v } else { f64::NAN });
             match self.maps.iter_mut().find(|below| below.name == map.name) {
@@ -228,7 +246,7 @@ impl Running<'_> {
                 if matches!(join, params::Join::Blend) {
                     self.clear_maps(&weights, |w| w == 1.0);
                 }
-                self.lay_maps(made.maps, &weights);
+                self.merge_maps(made.maps, &weights);
                 self.lines
                     .extend(made.lines.iter().map(|line| line.points_m.iter().map(|&[x, y, _]| [x, y]).collect()));
                 Ok(join.of(z, &made.heights.map(|v| v * factor), &weights))
@@ -253,7 +271,7 @@ impl params::Join {
     }
 }
 
-/// Lines on a surface; points beside its cells, or where it has no height, are left out.
+/// Lines on a surface; points outside its cells, or where it has no height, are left out.
 fn lines_on(heights: &Grid, lines: Vec<Vec<[f64; 2]>>) -> Vec<Line> {
     let on_ground = |&[x, y]: &[f64; 2]| heights.height(x, y).map(|z| [x, y, z]);
     let line = |(k, points_m): (usize, Vec<[f64; 2]>)| Line {
@@ -285,7 +303,7 @@ impl Generator for Compose {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, an operand, weights, their product and the sum, and the maps so far, beside the largest generator at work.
+        // Heights, an operand, weights, their product and the sum, and the maps so far, in addition to the largest generator.
         let most = self.processes.iter().flat_map(Process::operands).map(Operand::memory_bytes).max();
         most.unwrap_or(0) + 8 * (5 + MAPS.len() as u64) * self.geometry.len() as u64
     }

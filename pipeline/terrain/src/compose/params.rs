@@ -9,28 +9,28 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 
-/// Cells when no size is given.
+/// Cells if no size is given.
 const DEFAULT_SIZE_PX: [u32; 2] = [512, 512];
-/// Most processes of one surface.
+/// Maximum number of processes of one surface.
 const PROCESSES_MAX: usize = 64;
-/// Keys that a generator of a process takes from the whole.
+/// Keys that the composition sets for the generators of its processes.
 pub(super) const COMMON: [&str; 4] = ["size_m", "size_px", "cell_m", "origin_m"];
 
-/// Surfaces joined by an ordered list of processes.
+/// Surfaces combined by an ordered list of processes.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawCompose {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 512 x 512 when no size is given.
+    /// Number of cells east and north; 512 x 512 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
     pub cell_m: f64,
-    /// South-west corner, m: where surfaces of the study are taken, in their coordinates.
+    /// South-west corner, m, in the coordinates of the study's surfaces that are used as operands.
     pub origin_m: [f64; 2],
-    /// The processes, in their order. By default hills with a rough surface on them.
+    /// The processes, in order; by default hills with a rough surface added.
     pub processes: Vec<RawProcess>,
 }
 
@@ -60,13 +60,13 @@ pub enum Operation {
     /// The operand is added.
     #[default]
     Add,
-    /// Heights are multiplied with the operand.
+    /// Heights are multiplied by the operand.
     Multiply,
-    /// The operand takes the place of the heights, where the region says so.
+    /// The operand replaces the heights, by the weight of the region.
     Blend,
-    /// Heights stay inside of the region and become `outside_m` elsewhere.
+    /// Heights are kept inside the region and become `outside_m` elsewhere.
     Mask,
-    /// Heights are kept between two bounds.
+    /// Heights are limited to two bounds.
     Clip,
     /// Heights are scaled to a relief.
     ScaleToRelief,
@@ -76,38 +76,38 @@ pub enum Operation {
 
 /// One process.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default, expecting = "a process, which is a table")]
+#[serde(deny_unknown_fields, default, expecting = "a process, given as a table")]
 pub struct RawProcess {
-    /// What it does; `add` when absent.
+    /// What the process does; `add` by default.
     pub operation: Operation,
     /// Generator of the operand (see `sastrugi kinds`).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub kind: Option<String>,
-    /// Parameters of that generator but for size, cell and origin, which are those of the whole.
+    /// Parameters of that generator, except size, cell and origin, which the composition sets.
     #[serde(skip_serializing_if = "Map::is_empty")]
     pub parameters: Map<String, Value>,
-    /// In place of `kind`: id of a DEM or an earlier terrain of the study.
+    /// Id of a DEM or an earlier terrain of the study; alternative to `kind`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// Factor of the operand; 1 when absent.
+    /// Factor of the operand; 1 by default.
     #[serde(skip_serializing_if = "is_one")]
     pub factor: f64,
-    /// Where the process counts; everywhere when absent. For `mask`, what it masks by.
+    /// Where the process takes effect; everywhere by default. For `mask`, where heights are kept.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub region: Option<RawRegion>,
-    /// For `mask`: heights outside of the region, m; 0 when absent.
+    /// For `mask`: height outside the region, m; 0 by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub outside_m: Option<f64>,
-    /// For `clip`: lowest height, m; none when absent.
+    /// For `clip`: lower bound of the heights, m; by default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub low_m: Option<f64>,
-    /// For `clip`: highest height, m; none when absent.
+    /// For `clip`: upper bound of the heights, m; by default none.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub high_m: Option<f64>,
-    /// For `scale_to_relief`: highest less lowest height, m.
+    /// For `scale_to_relief`: highest minus lowest height, m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub relief_m: Option<f64>,
-    /// For `trail`: where it leads and what it looks like; along ridges when absent.
+    /// For `trail`: course and shape of the trail; along ridges by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub trail: Option<RawTrail>,
 }
@@ -134,26 +134,26 @@ fn is_one(factor: &f64) -> bool {
     *factor == 1.0
 }
 
-/// Where a process counts, by the values of a surface.
+/// Where a process takes effect, defined by the values of a surface.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, expecting = "a region, which is a table")]
+#[serde(deny_unknown_fields, expecting = "a region, given as a table")]
 pub struct RawRegion {
     /// Generator of that surface.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub kind: Option<String>,
-    /// Its parameters, as in a process.
+    /// Parameters of that generator, as in a process.
     #[serde(default, skip_serializing_if = "Map::is_empty")]
     pub parameters: Map<String, Value>,
-    /// In place of `kind`: id of a DEM or an earlier terrain of the study.
+    /// Id of a DEM or an earlier terrain of the study; alternative to `kind`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub of: Option<String>,
-    /// Value where the weight begins to rise from 0.
+    /// Value at which the weight starts to rise from 0.
     pub from: f64,
-    /// Value where the weight reaches 1.
+    /// Value at which the weight reaches 1.
     pub to: f64,
 }
 
-/// What a process or a region works with.
+/// The surface that a process or a region uses.
 pub(super) enum Operand {
     /// A generator on the same cells, and the key of its parameters.
     Generator { generator: Box<dyn Generator>, key: String },
@@ -168,7 +168,7 @@ pub(super) struct Region {
     pub(super) to: f64,
 }
 
-/// How an operand joins the heights.
+/// How an operand is combined with the heights.
 #[derive(Clone, Copy)]
 pub(super) enum Join {
     Add,
@@ -191,7 +191,7 @@ pub(super) struct Process {
 }
 
 impl Process {
-    /// Operand and region, in the order in which they are made.
+    /// Operand and region, in the order in which they are generated.
     pub(super) fn operands(&self) -> Vec<&Operand> {
         self.parts().into_iter().map(|(_, operand)| operand).collect()
     }
@@ -208,7 +208,7 @@ impl Process {
     }
 }
 
-/// What a generator is to its process.
+/// Role of a generator in its process.
 #[derive(Clone, Copy)]
 pub(super) enum Part {
     Operand,
@@ -216,7 +216,7 @@ pub(super) enum Part {
 }
 
 impl Part {
-    /// A note of the generator alone, which need not be true of the whole. Processes count from 1.
+    /// A note of the generator alone, which need not hold for the composition. Processes count from 1.
     pub(super) fn note(self, number: usize, note: &str) -> String {
         match self {
             Self::Operand => format!("process {number} alone: {note}"),
@@ -258,7 +258,7 @@ impl TryFrom<RawCompose> for Compose {
     }
 }
 
-/// The whole that every process is part of.
+/// The cells of the composition, common to all processes.
 struct Whole {
     size: Size,
     origin_m: [f64; 2],
@@ -277,12 +277,13 @@ impl Whole {
                 Ok(Step::Mask { region, outside_m: finite("outside_m", raw.outside_m.unwrap_or(0.0))? })
             }
             (Operation::Mask, None) => {
-                Err(ParameterError::new("region", "is missing; `mask` needs to know where heights stay"))
+                Err(ParameterError::new("region", "is missing; `mask` needs a region in which heights are kept"))
             }
             (Operation::Clip, _) => clip(raw),
             (Operation::ScaleToRelief, _) => {
                 let relief_m = raw.relief_m.ok_or_else(|| {
-                    ParameterError::new("relief_m", "is missing; `scale_to_relief` needs highest less lowest height, m")
+                    let message = "is missing; `scale_to_relief` needs the relief, highest minus lowest height, in m";
+                    ParameterError::new("relief_m", message)
                 })?;
                 Ok(Step::ScaleToRelief { relief_m: ParameterError::positive("relief_m", relief_m)? })
             }
@@ -305,7 +306,9 @@ impl Whole {
         let operand = self.operand(&at, raw.kind.as_deref(), &raw.parameters, raw.of.as_deref())?;
         let (from, to) = (finite("from", raw.from)?, finite("to", raw.to)?);
         if from == to {
-            return Err(ParameterError::new("to", format!("is {to}, as `from`; the weight rises between two values")));
+            let message =
+                format!("is {to}, the same as `from`; the weight rises between two values, which must differ");
+            return Err(ParameterError::new("to", message));
         }
         Ok(Region { operand, from, to })
     }
@@ -322,19 +325,22 @@ impl Whole {
                 let generator = self.generator(kind, parameters)?;
                 Ok(Operand::Generator { generator, key: format!("{at}.parameters") })
             }
-            (None, Some(_)) if !parameters.is_empty() => {
-                Err(ParameterError::new("parameters", "belong to a `kind`; a surface named by `of` has none"))
-            }
+            (None, Some(_)) if !parameters.is_empty() => Err(ParameterError::new(
+                "parameters",
+                "belong to a generator; a surface named by `of` has no parameters",
+            )),
             (None, Some(id)) => Ok(Operand::Surface(NamedInput::heights(&format!("{at}.of"), id))),
-            (None, None) => Err(ParameterError::new("kind", "is missing; name a generator, or a surface by `of`")),
-            (Some(_), Some(_)) => Err(ParameterError::new("of", "stands beside `kind`; give one of them")),
+            (None, None) => {
+                Err(ParameterError::new("kind", "is missing; name a generator here, or a surface with `of`"))
+            }
+            (Some(_), Some(_)) => Err(ParameterError::new("of", "conflicts with `kind`; give only one of them")),
         }
     }
 
-    /// A generator on the cells of the whole.
+    /// A generator on the cells of the composition.
     fn generator(&self, kind: &str, parameters: &Map<String, Value>) -> Result<Box<dyn Generator>, ParameterError> {
         if let Some(key) = COMMON.into_iter().find(|key| parameters.contains_key(*key)) {
-            let message = "is that of the whole surface; leave it out here";
+            let message = "is set by the composition as a whole; leave it out here";
             return Err(ParameterError::new(key, message).within("parameters"));
         }
         let mut all = parameters.clone();
@@ -346,7 +352,7 @@ impl Whole {
         let generator = crate::prepare(kind, &Value::Object(all)).map_err(|e| match e.key.as_str() {
             "kind" => e,
             key if COMMON.contains(&key) => {
-                let message = format!("is `{kind}`, for which the whole's `{key}` does not serve: it {}", e.message);
+                let message = format!("is `{kind}`, which cannot use the `{key}` of the composition: it {}", e.message);
                 ParameterError::new("kind", message)
             }
             _ => e.within("parameters"),
@@ -355,21 +361,21 @@ impl Whole {
         Ok(generator)
     }
 
-    /// What a generator calls its origin. `elaborate` stands on a DEM in the study's coordinates, and its origin is the sample in the
-    /// centre of the south-western cell; worlds of `planetary` have coordinates of their own.
+    /// The `origin_m` of a generator. `elaborate` uses a DEM in the study's coordinates, and its origin is the sample in the
+    /// centre of the south-western cell; worlds of `planetary` have their own coordinates.
     fn origin_of(&self, kind: &str) -> [f64; 2] {
         let half = if kind == crate::elaborate::KIND { 0.5 * self.size.cell_m } else { 0.0 };
         self.origin_m.map(|at| at + half)
     }
 
-    /// Published listings may choose cells of their own.
+    /// Published listings may choose their own cells.
     fn check_cells(&self, kind: &str, own: &Geometry) -> Result<(), ParameterError> {
         let whole = self.size.geometry();
         if (own.rows, own.cols, own.cell) == (whole.rows, whole.cols, whole.cell) {
             return Ok(());
         }
         let message = format!(
-            "make `{kind}` choose {} x {} cells of {} m in place of {} x {} of {} m; leave that to a terrain of its own",
+            "make `{kind}` choose {} x {} cells of {} m in place of {} x {} of {} m; define it as a separate terrain and use `of`",
             own.cols, own.rows, own.cell[0], whole.cols, whole.rows, whole.cell[0]
         );
         Err(ParameterError::new("parameters", message))
@@ -382,15 +388,13 @@ fn check_count(processes: &[RawProcess]) -> Result<(), ParameterError> {
         None => refuse("is empty; it needs at least one process".to_owned()),
         Some(Operation::Add | Operation::Blend) if processes.len() <= PROCESSES_MAX => Ok(()),
         Some(Operation::Add | Operation::Blend) => {
-            refuse(format!("holds {}; the most is {PROCESSES_MAX}", processes.len()))
+            refuse(format!("has {} entries; at most {PROCESSES_MAX} are allowed", processes.len()))
         }
-        Some(_) => {
-            refuse("begins with heights of 0 m everywhere, so that the first must be `add` or `blend`".to_owned())
-        }
+        Some(_) => refuse("starts from heights of 0 m everywhere; its first entry must be `add` or `blend`".to_owned()),
     }
 }
 
-/// Refuses keys of other operations, which would be without effect.
+/// Refuses keys of other operations, which would have no effect.
 fn refuse_foreign_keys(raw: &RawProcess) -> Result<(), ParameterError> {
     let joins = matches!(raw.operation, Operation::Add | Operation::Multiply | Operation::Blend);
     let masks = raw.operation == Operation::Mask;
@@ -410,7 +414,7 @@ fn refuse_foreign_keys(raw: &RawProcess) -> Result<(), ParameterError> {
         Some((key, ..)) => {
             let operation = json!(raw.operation);
             let operation = operation.as_str().unwrap_or_default();
-            Err(ParameterError::new(key, format!("has no place in the operation `{operation}`")))
+            Err(ParameterError::new(key, format!("is not used by the operation `{operation}`; remove it")))
         }
         None => Ok(()),
     }
@@ -420,7 +424,7 @@ fn clip(raw: &RawProcess) -> Result<Step, ParameterError> {
     let low_m = raw.low_m.map_or(Ok(f64::NEG_INFINITY), |v| finite("low_m", v))?;
     let high_m = raw.high_m.map_or(Ok(f64::INFINITY), |v| finite("high_m", v))?;
     if raw.low_m.is_none() && raw.high_m.is_none() {
-        return Err(ParameterError::new("low_m", "is missing, and `high_m` as well; `clip` needs one of them"));
+        return Err(ParameterError::new("low_m", "is missing, and so is `high_m`; `clip` needs at least one of them"));
     }
     if low_m < high_m {
         Ok(Step::Clip { low_m, high_m })
@@ -433,7 +437,7 @@ fn finite(key: &str, value: f64) -> Result<f64, ParameterError> {
     if value.is_finite() { Ok(value) } else { Err(ParameterError::new(key, format!("is {value}; it must be finite"))) }
 }
 
-/// What the whole and its generators say before they run; a rounded size is said once.
+/// Notes of the composition and its generators before they run; a rounded size is noted only once.
 fn notes(size: &Size, processes: &[Process]) -> Vec<String> {
     let mut notes: Vec<String> = size.note().into_iter().collect();
     for (k, process) in processes.iter().enumerate() {

@@ -15,7 +15,7 @@ fn made(processes: Value, inputs: &[Grid]) -> Terrain {
     prepared(processes).generate(&streams(), &inputs).unwrap()
 }
 
-/// A ramp that rises by 1 a metre to the east.
+/// A ramp that rises by 1 per metre to the east.
 fn ramp() -> Grid {
     let g = Geometry::square(40, 40, 0.5);
     Grid::new(g, (0..g.len()).map(|k| g.x(k % 40)).collect())
@@ -35,7 +35,8 @@ fn val_operations_are_those_of_the_table() {
     assert_eq!(joined(params::Join::Multiply), [1.0, 21.0, 90.0]);
     assert_eq!(joined(params::Join::Blend), [1.0, 11.0, 30.0]);
     assert_eq!(scaled_to_relief(&z, 4.0).unwrap().values, [0.0, 2.0, 4.0]);
-    assert!(scaled_to_relief(&o(&[2.0, 2.0]), 4.0).is_err());
+    let level = TerrainError::Level { part: "the processes so far" };
+    assert_eq!(scaled_to_relief(&o(&[2.0, 2.0]), 4.0), Err(level));
 }
 
 #[test]
@@ -47,9 +48,9 @@ fn val_regions_rise_smoothly_between_their_values() {
     assert_eq!(region(3.0, 2.0).weight(2.25), 1.0 - region(2.0, 3.0).weight(2.25));
 }
 
-/// Processes change what the ones before them left, each with streams of its own.
+/// Each process modifies the result of the previous ones, with its own streams.
 #[test]
-fn val_processes_run_in_their_order() {
+fn val_processes_run_in_order() {
     let two = made(json!([{"kind": "spheroids"}, {"kind": "spheroids", "factor": 0.5}]), &[]).heights;
     let expected = ops::combine(&hills(1), &hills(2), |a, b| a + b * 0.5);
     assert_eq!(two.values, expected.values);
@@ -62,26 +63,35 @@ fn val_processes_run_in_their_order() {
     assert!((high - low - 3.0).abs() < 1e-12 && (0.5 * (low + high) - 7.5).abs() < 1e-12);
 }
 
-/// West of 4 m the ramp, east of 6 m hills, between them both; a mask leaves -1 m in the west.
+/// West of 4 m lies the ramp, east of 6 m hills, and a blend in between; a mask leaves -1 m in the west. The weight is `3 t^2 - 2 t^3`, with t from
+/// 0 to 1.
 #[test]
 fn val_blends_and_masks_follow_their_region() {
     let region = json!({"of": "ramp", "from": 4.0, "to": 6.0});
     let blend = json!([{"of": "ramp"}, {"operation": "blend", "kind": "spheroids", "region": region}]);
     let heights = made(blend, &[ramp(), ramp()]).heights;
-    let hills = hills(2);
+    let weight = |k: usize| {
+        let t = ((heights.geometry.x(k % 30) - 4.0) / 2.0).clamp(0.0, 1.0);
+        3.0 * t * t - 2.0 * t * t * t
+    };
+    let (first, second) = (hills(1).values, hills(2).values);
     for k in 0..600 {
-        let x = heights.geometry.x(k % 30);
-        let expected = if x < 4.0 { x } else { hills.values[k] };
-        assert!((4.0..6.0).contains(&x) || (heights.values[k] - expected).abs() < 1e-12, "{x}");
+        let (x, w) = (heights.geometry.x(k % 30), weight(k));
+        let expected = (1.0 - w) * x + w * second[k];
+        assert!((heights.values[k] - expected).abs() < 1e-12, "{x}: {} {expected}", heights.values[k]);
     }
     let mask = json!([{"kind": "spheroids"}, {"operation": "mask", "outside_m": -1.0, "region": region}]);
-    let heights = made(mask, &[ramp()]).heights;
-    assert!((0..600).all(|k| heights.geometry.x(k % 30) > 4.0 || heights.values[k] == -1.0));
+    let masked = made(mask, &[ramp()]).heights;
+    assert!((0..600).all(|k| heights.geometry.x(k % 30) > 4.0 || masked.values[k] == -1.0));
+    for k in 0..600 {
+        let expected = weight(k) * first[k] - (1.0 - weight(k));
+        assert!((masked.values[k] - expected).abs() < 1e-12, "{k}: {} {expected}", masked.values[k]);
+    }
 }
 
-/// A refined DEM lies where the DEM lies: between the posts of a ramp it is the ramp.
+/// A refined DEM keeps the DEM's position: between the posts of a ramp it is the ramp.
 #[test]
-fn val_a_refined_dem_lies_on_its_posts() {
+fn val_a_refined_dem_keeps_its_position() {
     let g = Geometry { origin: [-10.0, -10.0], ..Geometry::square(12, 14, 3.0) };
     let dem = Grid::new(g, (0..g.len()).map(|k| g.x(k % 14) - 2.0 * g.y(k / 14)).collect());
     let plain = json!({"dem": "hill", "texture": false});
@@ -95,7 +105,7 @@ fn val_a_refined_dem_lies_on_its_posts() {
 }
 
 #[test]
-fn val_surfaces_must_reach_the_cells() {
+fn val_surfaces_must_cover_the_cells() {
     let small = Grid::filled(Geometry::square(10, 10, 0.5), 1.0);
     let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[small.into()]).unwrap_err();
     assert!(
@@ -104,14 +114,14 @@ fn val_surfaces_must_reach_the_cells() {
         "{error}"
     );
     let error = prepared(json!([{"of": "small"}])).generate(&streams(), &[]).unwrap_err();
-    assert!(error.to_string().contains("is not there"));
+    assert!(error.to_string().contains("is missing"));
     let flat = Grid::filled(Geometry::square(40, 40, 0.5), 1.0);
     let error = prepared(json!([{"of": "flat"}])).generate_checked(&streams(), &[flat.into()]).unwrap_err();
     assert!(error.to_string().contains("same everywhere"), "{error}");
 }
 
-/// What does not reach the cells is refused before it is read, in the words of the run, by the key that names it; what is not known yet is
-/// left to the run.
+/// A surface that does not cover the cells is refused before it is read, with the same reason as in the run and under the key that names it;
+/// positions that are not known yet are left to the run.
 #[test]
 fn val_places_are_checked_before_the_run() {
     let small = Grid::filled(Geometry::square(10, 10, 0.5), 1.0);
@@ -127,18 +137,18 @@ fn val_places_are_checked_before_the_run() {
         reason.contains("x 0.25 to 4.75, y 0.25 to 4.75 m") && error.message.ends_with(&reason),
         "{error} {at_run}"
     );
-    // The origin of an elaborated DEM is that of the whole.
+    // The origin of an elaborated DEM is that of the composition.
     let inner = prepared(json!([{"kind": "elaborate", "parameters": {"dem": "b"}}]));
     let error =
         inner.check_places(&[Some(Geometry { origin: [3.0, 0.0], ..Geometry::square(20, 20, 5.0) })]).unwrap_err();
     assert_eq!(error.key, "origin_m");
-    // To the rounding of coordinates.
+    // Up to the rounding of coordinates.
     let exact = Geometry { origin: [1e-9, -1e-9], ..Geometry::square(20, 30, 0.5) };
     assert_eq!(prepared(json!([{"of": "a"}])).check_places(&[Some(exact)]), Ok(()));
 }
 
 #[test]
-fn val_bases_stand_in_the_order_of_the_processes() {
+fn val_inputs_follow_the_order_of_the_processes() {
     let region = json!({"of": "b", "from": 0.0, "to": 1.0});
     let generator = prepared(json!([{"of": "a", "region": region}, {"kind": "spheroids"}, {"of": "c"}]));
     let inputs: Vec<(String, String)> = generator.inputs().into_iter().map(|b| (b.key, b.name)).collect();
@@ -149,6 +159,7 @@ fn val_bases_stand_in_the_order_of_the_processes() {
 /// Every generator that needs no other surface can take part.
 #[test]
 fn prop_every_generator_composes() {
+    let mut composed = 0;
     for kind in crate::kinds().iter().filter(|k| k.kind != KIND && crate::prepare(k.kind, &Value::Null).is_ok()) {
         let params =
             json!({"size_px": [32, 24], "cell_m": 0.05, "origin_m": [2.0, 1.0], "processes": [{"kind": kind.kind}]});
@@ -157,13 +168,16 @@ fn prop_every_generator_composes() {
             let made = generator.generate(&streams(), &[]).unwrap_or_else(|e| panic!("{}: {e}", kind.kind));
             assert_eq!(made.heights.geometry, generator.geometry(), "{}", kind.kind);
             assert!(made.maps.iter().all(|m| m.values.geometry == generator.geometry()), "{}", kind.kind);
+            composed += 1;
         }
     }
+    // All but `compose` itself and `elaborate`, which needs a DEM.
+    assert_eq!(composed, crate::kinds().len() - 2);
 }
 
-/// What a generator says is said of its process, or of its region.
+/// Notes of a generator are attributed to its process, or to its region.
 #[test]
-fn val_notes_of_generators_go_on() {
+fn val_notes_of_generators_are_kept() {
     let listing = json!([{"kind": "mavs_perlin", "parameters": {"compat": true}}, {"kind": "cascade"}]);
     let generator = prepared(listing);
     let alone = crate::prepare("mavs_perlin", &json!({"size_px": [30, 20], "cell_m": 0.5, "compat": true})).unwrap();
@@ -175,13 +189,13 @@ fn val_notes_of_generators_go_on() {
     assert!(made.notes.iter().all(of_region) && made.notes[0].contains("zeta(1)"), "{:?}", made.notes);
 }
 
-/// Size, cell and origin are keys of the whole: what does not serve a generator is said of its kind.
+/// Size, cell and origin are keys of the composition: a generator that cannot use them is reported under its `kind`.
 #[test]
-fn val_an_origin_that_a_generator_refuses_is_the_whole_s() {
+fn val_a_refused_origin_is_attributed_to_the_composition() {
     let processes = json!([{"kind": "spheroids"}, {"kind": "gap"}]);
     let params = json!({"size_px": [90, 90], "cell_m": 0.25, "origin_m": [0.1, 0.0], "processes": processes});
     let error = crate::prepare(KIND, &params).err().unwrap();
-    assert!(error.key == "processes.1.kind" && error.message.contains("the whole's `origin_m`"), "{error}");
+    assert!(error.key == "processes.1.kind" && error.message.contains("the `origin_m` of the composition"), "{error}");
 }
 
 /// The listing behind `mavs_gaussian` may choose another cell.
@@ -194,7 +208,7 @@ fn val_cells_of_a_listing_are_refused() {
 }
 
 #[test]
-fn val_maps_of_generators_go_on() {
+fn val_maps_of_generators_are_kept() {
     let maps = |processes| made(processes, &[]).maps;
     let one = maps(json!([{"kind": "cascade"}, {"kind": "spheroids"}]));
     assert_eq!(one.iter().map(|m| m.name).collect::<Vec<_>>(), ["flux"]);
@@ -203,7 +217,7 @@ fn val_maps_of_generators_go_on() {
     assert_ne!(one[0].values, two[0].values);
 }
 
-/// A map has values where its process counts, and none of roughness goes on: x below 4 m is masked off or blended over.
+/// A map has values where its process takes effect, and roughness maps are dropped: x below 4 m is masked off or blended over.
 #[test]
 fn val_maps_follow_their_region() {
     let region = |from: f64, to: f64| json!({"of": "ramp", "from": from, "to": to});
@@ -258,9 +272,9 @@ fn val_impossible_processes_are_refused() {
 
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(64))]
-    /// Whatever the numbers, a list of processes that fit fails with a reason, or gives finite heights that are not flat.
+    /// For any numbers, a valid list of processes fails with a reason, or gives finite heights that are not flat.
     #[test]
-    fn prop_any_list_is_made_or_refused(words in proptest::collection::vec((0usize..6, any::<bool>(), -3.0f64..3.0), 1..6)) {
+    fn prop_any_list_is_generated_or_refused(words in proptest::collection::vec((0usize..6, any::<bool>(), -3.0f64..3.0), 1..6)) {
         let operations = ["add", "multiply", "blend", "mask", "clip", "scale_to_relief"];
         let region = |number: f64| json!({"kind": "spheroids", "from": 0.0, "to": number});
         let process = |(operation, everywhere, number): (usize, bool, f64)| {
@@ -293,8 +307,8 @@ proptest! {
     }
 }
 
-/// The centre line of a trail comes with the surface, its heights those at the end; a second trail and those of an operand have names of
-/// their own. All parameters are written out, and read back to the same surface.
+/// The centre line of a trail is a line of the surface, with the final heights; a second trail and those of an operand get distinct
+/// names. All parameters are written out, and read back to the same surface.
 #[test]
 fn val_trails_are_lines_of_the_surface() {
     let small = json!({"width_m": 3.2, "turning_radius_m": 3.0});

@@ -3,13 +3,13 @@
 use sastrugi_numeric::{Geometry, Grid};
 use std::ops::Range;
 
-/// Cubic convolution (Keys, 1981, doi:10.1109/TASSP.1981.1163711, a = -1/2): through every post, without bends, exact on parabolas.
-/// Beyond the outermost posts it goes on at their height.
+/// Cubic convolution (Keys, 1981, doi:10.1109/TASSP.1981.1163711, a = -1/2): passes through every post, with continuous slope, and is
+/// exact on parabolas. Beyond the outermost posts it continues at their height.
 pub struct Background {
-    /// Where the posts of the whole DEM lie: places are told by them, so that parts of it agree bit by bit.
+    /// Geometry of the complete DEM: positions are computed from it, so that parts of the DEM agree bit by bit.
     whole: Geometry,
     posts: Grid,
-    /// Column and row (from the south) of the first of `posts` in the whole.
+    /// Column and row (from the south) of the first of `posts` in the complete DEM.
     first: [usize; 2],
 }
 
@@ -19,12 +19,12 @@ impl Background {
         Self { whole: posts.geometry, posts, first: [0; 2] }
     }
 
-    /// The surface through some of the posts of a DEM, for places that lie between them.
+    /// The surface through some of the posts of a DEM, for points between them.
     pub fn of_part(whole: Geometry, first: [usize; 2], posts: Grid) -> Self {
         Self { whole, posts, first }
     }
 
-    /// Where the posts of the whole lie.
+    /// Geometry of the complete DEM.
     pub fn geometry(&self) -> Geometry {
         self.whole
     }
@@ -42,35 +42,35 @@ impl Background {
     }
 }
 
-/// A place this near to a post, in posts, may be taken for it: coordinates are rounded.
+/// A point this close to a post, in posts, counts as lying on it: coordinates are rounded.
 const AT_POST: f64 = 1e-6;
 
-/// Whether a place along an axis lies between the outer posts.
+/// Whether a coordinate along an axis lies between the outer posts.
 pub fn lies_between(g: &Geometry, axis: usize, at: f64) -> bool {
     let last = ([g.cols, g.rows][axis] - 1) as f64;
     (-AT_POST..=last + AT_POST).contains(&position(g, axis, at))
 }
 
-/// Columns or rows (from the south, axis 1) of the posts that [`Background::at`] looks at between two places, m.
+/// Columns or rows (from the south, axis 1) of the posts that [`Background::at`] uses between two coordinates, m.
 pub fn around(g: &Geometry, axis: usize, [low, high]: [f64; 2]) -> Range<usize> {
     let count = [g.cols, g.rows][axis];
     let post = |at: f64| place(position(g, axis, at), count).0;
     post(low).saturating_sub(1)..(post(high) + 3).min(count)
 }
 
-/// Where a place lies along an axis, posts from the first.
+/// Position of a coordinate along an axis, in posts from the first.
 fn position(g: &Geometry, axis: usize, at: f64) -> f64 {
     (at - g.origin[axis]) / g.cell[axis] - 0.5
 }
 
-/// Post at or before a position, and the share of the way to the next.
+/// Post at or before a position, and the fraction of the way to the next post.
 fn place(position: f64, count: usize) -> (usize, f64) {
     let position = position.clamp(0.0, (count - 1) as f64);
     let post = (position as usize).min(count - 2);
     (post, position - post as f64)
 }
 
-/// Between post `at` and the next, from the four around.
+/// Interpolates between post `at` and the next from the four surrounding posts.
 fn along(value: impl Fn(usize) -> f64, count: usize, at: usize, t: f64) -> f64 {
     let (here, next) = (value(at), value(at + 1));
     // Keys' condition beyond the ends: the third difference is 0.
@@ -90,6 +90,17 @@ mod tests {
         Background::new(Grid::new(g, (0..g.len()).map(|k| f(g.x(k % 9), g.y(k / 9))).collect()))
     }
 
+    /// Halfway between two posts the weights of the four posts in a row are -1/16, 9/16, 9/16 and -1/16.
+    #[test]
+    fn val_weights_halfway_are_those_of_keys() {
+        let row = [16.0, 32.0, 48.0, 0.0];
+        let along_x = Grid::new(Geometry::square(4, 4, 1.0), (0..16).map(|k| row[k % 4]).collect());
+        assert!((Background::new(along_x).at([2.0, 2.3]) - 44.0).abs() < 1e-12);
+        // Row 0 lies in the north.
+        let along_y = Grid::new(Geometry::square(4, 4, 1.0), (0..16).map(|k| row[3 - k / 4]).collect());
+        assert!((Background::new(along_y).at([1.8, 2.0]) - 44.0).abs() < 1e-12);
+    }
+
     #[test]
     fn val_parabolas_are_exact() {
         let f = |x: f64, y: f64| 1.0 + 0.3 * x - 2.0 * y + 0.05 * x * x - 0.02 * y * y + 0.07 * x * y;
@@ -99,7 +110,7 @@ mod tests {
         }
     }
 
-    /// Through every post; without steps or bends across the lines of posts; level beyond the ends.
+    /// Passes through every post, with continuous value and slope across the lines of posts, and is level beyond the ends.
     #[test]
     fn prop_smooth_through_the_posts() {
         let f = |x: f64, y: f64| libm::sin(2.1 * x) * libm::cos(1.3 * y);

@@ -1,15 +1,15 @@
-//! How wide a crater or rock may be that is added to a site.
+//! Largest crater or rock that may be added to a site.
 //!
-//! What the DEM or images of the site would have shown is either in the DEM or not there. A feature shows when two samples fall on it, so
-//! that nothing wider than two posts of the DEM is added (section 5 of the paper's scheme), and nothing wider than `image_pixels` pixels of
-//! the images, two unless said otherwise: the sampling theorem's bound. Whether an eye finds a rock of two pixels also depends on light and
-//! contrast; surveys that count rocks ask for more.
+//! A feature that the DEM or images of the site would show is either in the DEM already or does not exist. A feature shows when two samples
+//! fall on it. So nothing wider than two posts of the DEM is added (section 5 of the paper's scheme), and nothing wider than `image_pixels`
+//! pixels of the images; the default of two is the sampling theorem's bound. Whether an observer can see a rock of two pixels also depends
+//! on light and contrast; surveys that count rocks require more pixels.
 
 use crate::planetary::RawProcess;
 
 /// Largest crater or rock, posts of the DEM.
 pub const DIAMETER_POSTS: f64 = 2.0;
-/// Pixels across the widest crater or rock that images do not show.
+/// Widest crater or rock that images do not show, pixels.
 pub const DIAMETER_PIXELS: f64 = 2.0;
 
 /// The widest crater or rock that may be added, and why.
@@ -17,7 +17,7 @@ pub const DIAMETER_PIXELS: f64 = 2.0;
 pub enum Bound {
     /// The DEM, with this distance between its posts, m.
     Posts(f64),
-    /// Images: metres per pixel, and how many pixels a feature may have.
+    /// Images: metres per pixel, and the largest width of a feature in pixels.
     Pixels(f64, f64),
 }
 
@@ -30,26 +30,26 @@ impl Bound {
         }
     }
 
-    /// The narrower of two.
+    /// The stricter of two bounds.
     pub fn and(self, other: Option<Self>) -> Self {
         other.filter(|other| other.most_m() < self.most_m()).unwrap_or(self)
     }
 
-    /// The sentence on what was left out; `None` for a list without craters and rocks.
+    /// A note on the bound; `None` for a list without craters and rocks.
     pub fn note(self, processes: &[RawProcess]) -> Option<String> {
         let why = match self {
             Self::Posts(post_m) => format!("the DEM, with posts {post_m:.3} m apart"),
-            Self::Pixels(resolution_m, pixels) => format!("images of {resolution_m} m a pixel ({pixels} pixels)"),
+            Self::Pixels(resolution_m, pixels) => format!("images with {resolution_m} m pixels ({pixels} pixels)"),
         };
         let bounded = processes.iter().any(|p| diameter_min_m(p).is_some());
         bounded
             .then(|| format!("craters and rocks are at most {:.3} m wide: {why} would show wider ones", self.most_m()))
     }
 
-    /// The processes with nothing wider.
+    /// The processes, limited to this width.
     ///
     /// # Errors
-    /// The place in the list of a process all of whose craters or rocks are wider, and its smallest diameter, m.
+    /// The index of a process whose craters or rocks are all wider, and its smallest diameter, m.
     pub fn apply(self, processes: &[RawProcess]) -> Result<Vec<RawProcess>, (usize, f64)> {
         let most_m = self.most_m();
         let one = |(n, process): (usize, &RawProcess)| match diameter_min_m(process) {
@@ -70,7 +70,7 @@ fn diameter_min_m(process: &RawProcess) -> Option<f64> {
     }
 }
 
-/// A process with nothing wider than `most_m`.
+/// A process limited to craters or rocks up to `most_m` wide.
 fn narrowed(process: &RawProcess, most_m: f64) -> RawProcess {
     let mut process = process.clone();
     let widest_m = match &mut process {

@@ -1,41 +1,65 @@
 //! Finer detail for a measured DEM.
 //!
 //! # What
-//! A smooth background through the posts of the DEM (cubic convolution), and on it what the processes of [`crate::planetary`] make below
-//! the spacing of the posts: texture, bounded craters, rocks. With S the surface so made, B the background and `I[.]` cubic convolution
-//! between values at the posts,
+//! A smooth background through the posts of the DEM (cubic convolution), plus the detail that the processes of [`crate::planetary`] add
+//! below the post spacing: texture, bounded craters, rocks. With S the background plus detail, B the background and `I[.]` cubic
+//! convolution between values at the posts,
 //! $$ z = S - I\left[\, S(\text{posts}) - B(\text{posts}) \,\right] $$
-//! so that z is the DEM's height at every post that is a lattice point, and the DEM's to within the slope times half a basic spacing
-//! at the others.
+//! so that z equals the DEM at every post that is a lattice point, and at the other posts to within the slope times half a basic
+//! spacing.
 //!
 //! Craters and rocks that the DEM, or images of the site, would have shown are not added (`bounds`). Sparse altimetry moves the surface
-//! onto measured points (`altimetry`). With a measured albedo A, its background `B_A` and the albedo P of the processes, the map of the
-//! albedo is
+//! onto measured points (`altimetry`). With a measured albedo A, its background `B_A` and the albedo P of the processes, the albedo map
+//! is
 //! $$ a = B_A + P - I\left[\, P(\text{cells of } A) \,\right] $$
-//! kept to 0 to 1: that of the measurement at the centres of its cells, as heights are at posts. Without a process `albedo` it is smooth.
+//! limited to 0 to 1. It equals the measurement at the centres of its cells, just as heights equal the DEM at posts. Without an `albedo`
+//! process it is smooth.
 //!
-//! Texture parameters are fitted to the second differences of the DEM over lags of 1 to 8 posts (`fit`), unless given; its coarsest
-//! points are the lattice spacing nearest to that of the posts.
+//! Texture parameters are fitted to the second differences of the DEM over lags of 1 to 8 posts (`fit`), unless given; the coarsest
+//! texture points have the lattice spacing closest to that of the posts.
 //!
 //! # The lattice
 //! Samples lie at `origin_m` and whole cells from it, lattice points whole basic spacings from it, numbered from the origin of the DEM's
-//! coordinates. The lattice is shifted so that samples lie on it, by half a cell at most. Windows of one cell whose origins differ by whole
-//! cells have the same shift: they are windows of one surface, and agree bit by bit. So do windows of twice the cell with every second
-//! sample, where their origin lies within half of the smaller cell of a whole number of larger ones; elsewhere they are shifted
-//! otherwise, and have other detail.
+//! coordinates. The lattice is shifted, by at most half a cell, so that samples lie on it. Windows with the same cell whose origins differ by
+//! whole cells have the same shift: they are windows of one surface, and agree bit by bit. Windows of twice the cell agree with every second
+//! sample if their origin lies within half of the smaller cell of a whole number of larger cells; otherwise they have a different shift, and
+//! thus different detail.
 //!
 //! # Source
 //! The paper's future work (section 1), and section 5 of Gaskell's scheme: "an interpolated surface begins with digital elevation and
 //! albedo maps which define the basic scale to within a factor of a power of two". Where we depart:
-//! * the DEM is not resampled to the lattice. The background goes through its own posts, whatever their distance, and residuals are
-//!   taken at them;
-//! * the residual is interpolated by cubic convolution instead of bilinearly, which would leave creases on the lines of posts as high
+//! * the DEM is not resampled to the lattice. The background passes through its own posts, whatever their spacing, and residuals are
+//!   evaluated there;
+//! * the residual is interpolated by cubic convolution; bilinear interpolation would leave creases along the lines of posts as high
 //!   as the texture;
-//! * the background is cubic, not the average of parents, which leaves cusps at the posts.
+//! * the background is cubic; the average of parents would leave cusps at the posts.
+//!
+//! # Example
+//! ```
+//! use sastrugi_numeric::{Geometry, Grid, Streams, Surface};
+//! use sastrugi_terrain::{Input, prepare};
+//! use serde_json::json;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! // 9 x 8 posts, 1 m apart, refined to samples of 25 cm with a given texture.
+//! let posts = Geometry::square(9, 8, 1.0);
+//! let dem = Grid::new(posts, (0..72).map(|k| f64::from(k * k % 7)).collect());
+//! let params = json!({
+//!     "dem": "site", "cell_m": 0.25, "origin_m": [3.0, 3.0], "size_px": [16, 16], "hurst": 0.7, "roughness_m": 0.02
+//! });
+//! let heights = prepare("elaborate", &params)?
+//!     .generate(&Streams::for_seed(1, "terrain"), &[Input::from(dem.clone())])?
+//!     .heights;
+//! // The surface passes through the posts, here that of row 5 and column 3.
+//! let height_m = heights.height(posts.x(3), posts.y(5)).ok_or("the post lies in the window")?;
+//! assert!((height_m - dem.at(5, 3)).abs() < 1e-6);
+//! # Ok(())
+//! # }
+//! ```
 //!
 //! # When not to use it
-//! The texture extrapolates a power law over decades of scale. Where the ground has another roughness below the posts (grass, gravel, a
-//! ploughed field) give `hurst` and `roughness_m`, or take `texture = false` and add a measured texture to the background.
+//! The texture extrapolates a power law over decades of scale. Where the roughness of the ground is different below the post spacing (grass,
+//! gravel, a ploughed field), set `hurst` and `roughness_m`, or set `texture = false` and add a measured texture to the background.
 
 mod altimetry;
 mod background;
@@ -47,12 +71,12 @@ mod tests;
 mod windows;
 
 #[cfg(test)]
-pub(crate) use fit::seen_through_the_lags;
+pub(crate) use fit::half_slope_and_factor;
 pub use fit::{TextureFit, fit};
 pub use params::{Elaborate, RawElaborate};
 pub use windows::Elaborated;
 
-use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError, told};
+use crate::generator::{Generator, Input, Map, NamedInput, Terrain, TerrainError, rounded_coordinate};
 use crate::planetary::{self, Assembly, Patch, Potential, RawProcess, Request, Window, Work, World};
 use altimetry::{AltimetryError, Correction, Points, Posts};
 use background::Background;
@@ -69,43 +93,43 @@ use std::sync::atomic::{AtomicBool, Ordering};
 /// Name in the registry.
 pub const KIND: &str = "elaborate";
 
-/// Fewest posts along a side of the DEM.
+/// Minimum number of posts along a side of the DEM.
 const POSTS_MIN: usize = 4;
-/// How far from a window the ground under its craters may reach, posts: ejecta of the widest, and their retained points.
+/// How far from a window the ground under its craters may extend, posts: ejecta of the widest, and their retained points.
 const CRATER_POSTS: usize = 8;
 
-/// Why a DEM, or what comes with it, cannot be used.
+/// Why a DEM or another input cannot be used. Messages read after "it".
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 enum DemError {
-    #[error("is not there")]
+    #[error("is missing")]
     Missing,
     #[error("has {rows} x {cols} posts; at least 4 x 4 are needed")]
     TooSmall { rows: usize, cols: usize },
-    #[error("has posts {post_m} m apart; `cell_m` is {cell_m} m and must be finer")]
+    #[error("has posts {post_m} m apart; `cell_m` is {cell_m} m but must be finer")]
     NotFiner { post_m: f64, cell_m: f64 },
     #[error(
         "has its outer posts at x {} to {}, y {} to {} m; the window's samples, x {} to {}, y {} to {} m, do not lie between them",
         dem[0], dem[1], dem[2], dem[3], window[0], window[1], window[2], window[3]
     )]
     Outside { dem: [f64; 4], window: [f64; 4] },
-    #[error("has no data at x = {x}, y = {y} m, which the window needs; choose another window or fill the hole")]
+    #[error("has no data at x = {x}, y = {y} m, where the window needs it; choose another window or fill the hole")]
     NoData { x: f64, y: f64 },
     #[error(
-        "has too few posts with data for a fit of its texture, which takes at least 7 in a row both ways; give `hurst` and `roughness_m`, or `texture = false`"
+        "has too few posts with data to fit its texture: at least 7 in a row are needed in both directions; set `hurst` and `roughness_m`, or `texture = false`"
     )]
     NoFit,
     #[error(
-        "has posts {post_m} m apart, and would show {what} wider than two of them; the smallest asked for is {diameter_m} m"
+        "has posts {post_m} m apart, so any {what} wider than two posts would show in it; the smallest requested is {diameter_m} m"
     )]
     Shows { post_m: f64, what: &'static str, diameter_m: f64 },
-    #[error("holds an albedo of {albedo} at x = {x}, y = {y} m; albedo lies in 0 to 1")]
-    NoAlbedo { albedo: f64, x: f64, y: f64 },
-    #[error("cannot hold the surface: {0}")]
+    #[error("has an albedo of {albedo} at x = {x}, y = {y} m; albedo must lie in 0 to 1")]
+    AlbedoOutOfRange { albedo: f64, x: f64, y: f64 },
+    #[error("is not usable as altimetry: {0}")]
     Altimetry(AltimetryError),
 }
 
 impl DemError {
-    /// The parameter that decides what is wrong with an input; `input` is the one that names it.
+    /// The parameter that causes the error; `input` is the one that names the input.
     fn key<'a>(&self, input: &'a str) -> &'a str {
         match self {
             Self::Outside { .. } => "origin_m",
@@ -119,7 +143,7 @@ impl DemError {
 /// Columns and rows (from the south) of posts.
 type Part = [Range<usize>; 2];
 
-/// What the window's samples are made from.
+/// The inputs, each under its role.
 struct Inputs<'a> {
     dem: &'a Grid,
     albedo: Option<&'a Grid>,
@@ -128,56 +152,56 @@ struct Inputs<'a> {
     potential: Option<&'a Grid>,
 }
 
-/// What the samples of a window are made from.
+/// The parts of the inputs that the samples of a window depend on.
 struct Surroundings {
-    /// Of the DEM.
+    /// Posts of the DEM.
     posts: Part,
-    /// The altimetry that matters.
+    /// Altimetry points within reach.
     points: Points,
-    /// Of the measured albedo.
+    /// Posts of the measured albedo.
     albedo: Option<Part>,
 }
 
-/// What an elaborated DEM is made from, whatever the window and the processes that act.
+/// The data of an elaborated DEM that do not depend on the window or on which processes act.
 struct Basis {
     background: Arc<Background>,
     /// The measured albedo.
     albedo: Option<Background>,
     points: Points,
     potential: Option<Potential>,
-    /// Without what the DEM or images would show.
+    /// The processes, limited to what neither the DEM nor images would show.
     processes: Vec<RawProcess>,
     texture: Option<TextureFit>,
     notes: Vec<String>,
 }
 
-/// The surface that the processes of a selection make.
+/// The surface generated by a selection of the processes.
 struct Model {
     basis: Arc<Basis>,
     /// The background with the detail.
     world: World,
 }
 
-/// How a window is made.
+/// How a window is computed.
 #[derive(Clone, Copy)]
 struct Pace<'a> {
-    /// Craters and rocks that are not wider are left out, m.
+    /// Craters and rocks up to this width are left out, m.
     least_m: f64,
-    /// Tells that the window is no longer wanted.
+    /// Set when the window is cancelled.
     cancel: Option<&'a AtomicBool>,
-    /// On all threads, or on this one.
+    /// Whether to use all threads or only this one.
     on_all: bool,
 }
 
 impl Pace<'_> {
-    /// Of a window that is wanted whole.
+    /// A complete window on all threads.
     const WHOLE: Self = Self { least_m: 0.0, cancel: None, on_all: true };
 
     fn is_over(&self) -> bool {
         self.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
     }
 
-    /// The values of `f` below a count; those that are no longer wanted are 0.
+    /// The values of `f` for 0 to `count - 1`; 0 for those after cancellation.
     fn values(&self, count: usize, f: impl Fn(usize) -> f64 + Sync) -> Vec<f64> {
         let value = |k: usize| if self.is_over() { 0.0 } else { f(k) };
         if self.on_all { (0..count).into_par_iter().map(value).collect() } else { (0..count).map(value).collect() }
@@ -185,51 +209,54 @@ impl Pace<'_> {
 }
 
 impl NamedInput {
-    /// A failure of it.
+    /// An error about this input.
     fn failed(&self, error: &DemError) -> TerrainError {
         self.error(error.to_string())
     }
 }
 
 impl Elaborate {
-    /// Place of a lattice point in the DEM's coordinates, m.
+    /// Position of a lattice point in the DEM's coordinates, m.
     fn place(&self, point: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|a| point[a] * self.spacing_m + self.offset_m[a])
     }
 
-    /// The lattice point nearest to a place.
+    /// The lattice point nearest to a position.
     fn nearest(&self, place: [f64; 2]) -> [i64; 2] {
         [0, 1].map(|a| ((place[a] - self.offset_m[a]) / self.spacing_m).round() as i64)
     }
 
-    /// Least and largest place of the window's samples along x and y, m.
+    /// Smallest and largest coordinate of the window's samples along x and y, m.
     fn ends(&self) -> [[f64; 2]; 2] {
         let last = [self.window.cols - 1, self.window.rows - 1].map(|n| n as f64 * self.raw.cell_m);
         [0, 1].map(|a| [self.raw.origin_m[a], self.raw.origin_m[a] + last[a]])
     }
 
-    /// The posts that the window's samples, and the ground up to `beyond_m` around them, lie between, two beyond on either side where there
-    /// are.
+    /// The posts that enclose the window's samples and the ground up to `beyond_m` around them, plus two on either side where they
+    /// exist.
     fn posts(&self, g: &Geometry, beyond_m: f64) -> Result<Part, DemError> {
         let ends = self.ends();
         let outer = [[g.x(0), g.x(g.cols - 1)], [g.y(g.rows - 1), g.y(0)]];
         if (0..2).any(|a| ends[a].iter().any(|at| !background::lies_between(g, a, *at))) {
             let four = |p: [[f64; 2]; 2]| [p[0][0], p[0][1], p[1][0], p[1][1]];
-            return Err(DemError::Outside { dem: four(outer).map(told), window: four(ends).map(told) });
+            return Err(DemError::Outside {
+                dem: four(outer).map(rounded_coordinate),
+                window: four(ends).map(rounded_coordinate),
+            });
         }
-        // The places of the outer samples to the last bit: `Background::at` looks at the posts around these.
+        // The positions of the outer samples to the last bit: `Background::at` uses the posts around these.
         let w = &self.window;
         let low = self.place([w.x(0), w.y(0)]);
         let high = self.place([w.x(w.cols - 1), w.y(w.rows - 1)]);
         Ok([0, 1].map(|a| background::around(g, a, [low[a] - beyond_m, high[a] + beyond_m])))
     }
 
-    /// How far from a sample the DEM must have data, posts.
+    /// Distance around a sample within which the DEM must have data, posts.
     fn margin(&self) -> usize {
         if self.raw.processes.is_empty() { 0 } else { CRATER_POSTS }
     }
 
-    /// Whether the posts of a part of a raster, and `margin` posts around it, have data.
+    /// Checks that the posts of a part of a raster, and `margin` posts around it, have data.
     fn check_raster(&self, raster: &Grid, part: &Part, margin: usize) -> Result<(), DemError> {
         let [cols, rows] = part;
         let g = &raster.geometry;
@@ -244,7 +271,7 @@ impl Elaborate {
         Ok(())
     }
 
-    /// Whether the rasters can be used at all, whatever the window.
+    /// Checks whether the rasters can be used at all, regardless of the window.
     fn check_inputs(&self, inputs: &Inputs<'_>) -> Result<(), TerrainError> {
         self.check_size(&inputs.dem.geometry).map_err(|e| self.dem().failed(&e))?;
         let (Some(albedo), Some(name)) = (inputs.albedo, self.albedo()) else { return Ok(()) };
@@ -254,12 +281,12 @@ impl Elaborate {
             None => Ok(()),
             Some(k) => {
                 let (albedo, x, y) = (albedo.values[k], g.x(k % g.cols), g.y(k / g.cols));
-                Err(name.failed(&DemError::NoAlbedo { albedo, x, y }))
+                Err(name.failed(&DemError::AlbedoOutOfRange { albedo, x, y }))
             }
         }
     }
 
-    /// Whether a DEM or an albedo of some shape and place can be used.
+    /// Checks whether a DEM or an albedo of this shape and position can be used.
     fn check_place(&self, name: &NamedInput, g: &Geometry) -> Result<(), DemError> {
         self.check_size(g)?;
         self.posts(g, 0.0)?;
@@ -269,7 +296,7 @@ impl Elaborate {
         Ok(())
     }
 
-    /// Whether a raster has enough posts, and farther apart than the samples.
+    /// Checks that a raster has enough posts, farther apart than the samples.
     fn check_size(&self, g: &Geometry) -> Result<(), DemError> {
         let post_m = g.cell[0].min(g.cell[1]);
         if g.rows < POSTS_MIN || g.cols < POSTS_MIN {
@@ -281,7 +308,7 @@ impl Elaborate {
         }
     }
 
-    /// The processes without what the DEM or images would show, and the sentence on it.
+    /// The processes without features that the DEM or images would show, and a note on the bound.
     fn bounded(&self, post_m: f64) -> Result<(Vec<RawProcess>, Option<String>), DemError> {
         let bound = Bound::Posts(post_m).and(self.images);
         let shown = |(n, diameter_m): (usize, f64)| {
@@ -292,7 +319,7 @@ impl Elaborate {
         Ok((processes, bound.note(&self.raw.processes)))
     }
 
-    /// Texture of the DEM, where it is asked for.
+    /// Texture of the DEM, if requested.
     fn texture(&self, dem: &Grid) -> Result<Option<TextureFit>, DemError> {
         if !self.raw.texture {
             return Ok(None);
@@ -304,7 +331,7 @@ impl Elaborate {
         Ok(Some(TextureFit { roughness_m: self.raw.roughness_m.unwrap_or(fitted.roughness_m), ..fitted }))
     }
 
-    /// The surface of a basis; of its processes act those at some places of the list.
+    /// The surface of a basis; `acts` selects the processes by their index in the list.
     fn model(&self, streams: &Streams, basis: Arc<Basis>, acts: impl Fn(usize) -> bool) -> Model {
         let (background, own) = (Arc::clone(&basis.background), self.clone());
         let anchor = planetary::nearest_zoom(background.geometry().mean_cell() / self.spacing_m);
@@ -317,7 +344,7 @@ impl Elaborate {
         Model { basis, world }
     }
 
-    /// A quantity of the detail at the posts of a part, interpolated as backgrounds are.
+    /// A quantity of the detail at the posts of a part, interpolated like the background.
     fn detail(
         &self,
         g: Geometry,
@@ -333,7 +360,7 @@ impl Elaborate {
         Background::of_part(g, [cols.start, rows.start], Grid::new(posts, values))
     }
 
-    /// Changes the values of a window, each by a function of its lattice point.
+    /// Replaces the values of a window by a function of their lattice point and old value.
     fn change(&self, values: &mut [f64], pace: Pace<'_>, by: impl Fn([f64; 2], f64) -> f64 + Sync) {
         let window = self.window;
         let line = |(row, line): (usize, &mut [f64])| {
@@ -360,7 +387,7 @@ impl Elaborate {
         })
     }
 
-    /// How far altimetry moves the surface that is `world` less `residual`.
+    /// How far altimetry moves the surface `world` minus `residual`.
     fn correction(&self, points: &Points, world: Bounded<'_>, residual: &Background) -> Correction {
         let corners = points.corners();
         let heights = world.pace.values(corners.len(), |k| {
@@ -371,7 +398,7 @@ impl Elaborate {
         points.correction(|corner| known.get(&corner).copied().unwrap_or(f64::NAN))
     }
 
-    /// The measured albedo at the window's samples, with the detail of the processes.
+    /// The measured albedo at the window's samples, plus the detail of the processes.
     fn measured_albedo(&self, measured: &Background, part: &Part, world: Bounded<'_>, patch: &mut Patch) {
         let detail = self.detail(measured.geometry(), part, world.pace, |point| world.sample(point).albedo[0]);
         self.change(&mut patch.albedo, world.pace, |point, own| {
@@ -380,7 +407,7 @@ impl Elaborate {
         });
     }
 
-    /// What all windows and selections of processes have in common.
+    /// The data shared by all windows and selections of processes.
     fn basis(&self, inputs: &Inputs<'_>, points: Points) -> Result<Basis, TerrainError> {
         let (dem, of_dem) = (inputs.dem, |e: DemError| self.dem().failed(&e));
         let g = &dem.geometry;
@@ -394,7 +421,7 @@ impl Elaborate {
         Ok(Basis { background, albedo, points, potential, processes, texture, notes })
     }
 
-    /// What the window is made from: posts of a DEM and of an albedo, and altimetry.
+    /// The posts of the DEM and of the albedo, and the altimetry, that the window depends on.
     fn surroundings(
         &self,
         dem: &Geometry,
@@ -412,7 +439,7 @@ impl Elaborate {
         Ok(Surroundings { posts, points, albedo })
     }
 
-    /// How far around a sample the ground matters to the altimetry that may move it, m.
+    /// Distance around a sample within which the ground affects the altimetry that may move it, m.
     fn altimetry_m(&self, dem: &Geometry, points: &Points) -> f64 {
         if points.is_empty() {
             return 0.0;
@@ -421,7 +448,7 @@ impl Elaborate {
         dem.cell[0].max(dem.cell[1]) + 2.0 * self.spacing_m
     }
 
-    /// Whether there are data all around the window.
+    /// Checks that there are data all around the window.
     fn check_data(&self, inputs: &Inputs<'_>, around: &Surroundings) -> Result<(), TerrainError> {
         self.check_raster(inputs.dem, &around.posts, self.margin()).map_err(|e| self.dem().failed(&e))?;
         match (inputs.albedo, self.albedo(), &around.albedo) {
@@ -430,7 +457,8 @@ impl Elaborate {
         }
     }
 
-    /// Makes samples of the model into those of the surface, which goes through the posts and the altimetry; with a measured albedo its own.
+    /// Turns samples of the model into samples of the surface, which passes through the posts and the altimetry; also sets the measured albedo,
+    /// if any.
     fn settle(&self, around: &Surroundings, model: &Model, pace: Pace<'_>, patch: &mut Patch) -> Option<Correction> {
         let (world, background) = (Bounded { world: &model.world, pace }, &model.basis.background);
         let residual = self.detail(background.geometry(), &around.posts, pace, |[i, j]| {
@@ -478,7 +506,7 @@ impl Elaborate {
     fn texture_notes(&self, texture: &TextureFit, g: &Geometry) -> Vec<String> {
         let given = self.raw.hurst.is_some() && self.raw.roughness_m.is_some();
         vec![format!(
-            "texture below the posts of {:.3} x {:.3} m: H = {:.3}, roughness {:.4} m at 1 m, {:.4} m at the cell ({})",
+            "texture below the post spacing of {:.3} x {:.3} m: H = {:.3}, roughness {:.4} m at 1 m, {:.4} m at the cell ({})",
             g.cell[0],
             g.cell[1],
             texture.hurst,
@@ -500,7 +528,7 @@ impl Elaborate {
         self.raw.altimetry.as_ref().map(|name| NamedInput::points("altimetry", name))
     }
 
-    /// The inputs, each in the place of its name.
+    /// The inputs, assigned to their roles.
     fn sorted<'a>(&self, inputs: &'a [Input]) -> Result<Inputs<'a>, TerrainError> {
         let mut given = inputs.iter();
         let mut grid = |name: Option<NamedInput>| match (name, &mut given) {
@@ -524,7 +552,7 @@ impl Elaborate {
     }
 }
 
-/// A world without craters and rocks that are not wider than its pace says.
+/// A world limited to craters and rocks wider than `pace.least_m`.
 #[derive(Clone, Copy)]
 struct Bounded<'a> {
     world: &'a World,
@@ -538,7 +566,7 @@ impl Bounded<'_> {
     }
 }
 
-/// Some posts, and `margin` more on either side where there are.
+/// A range of posts, extended by `margin` on either side where they exist.
 fn widened(posts: &Range<usize>, margin: usize, count: usize) -> Range<usize> {
     posts.start.saturating_sub(margin)..(posts.end + margin).min(count)
 }
@@ -548,7 +576,7 @@ fn point(west: i64, south: i64) -> Window {
     Window { zoom: 0, west, south, cols: 1, rows: 1, centred: false }
 }
 
-/// The DEM with its mean where it has no data: far from the window, where only planes of distant craters ask.
+/// The DEM with no data replaced by its mean: far from the window, where only the planes of distant craters use it.
 fn without_holes(dem: &Grid) -> Grid {
     let mean = sastrugi_numeric::sums::mean(&sastrugi_numeric::sums::finite(&dem.values));
     dem.map(|z| if z.is_finite() { z } else { mean })
@@ -591,7 +619,7 @@ impl Generator for Elaborate {
                 continue;
             };
             self.check_place(name, &g).map_err(|error| {
-                let message = format!("does not fit \"{}\": it {error}", name.name);
+                let message = format!("does not suit \"{}\", which {error}", name.name);
                 ParameterError::new(error.key(&name.key), message)
             })?;
         }

@@ -41,8 +41,8 @@ fn processes() -> Value {
     ])
 }
 
-/// Posts on the lattice are kept to 1e-6, with texture, craters and rocks; also where the posts are no power of 2 apart and
-/// not as far north as east.
+/// Posts on the lattice are kept to 1e-6, with texture, craters and rocks; also where the post spacing is not a power of 2 and
+/// differs between north and east.
 #[test]
 fn val_posts_are_kept() {
     for cell in [[1.28, 1.28], [1.12, 1.6]] {
@@ -54,8 +54,8 @@ fn val_posts_are_kept() {
     }
 }
 
-/// Posts off the lattice are kept to the slope over half a basic spacing; bilinear between samples 2 cm apart adds their texture, 6 mm
-/// between neighbours.
+/// Posts off the lattice are kept to within the slope over half a basic spacing; bilinear interpolation between samples 2 cm apart adds
+/// their texture, 6 mm between neighbours.
 #[test]
 fn val_posts_off_the_lattice_are_kept_to_the_slope() {
     let dem = site(24, 24, [1.123, 1.617]);
@@ -63,7 +63,7 @@ fn val_posts_off_the_lattice_are_kept_to_the_slope() {
     assert!(errors_at_posts(&made.heights, &dem, 100) < 0.03);
 }
 
-/// Largest difference at the posts inside; there must be `least` of them.
+/// Largest difference at the posts inside, of which there must be at least `least`.
 fn errors_at_posts(heights: &Grid, dem: &Grid, least: usize) -> f64 {
     let g = &dem.geometry;
     let cells = (0..g.rows).flat_map(|row| (0..g.cols).map(move |col| (row, col)));
@@ -73,10 +73,10 @@ fn errors_at_posts(heights: &Grid, dem: &Grid, least: usize) -> f64 {
     all.into_iter().fold(0.0, f64::max)
 }
 
-/// The Hurst exponent of a DEM of known texture comes back within 0.05, and the roughness over three posts, amid
+/// The Hurst exponent of a DEM of known texture is recovered within 0.05, and the roughness over three posts, in the middle of
 /// the lags, within 5 %. H of a DEM of 200 x 200 posts scatters by 0.01 (printed).
 #[test]
-fn stat_texture_parameters_come_back() {
+fn stat_texture_parameters_are_recovered() {
     for hurst in [0.5, 0.7, 0.8, 0.9] {
         let fits: Vec<TextureFit> = (0..8)
             .map(|seed| {
@@ -103,7 +103,7 @@ fn stat_texture_parameters_come_back() {
     }
 }
 
-/// Windows that overlap and zooms agree bit by bit.
+/// Overlapping windows and different zooms agree bit by bit.
 #[test]
 fn prop_windows_agree() {
     let dem = site(30, 30, [1.28, 1.5]);
@@ -113,7 +113,7 @@ fn prop_windows_agree() {
     let whole = of(0.08, [105.6, 206.4], [121, 101]);
     let part = of(0.08, [105.6 + 0.08 * 30.0, 206.4 + 0.08 * 20.0], [50, 60]);
     let coarse = of(0.16, [105.6, 206.4], [61, 51]);
-    // Origins half a cell off the lattice, whose quotients by the cell fall on either side of a half.
+    // Origins half a cell off the lattice; dividing them by the cell gives quotients on either side of a half.
     let (half, half_part) = (of(0.08, [105.64, 206.44], [60, 60]), of(0.08, [105.64 + 2.4, 206.44 + 1.6], [20, 20]));
     for (j, i) in (0..20).flat_map(|j| (0..20).map(move |i| (j, i))) {
         assert_eq!(half_part.heights.at(19 - j, i), half.heights.at(59 - (j + 20), i + 30));
@@ -131,7 +131,7 @@ fn prop_windows_agree() {
     }
 }
 
-/// Without texture and processes: the smooth background, to which a texture of the texture stage may be added.
+/// Without texture and processes the result is the smooth background, to which the texture stage may add a texture.
 #[test]
 fn val_the_background_alone_is_smooth() {
     let dem = site(20, 20, [1.28, 1.28]);
@@ -174,7 +174,7 @@ fn val_unusable_dems_are_refused() {
         (with(json!({"cell_m": 1.28})), "cell_m"),
         (with(json!({"processes": [{"kind": "primary_craters", "diameter_min_m": 3.0}]})), "processes"),
     ] {
-        // Before the run, in the words of the run.
+        // Before the run, with the reason given in the run.
         let refused = elaborate(params.clone()).check_places(&[Some(dem.geometry)]).unwrap_err();
         let reason = refusal(params.clone(), &dem).split_once("it has").unwrap().1.to_owned();
         assert!(refused.key == key && refused.message.ends_with(&reason), "{params}: {refused}");
@@ -189,9 +189,9 @@ fn val_unusable_dems_are_refused() {
     assert!(refusal(inside.clone(), &holed).contains("no data at"));
 }
 
-/// A slope of any steepness moves no fit: H and roughness are those of the level DEM, to rounding.
+/// A slope of any steepness does not affect the fit: H and roughness are those of the level DEM, to rounding.
 #[test]
-fn prop_slopes_move_no_fit() {
+fn prop_slopes_do_not_affect_the_fit() {
     let level = site(40, 30, [2.0, 3.0]);
     let g = level.geometry;
     let of = |[east, north]: [f64; 2]| {
@@ -207,7 +207,7 @@ fn prop_slopes_move_no_fit() {
     }
 }
 
-/// Planes have no roughness; a DEM without data, or narrower than three lags, has no fit.
+/// Planes have no roughness; a DEM without data, or too small for three lags, has no fit.
 #[test]
 fn val_planes_have_no_roughness() {
     let g = Geometry::square(20, 20, 2.0);

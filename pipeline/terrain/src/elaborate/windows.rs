@@ -1,4 +1,4 @@
-//! Windows of an elaborated DEM on the lattice of its parameters: all of one surface, at any zoom up to half the posts.
+//! Windows of an elaborated DEM on the lattice of its parameters: all belong to one surface, at any zoom up to half the post spacing.
 
 use super::background::{Background, around, lies_between};
 use super::{Elaborate, Model, Pace, RawElaborate, point, widened};
@@ -14,19 +14,19 @@ use std::sync::atomic::Ordering;
 pub struct Elaborated {
     form: Elaborate,
     model: Model,
-    /// Of the DEM and of the measured albedo.
+    /// Coverage of the DEM and of the measured albedo.
     cover: Arc<[Cover]>,
 }
 
-/// Where the posts of a raster carry ground: a sample has ground where all posts that it depends on have data. That depends on the place of the
-/// sample alone, so that all windows agree.
+/// Where a raster provides ground: a sample has ground if all posts that it depends on have data. This depends only on the position of the
+/// sample, so that all windows agree.
 struct Cover {
     geometry: Geometry,
-    /// How far around a sample posts matter to it, m.
+    /// Distance around a sample within which posts affect it, m.
     beyond_m: f64,
-    /// How many posts more around those.
+    /// Additional posts around those.
     margin: usize,
-    /// Posts without data south and west of a corner of the posts: rows from the south of one more than there are columns.
+    /// Summed-area table: number of posts without data south and west of each corner; rows from the south, one entry more than columns.
     missing: Vec<u32>,
 }
 
@@ -45,7 +45,7 @@ impl Cover {
         Self { geometry, beyond_m, margin, missing }
     }
 
-    /// The columns or rows (from the south) of posts that a place along an axis depends on; `None` beyond the outer posts.
+    /// The columns or rows (from the south) of posts that a coordinate along an axis depends on; `None` beyond the outer posts.
     fn posts(&self, axis: usize, at_m: f64) -> Option<Range<usize>> {
         let g = &self.geometry;
         lies_between(g, axis, at_m).then(|| {
@@ -55,7 +55,7 @@ impl Cover {
     }
 
     /// Whether all posts of a part have data.
-    fn is_whole(&self, cols: &Range<usize>, rows: &Range<usize>) -> bool {
+    fn is_complete(&self, cols: &Range<usize>, rows: &Range<usize>) -> bool {
         let south_west = |row: usize, col: usize| self.missing[row * (self.geometry.cols + 1) + col];
         south_west(rows.end, cols.end) + south_west(rows.start, cols.start)
             == south_west(rows.start, cols.end) + south_west(rows.end, cols.start)
@@ -63,7 +63,7 @@ impl Cover {
 }
 
 impl Elaborate {
-    /// The surface of which this window is one.
+    /// The surface that this window is part of.
     ///
     /// # Errors
     /// Inputs that cannot be used.
@@ -89,7 +89,7 @@ impl Elaborate {
 }
 
 impl Elaborated {
-    /// The same with the processes at some places of the list, from 0; the others keep their draws.
+    /// The same surface with only the processes whose index in the list (from 0) `acts` selects; their draws do not change.
     pub fn selecting(&self, streams: &Streams, acts: impl Fn(usize) -> bool) -> Self {
         let model = self.form.model(streams, Arc::clone(&self.model.basis), acts);
         Self { form: self.form.clone(), model, cover: Arc::clone(&self.cover) }
@@ -100,22 +100,22 @@ impl Elaborated {
         self.form.spacing_m
     }
 
-    /// Where lattice point 0 lies in the DEM's coordinates, m.
+    /// Position of lattice point 0 in the DEM's coordinates, m.
     pub fn offset_m(&self) -> [f64; 2] {
         self.form.offset_m
     }
 
-    /// Its parameters.
+    /// The parameters.
     pub fn raw(&self) -> &RawElaborate {
         &self.form.raw
     }
 
-    /// Where the posts of its DEM lie.
+    /// Geometry of its DEM.
     pub fn posts(&self) -> Geometry {
         self.model.basis.background.geometry()
     }
 
-    /// Place of a lattice point in the DEM's coordinates, m.
+    /// Position of a lattice point in the DEM's coordinates, m.
     pub fn place(&self, point: [f64; 2]) -> [f64; 2] {
         self.form.place(point)
     }
@@ -129,14 +129,14 @@ impl Elaborated {
             for (n, line) in has.chunks_exact_mut(window.cols).enumerate() {
                 let rows = cover.posts(1, place(n)[1]);
                 for (has, cols) in line.iter_mut().zip(&cols) {
-                    *has &= rows.as_ref().zip(cols.as_ref()).is_some_and(|(rows, cols)| cover.is_whole(cols, rows));
+                    *has &= rows.as_ref().zip(cols.as_ref()).is_some_and(|(rows, cols)| cover.is_complete(cols, rows));
                 }
             }
         }
         has
     }
 
-    /// The samples of a window all of which lie between the outer posts; those without ground are of no use.
+    /// The samples of a window that lies completely between the outer posts; values without ground are meaningless.
     fn made(&self, request: &Request<'_>) -> Result<Patch, TerrainError> {
         let here = self.form.in_window(request.window);
         let basis = &self.model.basis;
@@ -149,8 +149,8 @@ impl Elaborated {
     }
 }
 
-/// The least window of those columns and rows that holds all of some samples.
-fn least_around(window: &Window, wanted: &[bool]) -> Option<[Range<usize>; 2]> {
+/// The smallest range of columns and rows that contains all wanted samples.
+fn bounding_range(window: &Window, wanted: &[bool]) -> Option<[Range<usize>; 2]> {
     let row = |row: &usize| wanted[row * window.cols..(row + 1) * window.cols].contains(&true);
     let col = |col: &usize| wanted[*col..].iter().step_by(window.cols).any(|wanted| *wanted);
     let (rows, cols) = (0..window.rows, 0..window.cols);
@@ -163,11 +163,11 @@ impl Windows for Elaborated {
         let whole = request.window;
         let mut patch = Patch::void(whole);
         let has_ground = self.has_ground(&whole);
-        if let Some([cols, rows]) = least_around(&whole, &has_ground) {
+        if let Some([cols, rows]) = bounding_range(&whole, &has_ground) {
             let (west, south) = (whole.west + cols.start as i64, whole.south + rows.start as i64);
             let window = Window { west, south, cols: cols.len(), rows: rows.len(), ..whole };
             let made = self.made(&Request { window, ..*request }).ok()?;
-            patch.lay(&made, [cols.start, rows.start]);
+            patch.copy_from(&made, [cols.start, rows.start]);
             patch.clear(|k| !has_ground[k]);
         }
         (!request.cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))).then_some(patch)
@@ -196,7 +196,7 @@ impl Windows for Elaborated {
 }
 
 impl Patch {
-    /// Without ground.
+    /// A patch without ground.
     fn void(window: Window) -> Self {
         let count = window.len();
         Self {
@@ -208,7 +208,7 @@ impl Patch {
         }
     }
 
-    /// Takes the ground from some samples.
+    /// Removes the ground from the selected samples.
     fn clear(&mut self, which: impl Fn(usize) -> bool) {
         for k in (0..self.heights.len()).filter(|k| which(*k)) {
             (self.heights[k], self.albedo[k], self.rock_potential[k]) = (f64::NAN, f64::NAN, f64::NAN);
@@ -216,8 +216,8 @@ impl Patch {
         }
     }
 
-    /// Takes over the samples of a part, from a column and row on.
-    fn lay(&mut self, part: &Self, [col, row]: [usize; 2]) {
+    /// Copies the samples of a part to this patch, starting at a column and row.
+    fn copy_from(&mut self, part: &Self, [col, row]: [usize; 2]) {
         let (from, to) = (part.window.cols, self.window.cols);
         for r in 0..part.window.rows {
             let (own, its) = ((row + r) * to + col, r * from);

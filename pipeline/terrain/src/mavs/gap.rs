@@ -1,8 +1,8 @@
 //! Kind `gap`: a trench across level ground, the obstacle of gap-crossing trials.
 //!
-//! Along x, from its western edge: down a wall over `x1 = depth tan(theta)`, the floor over `width`, up a wall over x1, theta the
-//! wall's angle from the vertical; the same for every y. `hi_mag_m P` adds roughness everywhere (the listing has no factor 4
-//! here, so that its RMS is 0.249 of it).
+//! The profile along x, from the western edge, is the same for every y: down a wall of width `x1 = depth tan(theta)`, where theta is
+//! the wall's angle from the vertical, across the floor of width `width`, and up a wall of width x1. `hi_mag_m P` adds roughness
+//! everywhere (the listing has no factor 4 here, so the RMS is 0.249 `hi_mag_m`).
 
 use super::frame::Frame;
 use super::perlin::{self, Layer};
@@ -20,15 +20,15 @@ use std::f64::consts::PI;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawGap {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 666 x 666 when no size is given.
+    /// Number of cells east and north; 666 x 666 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
     pub cell_m: f64,
-    /// South-west corner in the world, m, whole cells.
+    /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
     /// Depth, m.
     pub depth_m: f64,
@@ -36,12 +36,12 @@ pub struct RawGap {
     pub width_m: f64,
     /// Angle of the walls from the vertical, degrees, from 0 to below 90.
     pub wall_angle_deg: f64,
-    /// Easting of the western edge in the world, m; the trench lies in the middle when not given.
+    /// Easting of the western edge in the world, m; by default the trench is centred.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub edge_m: Option<f64>,
-    /// Peak of the roughness, m.
+    /// Peak height of the roughness, m.
     pub hi_mag_m: f64,
-    /// Length of the roughness, m (listing); its lattice is 3.93 times as long.
+    /// Length scale of the roughness, m (listing); its noise lattice is 3.93 times as long.
     pub hi_len_m: f64,
 }
 
@@ -84,11 +84,11 @@ impl TryFrom<RawGap> for Gap {
         ParameterError::positive("hi_len_m", raw.hi_len_m)?;
         frame.resolves("hi_len_m", 1.25 * PI * raw.hi_len_m)?;
         if !(0.0..90.0).contains(&raw.wall_angle_deg) {
-            let message = format!("is {}; it must lie between 0 and 90, 0 included", raw.wall_angle_deg);
+            let message = format!("is {}; it must be at least 0 and below 90", raw.wall_angle_deg);
             return Err(ParameterError::new("wall_angle_deg", message));
         }
         if raw.width_m < raw.cell_m {
-            let message = format!("is {} m; it must be at least a cell, {} m", raw.width_m, raw.cell_m);
+            let message = format!("is {} m; it must be at least one cell, {} m", raw.width_m, raw.cell_m);
             return Err(ParameterError::new("width_m", message));
         }
         let wall_m = raw.depth_m * libm::tan(raw.wall_angle_deg.to_radians());
@@ -96,11 +96,12 @@ impl TryFrom<RawGap> for Gap {
         let west = frame.origin_m()[0];
         let edge_m = raw.edge_m.unwrap_or(west + 0.5 * (length - whole));
         if !(edge_m < west + length && edge_m + whole > west && whole.is_finite()) {
-            let message = format!("is {edge_m} m; a trench of {whole} m from there on misses the surface");
+            let message = format!("is {edge_m} m; a trench {whole} m wide from there misses the surface");
             return Err(ParameterError::new("edge_m", message));
         }
         if raw.edge_m.is_none() && whole > length {
-            let message = format!("makes a trench of {whole} m in all; the surface has {length} m along x");
+            let message =
+                format!("gives a trench {whole} m wide, walls included; the surface is only {length} m long in x");
             return Err(ParameterError::new("width_m", message));
         }
         let raw = RawGap { size_m: None, size_px: Some(size.px), ..raw };

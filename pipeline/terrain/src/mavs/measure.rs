@@ -1,4 +1,4 @@
-//! The roughness that a vehicle meets: what is asked for, what is there, and where.
+//! Roughness in a vehicle's band of wavelengths: requested, measured, and mapped.
 
 use super::frame::Frame;
 use crate::generator::{Map, Terrain, TerrainError};
@@ -8,38 +8,37 @@ use sastrugi_schemas::ParameterError;
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 
-/// By which RMS a surface is scaled.
+/// Which RMS the scaling of a surface starts from.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scaling {
-    /// The one that it has: the result is exact.
+    /// The measured RMS of this surface: the result is exact.
     Measured,
-    /// The one that surfaces of these parameters have on average: the same factor for every surface, so that tiles join.
+    /// The expected RMS of surfaces with these parameters: the same factor for every surface, so that adjacent tiles match.
     Expected,
 }
 
-/// Band of wavelengths in which roughness is measured, and what it is scaled to. With a band the maps `rms-measured` (RMS in
-/// windows of three times its longest wavelength) and, where the roughness varies by rule, `rms-predicted` stand beside
-/// the heights.
+/// Band of wavelengths in which roughness is measured, and the RMS to which it is scaled. A band adds the maps `rms-measured`
+/// (RMS in windows of three times its longest wavelength) and, where the roughness follows a rule, `rms-predicted`.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
-#[schemars(transform = nothing_is_required)]
+#[schemars(transform = without_required)]
 pub struct RawRoughness {
-    /// Shortest and longest wavelength, m; or a vehicle.
+    /// Shortest and longest wavelength, m; alternative to `wheelbase_m` and `tyre_radius_m`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub band_m: Option<[f64; 2]>,
-    /// Wheelbase of a vehicle, m (2.7 in the example of the MAVS documentation): waves up to twice as long count.
+    /// Wheelbase of a vehicle, m (2.7 in the example of the MAVS documentation): the band ends at twice this wavelength.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wheelbase_m: Option<f64>,
-    /// Tyre radius of that vehicle, m (0.33): shorter waves do not count, and cells may have half of it.
+    /// Tyre radius of that vehicle, m (0.33): the band starts at this wavelength, and cells may be at most half of it.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tyre_radius_m: Option<f64>,
-    /// True: cells that are too large for the shortest wave are noted instead of refused.
+    /// True: cells too large for the shortest wave cause a note instead of an error.
     pub allow_coarse: bool,
     /// RMS of the heights in the band to which the surface is scaled, m; usual values are 0.005 to 0.127.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub rms_m: Option<f64>,
-    /// By which RMS it is scaled.
+    /// Which RMS the scaling starts from.
     pub scaling: Scaling,
 }
 
@@ -56,18 +55,18 @@ impl Default for RawRoughness {
     }
 }
 
-/// A table may be given in part.
-fn nothing_is_required(schema: &mut Schema) {
+/// The table may be given in part: no parameter is required.
+fn without_required(schema: &mut Schema) {
     schema.remove("required");
 }
 
-/// A checked band, and what is asked for in it.
+/// A checked band and the RMS requested in it.
 #[derive(Clone, Debug)]
 pub struct Roughness {
     band: WaveBand,
     rms_m: Option<f64>,
     scaling: Scaling,
-    /// Cells are too large for its shortest wave.
+    /// Set if the cells are too large for its shortest wave.
     coarse: Option<BandError>,
 }
 
@@ -77,16 +76,16 @@ impl Roughness {
         self.band
     }
 
-    /// The RMS that is asked for, m.
+    /// The requested RMS, m.
     pub fn rms_m(&self) -> Option<f64> {
         self.rms_m
     }
 
-    /// What is asked of a surface; `None` without a band.
+    /// The checked roughness of a surface; `None` without a band.
     ///
     /// # Errors
-    /// At the key below `roughness`: a band that is none, a vehicle beside a band or with one of its lengths, cells too large,
-    /// a surface below four of the longest wave, an RMS without a band or not above 0.
+    /// Under its key within `roughness`: an invalid band, both a vehicle and a band, a vehicle with only one of its two lengths,
+    /// cells too large, a surface shorter than four of the longest waves, an RMS without a band or not above 0.
     pub fn check(raw: &RawRoughness, frame: &Frame) -> Result<Option<Self>, ParameterError> {
         Self::of(raw, frame).map_err(|e| e.within("roughness"))
     }
@@ -100,49 +99,54 @@ impl Roughness {
             (None, None, None) => {
                 return Err(ParameterError::new(
                     "rms_m",
-                    "has no band; give `band_m`, or `wheelbase_m` and `tyre_radius_m`",
+                    "needs a band; give `band_m`, or `wheelbase_m` and `tyre_radius_m`",
                 ));
             }
             (Some([min, max]), None, None) => ("band_m", WaveBand::new(min, max)),
             (None, Some(wheelbase), Some(radius)) => ("wheelbase_m", WaveBand::of_vehicle(wheelbase, radius)),
-            (Some(_), ..) => return Err(ParameterError::new("band_m", "stands beside a vehicle; give one of them")),
+            (Some(_), ..) => {
+                return Err(ParameterError::new(
+                    "band_m",
+                    "conflicts with `wheelbase_m` and `tyre_radius_m`; give either the band or the vehicle",
+                ));
+            }
             (None, Some(_), None) => {
-                return Err(ParameterError::new("tyre_radius_m", "is missing beside `wheelbase_m`"));
+                return Err(ParameterError::new("tyre_radius_m", "is missing; `wheelbase_m` needs it"));
             }
             (None, None, Some(_)) => {
-                return Err(ParameterError::new("wheelbase_m", "is missing beside `tyre_radius_m`"));
+                return Err(ParameterError::new("wheelbase_m", "is missing; `tyre_radius_m` needs it"));
             }
         };
-        let refuse = |e: BandError| ParameterError::new(key, format!("is refused: {e}"));
+        let refuse = |e: BandError| ParameterError::new(key, format!("cannot be used: {e}"));
         let band = band.map_err(refuse)?;
         band.fits_length(frame.sides_m()[1]).map_err(refuse)?;
         let coarse = band.fits_cells(frame.size.cell_m).err();
         match coarse {
             Some(e) if !raw.allow_coarse => {
-                Err(ParameterError::new(key, format!("is refused: {e}; `allow_coarse = true` lets it pass")))
+                Err(ParameterError::new(key, format!("cannot be used: {e}; `allow_coarse = true` accepts it")))
             }
             coarse => Ok(Some(Self { band, rms_m: raw.rms_m, scaling: raw.scaling, coarse })),
         }
     }
 }
 
-/// Roughness in the band below this share of the RMS of all heights is what the filter leaks: no surface is scaled by it.
+/// Roughness in the band below this share of the RMS of all heights is leakage of the filter; no surface is scaled by it.
 const ROUGHNESS_SHARE_MIN: f64 = 1e-3;
 
-/// A surface before it is measured.
+/// A surface before its roughness is measured.
 pub struct Made<F> {
-    /// Heights without their field of scales.
+    /// Heights before modulation.
     pub plain: Grid,
-    /// By which they are multiplied, cell by cell.
+    /// Field of scales that multiplies them, cell by cell.
     pub scale: Option<Grid>,
-    /// Variance of profiles in a band that surfaces of these parameters have on average, scales included, m2.
+    /// Expected variance of profiles in a band, field of scales included, m2.
     pub expected_m2: F,
 }
 
-/// The finished terrain: scaled to what is asked for, with its maps.
+/// The finished terrain, scaled to the requested RMS, with its maps.
 ///
 /// # Errors
-/// When no roughness in the band is there to be scaled.
+/// When the surface has no roughness in the band to scale.
 pub fn finish<F: Fn(&WaveBand) -> f64>(made: Made<F>, asked: Option<&Roughness>) -> Result<Terrain, TerrainError> {
     let Made { plain, scale, expected_m2 } = made;
     let (heights, modulated) = match scale {
@@ -158,14 +162,15 @@ pub fn finish<F: Fn(&WaveBand) -> f64>(made: Made<F>, asked: Option<&Roughness>)
         Scaling::Expected => expected_m2(band).sqrt(),
     };
     let all_m = sums::variance(&heights.values).sqrt();
-    let there = own_m > ROUGHNESS_SHARE_MIN * all_m && own_m.is_finite();
-    if asked.rms_m.is_some() && !there {
+    let usable = own_m > ROUGHNESS_SHARE_MIN * all_m && own_m.is_finite();
+    if asked.rms_m.is_some() && !usable {
         return Err(TerrainError::NoRoughness { min_m: band.min_m(), max_m: band.max_m() });
     }
     let factor = asked.rms_m.map_or(1.0, |rms| rms / own_m);
-    let mut notes: Vec<String> = asked.coarse.iter().map(|e| format!("the band is not all there: {e}")).collect();
+    let mut notes: Vec<String> =
+        asked.coarse.iter().map(|e| format!("the cells do not resolve the complete band: {e}")).collect();
     notes.push(format!(
-        "RMS of profiles in wavelengths of {} to {} m: {:.6} m (detrender band)",
+        "RMS height of profiles at wavelengths of {} to {} m: {:.6} m (detrender `band`)",
         band.min_m(),
         band.max_m(),
         factor * measured.rms_m()
@@ -179,8 +184,8 @@ pub fn finish<F: Fn(&WaveBand) -> f64>(made: Made<F>, asked: Option<&Roughness>)
     Ok(Terrain { heights: heights.map(|z| factor * z), maps, lines: Vec::new(), notes })
 }
 
-/// Working memory of [`finish`] and of layers before it, bytes.
+/// Working memory of [`finish`] and of the layers before it, bytes.
 pub fn memory_bytes(frame: &Frame, asked: Option<&Roughness>) -> u64 {
-    // Heights, scales and their product; with a band residuals of both directions, their transposes, and running sums.
+    // Heights, scales and their product; with a band, also residuals in both directions, their transposes, and running sums.
     (if asked.is_some() { 120 } else { 32 }) * frame.size.cells()
 }

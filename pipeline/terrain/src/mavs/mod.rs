@@ -1,21 +1,38 @@
 //! Ground at the scale of vehicles, after the Mississippi State University Autonomous Vehicle Simulator (MAVS).
 //!
 //! # Kinds
-//! | kind | what |
+//! | kind | surface |
 //! |---|---|
 //! | [`MAVS_PERLIN`] | the published Algorithm 1: two layers of Perlin noise |
 //! | [`MAVS_GAUSSIAN`] | Algorithm 2: an Ornstein-Uhlenbeck field over a layer of Perlin noise |
-//! | [`MAVS_VARIABLE`] | Algorithm 3: octaves of Perlin noise under a field of scales |
-//! | [`ORNSTEIN_UHLENBECK`] | what Algorithm 2 is meant to be: a stationary field with a chosen covariance |
-//! | [`VAN_DEUSEN`] | what Algorithm 3 is meant to be: profiles with density `c f^-n` |
+//! | [`MAVS_VARIABLE`] | Algorithm 3: octaves of Perlin noise, modulated by a field of scales |
+//! | [`ORNSTEIN_UHLENBECK`] | Algorithm 2 as intended: a stationary field with a chosen covariance |
+//! | [`VAN_DEUSEN`] | Algorithm 3 as intended: profiles with PSD `c f^-n` |
 //! | [`GAP`], [`POTHOLE`], [`MAVS_PROFILE`] | a trench, round holes, a ridged surface from one profile |
 //!
-//! `compat = true` gives a published listing with its defects; the notes of the terrain name them. What is wrong with the
-//! listings, and by how much, is in `docs/papers/mavs.md`.
+//! `compat = true` reproduces a published listing with its defects; the notes of the terrain name them. `docs/papers/mavs.md`
+//! describes and quantifies the defects.
 //!
 //! # Coordinates
-//! Cell (row, col) stands for its centre, `x = origin + (col + 1/2) cell`, in the coordinates of a world of which the surface
-//! is a part; so tiles join.
+//! The value of cell (row, col) belongs to its centre, `x = origin + (col + 1/2) cell`, in the coordinates of a world that the
+//! surface is part of; so adjacent tiles match.
+//!
+//! # Example
+//! A surface scaled to an RMS height of 3 cm at the wavelengths that shake a vehicle.
+//! ```
+//! use sastrugi_numeric::Streams;
+//! use sastrugi_roughness::{Detrended, Detrender, WaveBand};
+//! use sastrugi_terrain::prepare;
+//! use serde_json::json;
+//!
+//! # fn main() -> Result<(), Box<dyn std::error::Error>> {
+//! let params = json!({"size_m": [30.0, 24.0], "cell_m": 0.15, "roughness": {"band_m": [0.33, 5.4], "rms_m": 0.03}});
+//! let terrain = prepare("van_deusen", &params)?.generate(&Streams::for_seed(1, "terrain"), &[])?;
+//! let rms_m = Detrended::of(&terrain.heights, &WaveBand::new(0.33, 5.4)?, Detrender::Band).rms_m();
+//! assert!((rms_m - 0.03).abs() < 1e-9);
+//! # Ok(())
+//! # }
+//! ```
 //!
 //! # Source
 //! *Terrain Roughness in MAVS* (documentation, Mississippi State University), and MAVS `random_surface.cpp`,
@@ -39,9 +56,9 @@ pub const MAVS_PERLIN: &str = "mavs_perlin";
 pub const MAVS_GAUSSIAN: &str = "mavs_gaussian";
 /// Algorithm 3.
 pub const MAVS_VARIABLE: &str = "mavs_variable";
-/// Algorithm 2 as it is meant.
+/// Algorithm 2 as intended.
 pub const ORNSTEIN_UHLENBECK: &str = "ornstein_uhlenbeck";
-/// Algorithm 3 as it is meant.
+/// Algorithm 3 as intended.
 pub const VAN_DEUSEN: &str = "van_deusen";
 /// A trench.
 pub const GAP: &str = "gap";
@@ -58,6 +75,6 @@ pub const DEFAULT_SIZE_PX: [u32; 2] = [666, 666];
 pub const DEFAULT_HI_LEN_M: f64 = 2.0;
 /// Length of the low-frequency feature of the listings, m.
 pub const DEFAULT_LO_LEN_M: f64 = 50.0;
-/// Magnitude of the high-frequency feature, m; the listings have 0.2, 0.1 and 0.025 in different places, and advise less than
-/// 0.15.
+/// Magnitude of the high-frequency feature, m; the listings use 0.2, 0.1 and 0.025 in different places, and recommend less
+/// than 0.15.
 pub const DEFAULT_HI_MAG_M: f64 = 0.05;

@@ -1,4 +1,4 @@
-//! Kinds `mavs_variable` and `van_deusen`: octaves of Perlin noise under a slowly varying scale (Algorithm 3).
+//! Kinds `mavs_variable` and `van_deusen`: octaves of Perlin noise, modulated by a slowly varying scale (Algorithm 3).
 //!
 //! # What
 //! $$ z = s(x, y) \sum_{k=0}^{N-1} A_k P\!\left(\frac{(x, y)}{\lambda_k}\right) , \quad
@@ -8,15 +8,15 @@
 //! 1/2 (`modulation = false`: 1).
 //!
 //! # Amplitudes
-//! An octave has a variance of `A_k^2` in a bandwidth of `1 / lambda_k`. So profiles have the density `c f^-n` with
-//! `A_k = A_0 l^(k (n - 1) / 2)`:
+//! An octave has the variance `A_k^2` in a bandwidth of `1 / lambda_k`. With `A_k = A_0 l^(k (n - 1) / 2)`, profiles therefore have the
+//! PSD `c f^-n`:
 //! $$ c = \frac{A_0^2 \lambda_0^{1-n}}{\ln l} \int_0^\infty u^{n-1} S(u)\,du \; \overline{s^2} , $$
-//! S the density of the noise ([`super::perlin`]). For n = 2, l = 2 and s = 1 that is `c = 0.0351 A_0^2 / lambda_0`. The published
-//! `A_k = A_0 2^k` (`mavs_variable`) gives n = 3, not the 2 that is claimed for it.
+//! where S is the PSD of the noise ([`super::perlin`]). For n = 2, l = 2 and s = 1 this is `c = 0.0351 A_0^2 / lambda_0`. The published
+//! `A_k = A_0 2^k` (`mavs_variable`) gives n = 3, not the claimed 2.
 //!
-//! The sum of discrete octaves ripples about the power law (by a third for l = 2; much less for sqrt 2). As no octave is shorter than two
-//! cells, it falls below the law from waves of about 6 cells down: 0.7 of it at 4 cells, 0.5 (l = 2) or 0.25 (sqrt 2) at 2.2
-//! (`stat_the_density_is_that_of_the_octaves`). It falls below the law again for waves above 1.5 of the longest octave
+//! The sum of discrete octaves ripples about the power law (by a third for l = 2; much less for sqrt 2). Because no octave is shorter than
+//! two cells, the PSD falls below the law for waves shorter than about 6 cells: to 0.7 of it at 4 cells, 0.5 (l = 2) or 0.25 (sqrt 2) at 2.2
+//! (`stat_the_density_is_that_of_the_octaves`). It also falls below the law for waves longer than 1.5 times the longest octave
 //! (`val_the_law_ends_where_the_notes_say`).
 //!
 //! # Source
@@ -24,7 +24,7 @@
 //! non-yielding surfaces, NASA CR-659, for `c f^-2`.
 //!
 //! # When not to use it
-//! The shortest waves repeat after 256 of them (77 m for cells of 0.15 m): a correlation over such distances is the noise's.
+//! The shortest waves repeat after 256 wavelengths (77 m for cells of 0.15 m): correlations over such distances are artefacts of the noise.
 
 use super::frame::Frame;
 use super::measure::{Made, RawRoughness, Roughness, finish, memory_bytes};
@@ -39,47 +39,47 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Longest wave of the octaves, m, and wavelength of the scale.
+/// Longest wave of the octaves, and wavelength of the scale, m.
 const WAVELENGTH_MAX_M: f64 = 100.0;
 /// Longest wave over the shorter side.
 const WAVELENGTH_SHARE: f64 = 0.25;
-/// Fewest cells along the shorter side: a wave of two cells four times.
+/// Minimum number of cells along the shorter side: four waves of two cells.
 const CELLS_MIN: f64 = 8.0;
-/// Shortest wave that has the power law, cells: the octaves below two cells, which shorter waves lack, are not there.
+/// Shortest wave that follows the power law, cells: shorter waves lack the contribution of octaves below two cells.
 const CELLS_OF_LAW: f64 = 6.0;
-/// Longest wave that has the power law over the longest octave: longer ones lack the octaves above.
+/// Longest wave that follows the power law, over the longest octave: longer waves lack the contribution of longer octaves.
 const OCTAVES_OF_LAW: f64 = 1.5;
-/// Most octaves: finer lacunarities would add nothing.
+/// Maximum number of octaves: a finer lacunarity would gain nothing.
 const OCTAVES_MAX: usize = 200;
-/// Exponent of the profiles' density under the published amplitudes.
+/// Exponent of the PSD of profiles with the published amplitudes.
 const PUBLISHED_EXPONENT: f64 = 3.0;
 
-/// Octaves of Perlin noise as published: profiles with density f^-3.
+/// Octaves of Perlin noise as published: profiles with PSD f^-3.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawVariable {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 666 x 666 when no size is given (100 m in the examples).
+    /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples); half of the shortest wave.
     pub cell_m: f64,
-    /// South-west corner in the world, m, whole cells.
+    /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
-    /// Amplitude of the shortest waves, m (listings: 0.2 in one place, 0.1 in another; below 0.15 is advised).
+    /// Amplitude of the shortest waves, m (listings: 0.2 in one place, 0.1 in another; recommended: below 0.15).
     pub hi_mag_m: f64,
-    /// Longest wave, m; 100 m or a quarter of the shorter side, whichever is less, when not given. Tiles of one world need
-    /// the same.
+    /// Longest wave, m; by default 100 m or a quarter of the shorter side, whichever is less. Tiles of one world need the same
+    /// value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wavelength_max_m: Option<f64>,
-    /// Whether a field of scales with a wavelength of 100 m varies the roughness.
+    /// Vary the roughness by a field of scales with a wavelength of 100 m.
     pub modulation: bool,
-    /// True: the listing with its defects (one noise for all octaves and the scale; its lattice in the corner of every
-    /// surface).
+    /// True: the listing with its defects (the same noise for all octaves and the scale; its lattice starts in the corner of
+    /// every surface).
     pub compat: bool,
-    /// Where roughness is measured, and what it is scaled to.
+    /// Band in which roughness is measured, and the RMS to which it is scaled.
     pub roughness: RawRoughness,
 }
 
@@ -99,39 +99,39 @@ impl Default for RawVariable {
     }
 }
 
-/// Octaves of Perlin noise whose profiles have the density c f^-n.
+/// Octaves of Perlin noise whose profiles have the PSD c f^-n.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawVanDeusen {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 666 x 666 when no size is given (100 m in the examples).
+    /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples); half of the shortest wave.
     pub cell_m: f64,
-    /// South-west corner in the world, m, whole cells.
+    /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
-    /// Exponent n of the density c f^-n, between 1 and 3 (Van Deusen: 2).
+    /// Exponent n of the PSD c f^-n, between 1 and 3 (Van Deusen: 2).
     pub exponent: f64,
-    /// Amplitude of the shortest waves, m; 0.05 when neither it nor `psd_constant` is given.
+    /// Amplitude of the shortest waves, m; alternative to `psd_constant`, 0.05 if neither is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hi_mag_m: Option<f64>,
-    /// Constant c of the mean one-sided density c f^-n (f in cycles/m), m^(3 - n), in place of `hi_mag_m`. A c of 1 ft (n = 2)
+    /// Constant c of the mean one-sided PSD c f^-n (f in cycles/m), m^(3 - n); alternative to `hi_mag_m`. A c of 1 ft (n = 2)
     /// is 0.3048 m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub psd_constant: Option<f64>,
-    /// Ratio of successive wavelengths, above 1, at most 4. 2 as published; the square root of 2 has less ripple about the
+    /// Ratio of successive wavelengths, above 1, at most 4. Published: 2; the square root of 2 gives less ripple about the
     /// power law.
     pub lacunarity: f64,
-    /// Longest wave, m; 100 m or a quarter of the shorter side, whichever is less, when not given. Tiles of one world need
-    /// the same.
+    /// Longest wave, m; by default 100 m or a quarter of the shorter side, whichever is less. Tiles of one world need the same
+    /// value.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub wavelength_max_m: Option<f64>,
-    /// Whether a field of scales with a wavelength of 100 m varies the roughness.
+    /// Vary the roughness by a field of scales with a wavelength of 100 m.
     pub modulation: bool,
-    /// Where roughness is measured, and what it is scaled to.
+    /// Band in which roughness is measured, and the RMS to which it is scaled.
     pub roughness: RawRoughness,
 }
 
@@ -160,7 +160,7 @@ struct Octaves {
     /// Wavelengths, m, and amplitudes, m.
     octaves: Vec<[f64; 2]>,
     modulation: bool,
-    /// One noise for all octaves and the scale.
+    /// All octaves and the scale share one noise.
     shared: bool,
     roughness: Option<Roughness>,
 }
@@ -170,7 +170,7 @@ fn wavelengths(frame: &Frame, lacunarity: f64, max_m: Option<f64>) -> Result<Vec
     let (cell, side) = (frame.size.cell_m, frame.sides_m()[0]);
     let shortest = 2.0 * cell;
     if side < CELLS_MIN * cell * (1.0 - 1e-12) {
-        let message = format!("is {cell} m; the shorter side of {side} m must have at least {CELLS_MIN} cells");
+        let message = format!("is {cell} m; the shorter side, {side} m, must have at least {CELLS_MIN} cells");
         return Err(ParameterError::new("cell_m", message));
     }
     let longest = match max_m {
@@ -183,16 +183,16 @@ fn wavelengths(frame: &Frame, lacunarity: f64, max_m: Option<f64>) -> Result<Vec
     match (waves.len(), max_m) {
         (0, None) => {
             let message =
-                format!("is {cell} m; the shortest wave, two cells, must be no longer than {WAVELENGTH_MAX_M} m");
+                format!("is {cell} m; the shortest wave, two cells, must be at most {WAVELENGTH_MAX_M} m long");
             Err(ParameterError::new("cell_m", message))
         }
         (0, Some(max)) => {
-            let message = format!("is {max} m; it must be at least the shortest wave, two cells of {cell} m");
+            let message = format!("is {max} m; it must be at least two cells of {cell} m, the shortest wave");
             Err(ParameterError::new("wavelength_max_m", message))
         }
         (n, _) if n > OCTAVES_MAX => {
             let message = format!(
-                "is {lacunarity}; waves from {shortest} to {} m would be more than {OCTAVES_MAX} octaves",
+                "is {lacunarity}; waves from {shortest} to {} m would need more than {OCTAVES_MAX} octaves",
                 shown(longest)
             );
             Err(ParameterError::new("lacunarity", message))
@@ -202,7 +202,7 @@ fn wavelengths(frame: &Frame, lacunarity: f64, max_m: Option<f64>) -> Result<Vec
 }
 
 impl Octaves {
-    /// Octaves with amplitudes in proportion to `wavelength^((exponent - 1) / 2)`, the first of `first_m`.
+    /// Octaves with amplitudes proportional to `wavelength^((exponent - 1) / 2)`, starting at `first_m`.
     fn with_amplitudes(waves: &[f64], exponent: f64, first_m: f64) -> Vec<[f64; 2]> {
         waves.iter().map(|w| [*w, first_m * libm::pow(w / waves[0], 0.5 * (exponent - 1.0))]).collect()
     }
@@ -220,7 +220,7 @@ impl Octaves {
         Self::mean_square_of_scale(self.modulation) * plain
     }
 
-    /// The octaves, then the scale about its mean.
+    /// The octaves, then the scale less its mean.
     fn layers(&self, streams: &Streams) -> Vec<Layer> {
         let scale = [WAVELENGTH_MAX_M, 0.5];
         let all = self.octaves.iter().chain([&scale]);
@@ -249,8 +249,9 @@ impl Octaves {
     fn notes(&self) -> Vec<String> {
         let shortest = self.octaves[0][0];
         let period = 256.0 * shortest;
-        let repeats = (period < self.frame.sides_m()[1])
-            .then(|| format!("waves of {shortest} m repeat after {period} m, as Perlin noise does after 256 cells"));
+        let repeats = (period < self.frame.sides_m()[1]).then(|| {
+            format!("waves of {shortest} m repeat every {period} m: Perlin noise has a period of 256 lattice cells")
+        });
         self.frame.size.note().into_iter().chain(repeats).collect()
     }
 }
@@ -300,9 +301,9 @@ impl Generator for Variable {
     }
 
     fn notes(&self) -> Vec<String> {
-        let slope = "as published, amplitudes double with the wavelength: profiles have the density f^-3, not the f^-2 of \
-                     natural ground (that is `van_deusen`)";
-        let compat = "the published listing with its defects: all octaves and the scale share one noise, so that they are \
+        let slope = "as published, amplitudes double with the wavelength: profiles have the PSD f^-3, not the f^-2 of \
+                     natural ground (use `van_deusen` for that)";
+        let compat = "published listing with its defects: all octaves and the scale share the same noise, so they are \
                       copies of one another and all vanish in the corner of the surface";
         let mut notes = self.octaves.notes();
         notes.push(slope.to_owned());
@@ -315,12 +316,12 @@ impl Generator for Variable {
     }
 }
 
-/// Checked parameters of octaves with a power law.
+/// Checked parameters of octaves that follow a power law.
 #[derive(Clone, Debug)]
 pub struct VanDeusen {
     raw: RawVanDeusen,
     octaves: Octaves,
-    /// Mean density at 1 cycle/m before any scaling, m^(3 - n).
+    /// Mean PSD at 1 cycle/m before any scaling, m^(3 - n).
     constant: f64,
 }
 
@@ -332,14 +333,14 @@ impl TryFrom<RawVanDeusen> for VanDeusen {
         let frame = Frame::check(size, raw.origin_m)?;
         ParameterError::between("exponent", raw.exponent, 1.0, 3.0)?;
         if !(raw.lacunarity > 1.0 && raw.lacunarity <= 4.0) {
-            let message = format!("is {}; it must lie above 1 and be at most 4", raw.lacunarity);
+            let message = format!("is {}; it must be above 1 and at most 4", raw.lacunarity);
             return Err(ParameterError::new("lacunarity", message));
         }
         let waves = wavelengths(&frame, raw.lacunarity, raw.wavelength_max_m)?;
         let unit = constant_of_unit(&raw, waves[0]);
         let first = match (raw.hi_mag_m, raw.psd_constant) {
             (Some(_), Some(_)) => {
-                return Err(ParameterError::new("psd_constant", "stands beside `hi_mag_m`; give one of them"));
+                return Err(ParameterError::new("psd_constant", "conflicts with `hi_mag_m`; give only one of them"));
             }
             (None, Some(c)) => (ParameterError::positive("psd_constant", c)? / unit).sqrt(),
             (first, None) => ParameterError::positive("hi_mag_m", first.unwrap_or(DEFAULT_HI_MAG_M))?,
@@ -356,20 +357,20 @@ impl TryFrom<RawVanDeusen> for VanDeusen {
     }
 }
 
-/// A length for a sentence.
+/// A length rounded to three digits, for messages.
 fn short(length_m: f64) -> String {
     shown(format!("{length_m:.2e}").parse().unwrap_or(length_m))
 }
 
 impl VanDeusen {
-    /// Shortest and longest wave that have the power law, m.
+    /// Shortest and longest wave that follow the power law, m.
     pub(super) fn law_m(&self) -> [f64; 2] {
         let longest = self.octaves.octaves.last().map_or(0.0, |[wavelength, _]| *wavelength);
         [CELLS_OF_LAW * self.octaves.frame.size.cell_m, OCTAVES_OF_LAW * longest]
     }
 }
 
-/// Constant of the mean density where the shortest waves, of `shortest_m`, have an amplitude of 1 m.
+/// Constant of the mean PSD if the shortest waves, of length `shortest_m`, have an amplitude of 1 m.
 fn constant_of_unit(raw: &RawVanDeusen, shortest_m: f64) -> f64 {
     let power = raw.exponent - 1.0;
     let noise = perlin::moment(power) / libm::log(raw.lacunarity);
@@ -399,13 +400,10 @@ impl Generator for VanDeusen {
         notes.extend(asked.is_none().then(|| {
             let [low, high] = self.law_m();
             let waves = match low < high {
-                true => format!("for waves of {} to {} m; others have less", short(low), short(high)),
-                false => "of more octaves than these: all waves have less".to_owned(),
+                true => format!("at wavelengths of {} to {} m, lower elsewhere", short(low), short(high)),
+                false => "for an unlimited range of octaves; with these few, lower at all wavelengths".to_owned(),
             };
-            format!(
-                "mean density of profiles: {:.4e} f^-{} m3, f in cycles/m, {waves}",
-                self.constant, self.raw.exponent
-            )
+            format!("mean PSD of profiles: {:.4e} f^-{} m3 (f in cycles/m) {waves}", self.constant, self.raw.exponent)
         }));
         notes
     }
@@ -419,7 +417,35 @@ impl Generator for VanDeusen {
 mod tests {
     use super::*;
 
-    /// Octaves of 100 m at 0.15 m, 250 m at 0.3 m, and of finer ratios.
+    /// Amplitudes grow as the wavelength to the power `(n - 1) / 2`: they double for n = 3, as published.
+    #[test]
+    fn val_amplitudes_follow_the_exponent() {
+        for (exponent, ratio) in [(3.0, 2.0), (2.0, 2f64.sqrt()), (1.0, 1.0)] {
+            let octaves = Octaves::with_amplitudes(&[0.3, 0.6, 1.2], exponent, 0.05);
+            for (k, [wave_m, amplitude_m]) in octaves.iter().enumerate() {
+                assert_eq!(*wave_m, [0.3, 0.6, 1.2][k]);
+                assert!((amplitude_m / (0.05 * [1.0, ratio, ratio * ratio][k]) - 1.0).abs() < 1e-12, "{exponent} {k}");
+            }
+        }
+    }
+
+    /// For n = 2 and l = 2 the PSD's constant is `0.0351 A^2 / lambda` (to 0.2 %), times the mean square of the scale, 0.26563, with modulation;
+    /// a requested constant is met exactly.
+    #[test]
+    fn val_constants_of_the_density() {
+        let constant = |raw: RawVanDeusen| VanDeusen::try_from(raw).unwrap().constant;
+        let plain = RawVanDeusen { hi_mag_m: Some(0.1), modulation: false, ..RawVanDeusen::default() };
+        let own = constant(plain.clone());
+        assert!((own / (0.0351 * 0.01 / 0.3) - 1.0).abs() < 2e-3, "{own}");
+        let modulated = constant(RawVanDeusen { modulation: true, ..plain.clone() });
+        assert!((modulated / own / 0.265_631_558 - 1.0).abs() < 1e-8, "{modulated}");
+        for modulation in [false, true] {
+            let asked = RawVanDeusen { hi_mag_m: None, psd_constant: Some(2e-4), modulation, ..plain.clone() };
+            assert!((constant(asked) / 2e-4 - 1.0).abs() < 1e-12);
+        }
+    }
+
+    /// Octaves of 100 m at 0.15 m, of 250 m at 0.3 m, and with finer ratios.
     #[test]
     fn val_octave_counts() {
         let octaves = |size: f64, cell: f64, lacunarity: f64| {

@@ -1,30 +1,30 @@
-//! Perlin noise in two dimensions, as FastNoise (the version before FastNoiseLite, of MAVS) has it.
+//! Perlin noise in two dimensions, as in FastNoise (the predecessor of FastNoiseLite, used by MAVS).
 //!
 //! # What
-//! Every point of the integer lattice has a gradient, drawn from twelve by a permutation of 0 to 255; in a cell the four
-//! linear functions of its corners are blended by `q(t) = 6 t^5 - 15 t^4 + 10 t^3` along x and along y:
+//! Every point of the integer lattice has one of twelve gradients, selected by a permutation of 0 to 255. Within a cell, the
+//! linear functions of the four corners are blended by `q(t) = 6 t^5 - 15 t^4 + 10 t^3` along x and along y:
 //! $$ P(x, y) = \sum_{i,j} \left[ g_x a(x - i) b(y - j) + g_y b(x - i) a(y - j) \right] , \quad
 //!    b(t) = 1 - q(|t|) , \quad a(t) = t\,b(t) , \quad |t| < 1 . $$
-//! Gradients are those of three dimensions without their z: four diagonals, and each direction of an axis twice. Values lie
-//! in -1 to 1 and are 0 at lattice points. The lattice repeats after 256 points.
+//! The gradients are those of three dimensions without their z: four diagonals, and each axis direction twice. Values lie
+//! in -1 to 1 and are 0 at lattice points. The lattice has a period of 256 points.
 //!
 //! # Spectrum
-//! Over all permutations gradients have mean 0 and no correlation. As 256 is no multiple of 12, diagonals are a little more
-//! frequent: 88 and 84 of 256 gradients have a part of 1 along x, so its variance is 43/64. A profile along x has the
-//! one-sided density
+//! Averaged over all permutations, gradients have mean 0 and are uncorrelated. As 256 is not a multiple of 12, diagonals are slightly
+//! more frequent: 88 and 84 of 256 gradients have an x component of magnitude 1, so its variance is 43/64. A profile along x has
+//! the one-sided PSD
 //! $$ S(u) = \tfrac{43}{32} \left( |A(u)|^2 \textstyle\int b^2 + |B(u)|^2 \int a^2 \right) $$
 //! (u in cycles per lattice cell; A, B the transforms of a, b), and the variance is `43/32 int a^2 int b^2` = 0.2500^2.
-//! Van Deusen's constant and expected roughness follow from it.
+//! Van Deusen's constant and the expected roughness follow from it.
 //!
-//! One permutation scatters about that as a whole: every line of the lattice has the same 256 gradients in the same order, from
-//! another start, so that the neighbours' correlation along x is that of 256 pairs however large the surface.
+//! The statistics of a single permutation scatter about these values: every line of the lattice has the same 256 gradients in the same
+//! order, from a different start, so the correlation of neighbours along x is that of 256 pairs, however large the surface.
 //!
 //! # Source
 //! K. Perlin, Improving noise, ACM Trans. Graph. 21 (2002) 681, for q; J. Peck, FastNoise 0.4.1, for gradients and hashing.
-//! The permutation is drawn from a named stream instead of a Mersenne twister.
+//! The permutation is drawn from a named stream instead of a Mersenne Twister.
 //!
 //! # Cost
-//! About 2 ns a cell: along a row the lattice enters by two numbers for each of its columns.
+//! About 2 ns per cell: for a row of cells, each lattice column contributes just two numbers.
 
 use super::frame::Frame;
 use rayon::prelude::*;
@@ -33,7 +33,7 @@ use std::f64::consts::TAU;
 
 /// Lattice points after which the noise repeats.
 const PERIOD: usize = 256;
-/// Gradients along x and y, by rest of the permutation's value over 12.
+/// Gradients along x and y, indexed by the permutation's value modulo 12.
 const GRADIENTS: [[f64; 2]; 12] = [
     [1.0, 1.0],
     [-1.0, 1.0],
@@ -57,14 +57,14 @@ const SQUARED_B: f64 = 181.0 / 231.0;
 /// Integral of `a(t)^2` over -1 to 1.
 const SQUARED_A: f64 = 535.0 / 9009.0;
 
-/// One noise.
+/// One realisation of the noise.
 #[derive(Clone)]
 pub struct Perlin {
     permutation: [u8; PERIOD],
 }
 
 impl Perlin {
-    /// A drawn noise: the places of the permutation from the first on are exchanged with a drawn later one or themselves.
+    /// A random noise: each entry of the permutation, from the first on, is swapped with itself or a random later one.
     pub fn draw(stream: &mut Stream) -> Self {
         let mut permutation = std::array::from_fn(|k| k as u8);
         for k in 0..PERIOD {
@@ -78,14 +78,14 @@ impl Perlin {
         GRADIENTS[usize::from(self.permutation[place] % 12)]
     }
 
-    /// What a lattice column gives to points on `line`: the function `start + slope d` of the distance d east of it.
+    /// Contribution of a lattice column to points on `line`: `start + slope d` at the distance d east of the column.
     fn node(&self, column: i64, line: &Line) -> Node {
         let [[south_x, south_y], [north_x, north_y]] = line.hashes.map(|hash| self.gradient(column, hash));
         let (south, north) = (south_y * line.ahead, north_y * (line.ahead - 1.0));
         Node { start: south + line.blend * (north - south), slope: south_x + line.blend * (north_x - south_x) }
     }
 
-    /// The lattice lines beside `y`.
+    /// The lattice lines on either side of `y`.
     fn line(&self, y: f64) -> Line {
         let Place { lattice, ahead, blend } = Place::of(y);
         let hash = |line: i64| self.permutation[line.rem_euclid(PERIOD as i64) as usize];
@@ -93,13 +93,13 @@ impl Perlin {
     }
 }
 
-/// Where a coordinate lies in the lattice.
+/// Position of a coordinate in the lattice.
 struct Place {
     /// Lattice point at or before it.
     lattice: i64,
-    /// Distance from that.
+    /// Distance from that point.
     ahead: f64,
-    /// Weight of the next one.
+    /// Weight of the next lattice point.
     blend: f64,
 }
 
@@ -144,7 +144,7 @@ pub struct Layer {
 }
 
 impl Layer {
-    /// The layer `name` of a surface: permutation and offset from its own stream.
+    /// The layer `name` of a surface, with permutation and offset from its own stream.
     pub fn draw(streams: &Streams, name: &str, wavelength_m: f64, amplitude: f64) -> Self {
         let mut stream = streams.child(name).stream("lattice");
         let noise = Perlin::draw(&mut stream);
@@ -152,12 +152,12 @@ impl Layer {
         Self { noise, offset, wavelength_m, amplitude }
     }
 
-    /// A layer of a noise that others share, with its lattice at the origin of the world.
+    /// A layer of a noise shared with other layers; its lattice starts at the origin of the world.
     pub fn of(noise: &Perlin, wavelength_m: f64, amplitude: f64) -> Self {
         Self { noise: noise.clone(), offset: [0.0; 2], wavelength_m, amplitude }
     }
 
-    /// A coordinate of the world in lattice cells.
+    /// A world coordinate in lattice cells.
     fn cells(&self, metres: f64, axis: usize) -> f64 {
         metres / self.wavelength_m + self.offset[axis]
     }
@@ -186,7 +186,7 @@ struct Post {
     blend: f64,
 }
 
-/// Sum of layers, in their order.
+/// Sum of the layers, in order.
 pub fn sum(layers: &[Layer], frame: &Frame) -> Grid {
     let geometry = frame.geometry();
     let columns: Vec<Columns> = layers.iter().map(|layer| layer.columns(frame)).collect();
@@ -206,7 +206,7 @@ pub fn sum(layers: &[Layer], frame: &Frame) -> Grid {
 
 /// Intervals of the quadratures, even.
 const INTERVALS: usize = 128;
-/// Frequency beyond which the noise has no power to speak of (1e-7 of it), cycles per lattice cell.
+/// Frequency beyond which the noise has negligible power (1e-7 of the total), cycles per lattice cell.
 const FREQUENCY_MAX: f64 = 8.0;
 
 /// Simpson's rule.
@@ -220,7 +220,7 @@ fn integral(from: f64, to: f64, f: impl Fn(f64) -> f64) -> f64 {
     (0..=INTERVALS).map(|k| weight(k) * f(from + k as f64 * step)).sum::<f64>() * step / 3.0
 }
 
-/// One-sided density of profiles of the noise at `u` cycles per lattice cell, lattice cells.
+/// One-sided PSD of profiles of the noise at `u` cycles per lattice cell, lattice cells.
 fn density(u: f64) -> f64 {
     let b = |t: f64| 1.0 - quintic(t);
     let odd = 2.0 * integral(0.0, 1.0, |t| t * b(t) * libm::sin(TAU * u * t));
@@ -231,7 +231,7 @@ fn density(u: f64) -> f64 {
 /// Variance of profiles of the noise between two frequencies in cycles per lattice cell.
 pub fn variance_between([low, high]: [f64; 2]) -> f64 {
     let (low, high) = (low.min(FREQUENCY_MAX), high.min(FREQUENCY_MAX));
-    // In parts no longer than a cycle per cell, which the quadrature resolves.
+    // In parts of at most one cycle per cell, which the quadrature resolves.
     let parts = (high - low).ceil().max(1.0);
     let edge = |k: f64| low + (high - low) * k / parts;
     (0..parts as usize).map(|k| integral(edge(k as f64), edge(k as f64 + 1.0), density)).sum()

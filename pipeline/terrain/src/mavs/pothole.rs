@@ -1,8 +1,8 @@
 //! Kind `pothole`: round holes in level ground.
 //!
-//! At the distance r from its centre a hole of radius R and depth d has the height `d / 2 (cos(pi (r / R - 1)) - 1)`: -d in the
-//! middle, and 0 with a level edge at R. Radii are drawn from 0.45 to 0.55 of the diameter, depths from 0.9 to 1.1 of the
-//! depth; where holes meet they add up.
+//! At the distance r from its centre, a hole of radius R and depth d has the height `d / 2 (cos(pi (r / R - 1)) - 1)`: -d in the
+//! middle, and 0 with zero slope at R. Radii are drawn from 0.45 to 0.55 of the diameter, depths from 0.9 to 1.1 of the
+//! depth; overlapping holes add up.
 
 use super::frame::Frame;
 use super::{DEFAULT_CELL_M, DEFAULT_SIZE_PX, POTHOLE};
@@ -16,34 +16,34 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::f64::consts::PI;
 
-/// Radius over the diameter that is asked for, least and largest (listing).
+/// Smallest and largest radius over the requested diameter (listing).
 const RADIUS_SHARE: [f64; 2] = [0.45, 0.55];
-/// Depth over the depth that is asked for, least and largest (listing).
+/// Smallest and largest depth over the requested depth (listing).
 const DEPTH_SHARE: [f64; 2] = [0.9, 1.1];
-/// Most holes.
+/// Maximum number of holes.
 const HOLES_MAX: usize = 100_000;
 
 /// Round holes.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawPothole {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 666 x 666 when no size is given.
+    /// Number of cells east and north; 666 x 666 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
     pub cell_m: f64,
-    /// South-west corner in the world, m, whole cells.
+    /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
     /// Mean diameter, m.
     pub diameter_m: f64,
     /// Mean depth, m.
     pub depth_m: f64,
-    /// Centres in the world, m, in place of `holes`.
+    /// Centres of the holes in the world, m; alternative to `holes`.
     pub places_m: Vec<[f64; 2]>,
-    /// Holes at places drawn evenly over the surface.
+    /// Number of holes, at positions drawn uniformly over the surface.
     pub holes: u32,
 }
 
@@ -78,7 +78,7 @@ impl TryFrom<RawPothole> for Pothole {
         ParameterError::positive("depth_m", raw.depth_m)?;
         ParameterError::positive("diameter_m", raw.diameter_m)?;
         if raw.diameter_m < 3.0 * raw.cell_m {
-            let message = format!("is {} m; it must be at least three cells of {} m", raw.diameter_m, raw.cell_m);
+            let message = format!("is {} m; it must be at least three {} m cells", raw.diameter_m, raw.cell_m);
             return Err(ParameterError::new("diameter_m", message));
         }
         if raw.places_m.is_empty() && raw.holes == 0 {
@@ -90,7 +90,7 @@ impl TryFrom<RawPothole> for Pothole {
         let geometry = frame.geometry();
         match raw.places_m.iter().find(|[x, y]| geometry.cell_at(*x, *y).is_none()) {
             Some([x, y]) => {
-                Err(ParameterError::new("places_m", format!("has [{x}, {y}], which is not on the surface")))
+                Err(ParameterError::new("places_m", format!("contains [{x}, {y}], which is not on the surface")))
             }
             None => {
                 let raw = RawPothole { size_m: None, size_px: Some(size.px), ..raw };
@@ -108,7 +108,7 @@ struct Hole {
 }
 
 impl Hole {
-    /// Height at a place, m.
+    /// Height at a point, m.
     fn height_m(&self, x_m: f64, y_m: f64) -> f64 {
         let [dx, dy] = [x_m - self.centre_m[0], y_m - self.centre_m[1]];
         let share = (dx * dx + dy * dy).sqrt() / self.radius_m;
@@ -168,5 +168,68 @@ impl Generator for Pothole {
             }
         });
         Ok(Terrain::from(Grid { geometry, values }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::sums;
+    use serde_json::json;
+
+    fn pothole(params: Value) -> Pothole {
+        Pothole::try_from(crate::registry::read::<RawPothole>(&params).unwrap()).unwrap()
+    }
+
+    /// `-d / 2 (1 + cos(pi r / R))`, by hand at shares of the radius.
+    #[test]
+    fn val_a_hole_is_a_cosine() {
+        let hole = Hole { centre_m: [3.0, -1.0], radius_m: 2.0, depth_m: 0.4 };
+        for ([dx, dy], wanted) in [
+            ([0.0, 0.0], -0.4),
+            ([0.5, 0.0], -0.341_421_356_237_309_5),
+            ([-1.0, 0.0], -0.2),
+            ([0.6, 0.8], -0.2),
+            ([0.0, 1.5], -0.058_578_643_762_690_5),
+            ([2.0, 0.0], 0.0),
+            ([0.0, -3.0], 0.0),
+        ] {
+            assert!((hole.height_m(3.0 + dx, -1.0 + dy) - wanted).abs() < 1e-12, "{dx} {dy}");
+        }
+    }
+
+    /// Rows and columns out of reach of a hole are skipped; the result is the sum over all holes in every cell.
+    #[test]
+    fn val_heights_are_the_sum_over_all_holes() {
+        let params = json!({
+            "size_px": [50, 37], "cell_m": 0.2, "origin_m": [-4.0, 6.0], "diameter_m": 1.3, "holes": 30
+        });
+        let (all, streams) = (pothole(params), Streams::for_seed(2, "terrain"));
+        let (heights, holes) = (all.generate(&streams, &[]).unwrap().heights, all.holes(&streams));
+        assert_eq!(holes.len(), 30);
+        for (k, z) in heights.values.iter().enumerate() {
+            let (x_m, y_m) = (heights.geometry.x(k % 50), heights.geometry.y(k / 50));
+            let sum = holes.iter().map(|hole| hole.height_m(x_m, y_m)).sum::<f64>();
+            assert!((z - sum).abs() < 1e-12, "{k}: {z} {sum}");
+        }
+        assert!(heights.range().unwrap().0 < -0.07);
+    }
+
+    /// Null: radii, depths and centres are uniform over their ranges. Means of 2000 draws, threshold at 6 standard errors (2e-9 each); detects
+    /// a range that is off by a tenth of its width.
+    #[test]
+    fn stat_holes_are_uniform() {
+        let params = json!({"size_px": [100, 50], "cell_m": 1.0, "diameter_m": 10.0, "depth_m": 0.2, "holes": 2000});
+        let holes = pothole(params).holes(&Streams::for_seed(5, "terrain"));
+        let check = |of: fn(&Hole) -> f64, low: f64, high: f64| {
+            let values: Vec<f64> = holes.iter().map(of).collect();
+            assert!(values.iter().all(|v| (low..high).contains(v)), "{low} to {high}");
+            let error = (high - low) / (12.0 * values.len() as f64).sqrt();
+            assert!((sums::mean(&values) - 0.5 * (low + high)).abs() < 6.0 * error, "{low} to {high}");
+        };
+        check(|hole| hole.radius_m, 4.5 - 1e-12, 5.5 + 1e-12);
+        check(|hole| hole.depth_m, 0.18 - 1e-12, 0.22 + 1e-12);
+        check(|hole| hole.centre_m[0], 0.0, 100.0);
+        check(|hole| hole.centre_m[1], 0.0, 50.0);
     }
 }

@@ -1,9 +1,9 @@
-//! Kind `mavs_profile`: one Gaussian profile along x, the same for every y: a ride course.
+//! Kind `mavs_profile`: a ride course with one Gaussian profile along x, the same for every y.
 //!
-//! White noise of the standard deviation s is filtered with `exp(-x^2 / (2 a^2))`, scaled so that the squares of the weights
-//! sum to 1: the profile has the standard deviation s and the covariance `s^2 exp(-d^2 / (4 a^2))`, which falls to 1/e at 2 a.
-//! (The published gain `2 dx / (sqrt(pi) a)` gives another variance for every spacing: 4 dx / (sqrt(pi) a) s^2.) The noise is
-//! periodic over at least 200 a and the surface, of which the profile is the beginning.
+//! White noise of standard deviation s is filtered with `exp(-x^2 / (2 a^2))`, scaled so that the squares of the weights
+//! sum to 1: the profile has standard deviation s and covariance `s^2 exp(-d^2 / (4 a^2))`, which falls to 1/e at 2 a.
+//! (With the published gain `2 dx / (sqrt(pi) a)` the variance depends on the spacing: 4 dx / (sqrt(pi) a) s^2.) The period of the
+//! noise is at least 200 a and at least the surface; the profile is the beginning of a period.
 
 use super::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_SIZE_PX, MAVS_PROFILE};
 use crate::generator::{Generator, Input, Terrain, TerrainError};
@@ -15,26 +15,26 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 
-/// Least period over the correlation length (listing).
+/// Minimum period over the correlation length (listing).
 const PERIOD_LENGTHS: f64 = 200.0;
-/// Longest correlation length over a cell.
+/// Longest correlation length, cells.
 const LENGTH_MAX_CELLS: f64 = 10_000.0;
 
 /// A ridged surface from one profile.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawProfile {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 666 x 666 when no size is given.
+    /// Number of cells east and north; 666 x 666 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
     pub cell_m: f64,
     /// RMS of the heights, m.
     pub rms_m: f64,
-    /// Length a of the filter, m, at least a cell (listing: two).
+    /// Length a of the filter, m, at least one cell (listing: two).
     pub correlation_length_m: f64,
 }
 
@@ -65,7 +65,7 @@ impl TryFrom<RawProfile> for Profile {
         ParameterError::positive("rms_m", raw.rms_m)?;
         let cells = ParameterError::positive("correlation_length_m", raw.correlation_length_m)? / raw.cell_m;
         if !(1.0..=LENGTH_MAX_CELLS).contains(&cells) {
-            let message = format!("is {cells} cells; it must be 1 to {LENGTH_MAX_CELLS} of them");
+            let message = format!("is {cells} cells; it must be 1 to {LENGTH_MAX_CELLS} cells");
             return Err(ParameterError::new("correlation_length_m", message));
         }
         let raw = RawProfile { size_m: None, size_px: Some(size.px), ..raw };
@@ -127,5 +127,40 @@ impl Generator for Profile {
         let profile = self.heights(streams);
         let geometry = self.size.geometry();
         Ok(Terrain::from(Grid { geometry, values: profile.repeat(geometry.rows) }))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The profile is the circular convolution of white noise with the normalised filter, summed directly.
+    #[test]
+    fn val_the_profile_is_the_convolution() {
+        let raw = RawProfile {
+            size_px: Some([300, 3]),
+            cell_m: 0.5,
+            rms_m: 0.04,
+            correlation_length_m: 1.0,
+            ..RawProfile::default()
+        };
+        let streams = Streams::for_seed(6, "terrain");
+        let found = Profile::try_from(raw).unwrap().heights(&streams);
+        // 200 filter lengths of two cells.
+        let period = 400;
+        let mut stream = streams.stream("profile");
+        let noise: Vec<f64> = (0..period).map(|_| stream.normal()).collect();
+        let weights: Vec<f64> = (0..period)
+            .map(|k: usize| {
+                let x_m = 0.5 * k.min(period - k) as f64;
+                libm::exp(-0.5 * x_m * x_m)
+            })
+            .collect();
+        let norm = weights.iter().map(|w| w * w).sum::<f64>().sqrt();
+        assert_eq!(found.len(), 300);
+        for (i, z) in found.iter().enumerate() {
+            let sum: f64 = (0..period).map(|k| weights[k] * noise[(i + period - k) % period]).sum();
+            assert!((z - 0.04 * sum / norm).abs() < 1e-12, "{i}: {z}");
+        }
     }
 }

@@ -1,10 +1,10 @@
-//! Kind `mavs_perlin`: rolling ground under a rough surface, one layer of Perlin noise each (Algorithm 1).
+//! Kind `mavs_perlin`: a rough layer on rolling ground, each of Perlin noise (Algorithm 1).
 //!
 //! $$ z = 4 m_h P\!\left(\frac{(x, y)}{\lambda_h}\right) + m_l P\!\left(\frac{(x, y)}{\lambda_l}\right) , \quad
 //!    \lambda_h = 1.25 \pi\, l_h $$
 //! As 4 times the RMS of the noise is 0.996, `m_h` is the RMS of the high layer, while `m_l` is the peak of the low one (RMS
-//! 0.249 m_l). `l_h` is no wavelength: the lattice of the high layer is 3.93 times as long, its autocorrelation falls to
-//! 1/e at 1.77 l_h. `true_wavelength` makes the lattice l_h itself.
+//! 0.249 m_l). `l_h` is not a wavelength: the lattice of the high layer is 3.93 times as long, and its autocorrelation falls to
+//! 1/e at 1.77 l_h. `true_wavelength` sets the lattice to l_h itself.
 
 use super::frame::Frame;
 use super::measure::{Made, RawRoughness, Roughness, finish, memory_bytes};
@@ -24,29 +24,29 @@ use std::f64::consts::PI;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawTwoLayers {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 666 x 666 when no size is given (100 m in the examples).
+    /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples).
     pub cell_m: f64,
-    /// South-west corner in the world, m, whole cells.
+    /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
-    /// RMS of the high layer, m (listings: 0.2 in one place, 0.1 in another; below 0.15 is advised).
+    /// RMS of the high layer, m (listings: 0.2 in one place, 0.1 in another; recommended: below 0.15).
     pub hi_mag_m: f64,
-    /// Length of the high layer, m (listing).
+    /// Length scale of the high layer, m (listing).
     pub hi_len_m: f64,
     /// Peak of the low layer, m (listings: 0 in one place, 10 in another).
     pub lo_mag_m: f64,
     /// Wavelength of the low layer, m (listing).
     pub lo_len_m: f64,
-    /// True: the lattice of the high layer has `hi_len_m` itself, not 3.93 times that.
+    /// True: the lattice cell of the high layer is `hi_len_m` itself, not 3.93 times that.
     pub true_wavelength: bool,
-    /// True: the listing with its defects (one noise for both layers; its lattice in the corner of every surface).
+    /// True: the listing with its defects (the same noise for both layers; its lattice starts in the corner of every surface).
     pub compat: bool,
-    /// Where roughness is measured, and what it is scaled to.
+    /// Band in which roughness is measured, and the RMS to which it is scaled.
     pub roughness: RawRoughness,
 }
 
@@ -104,7 +104,7 @@ impl TryFrom<RawTwoLayers> for TwoLayers {
 }
 
 impl TwoLayers {
-    /// Lattice cell and factor of the high layer, then of the low one.
+    /// Name, lattice cell and factor of the high layer, then of the low one.
     fn layers(&self) -> [(&'static str, f64, f64); 2] {
         let p = &self.raw;
         [("high", p.high_lattice_m(), 4.0 * p.hi_mag_m), ("low", p.lo_len_m, p.lo_mag_m)]
@@ -148,8 +148,8 @@ impl Generator for TwoLayers {
 
     fn notes(&self) -> Vec<String> {
         let compat = self.raw.compat.then(|| {
-            "the published listing with its defects: both layers share one noise, whose lattice starts in the corner of \
-             every surface, where both are 0"
+            "published listing with its defects: both layers share the same noise, whose lattice starts in the corner of \
+             every surface, where both layers are 0"
                 .to_owned()
         });
         self.frame.size.note().into_iter().chain(compat).collect()
@@ -162,7 +162,9 @@ impl Generator for TwoLayers {
         if let Some(roughness) = &self.roughness {
             let total: f64 = self.layers().iter().map(|(_, _, a)| a * a * perlin::MEAN_SQUARE).sum();
             let share = 100.0 * self.expected_m2(&roughness.band()) / total;
-            made.notes.push(format!("{share:.2} % of the variance of such surfaces lies in the band"));
+            made.notes.push(format!(
+                "the band contains {share:.2} % of the expected variance of surfaces with these parameters"
+            ));
         }
         Ok(made)
     }

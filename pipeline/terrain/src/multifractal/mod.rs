@@ -1,19 +1,19 @@
 //! Multifractal terrain after Majhor and Bos.
 //!
 //! # What
-//! Three Weierstrass-Mandelbrot layers (low, mid and high frequency), each 1. low-pass filtered by a Gaussian, 2. freed
-//! of its mean, 3. scaled to a largest absolute value of 1; then 4. their cell-by-cell product, 5. scaled to 16-bit
-//! levels, 6. as heights: `(level - 32768) z_scale / 128` cm.
+//! Three Weierstrass-Mandelbrot layers (low, mid and high frequency). Each is 1. low-pass filtered by a Gaussian, 2. reduced
+//! by its mean, 3. scaled to a largest absolute value of 1. Their cell-by-cell product (4) is scaled to 16-bit levels (5)
+//! and converted to heights (6): `(level - 32768) z_scale / 128` cm.
 //!
 //! # Source
 //! Majhor and Bos, section 2.1, Table 1, and section 2.2 for the vertical scale.
 //!
 //! # Readings
-//! The paper leaves the filter widths, "near the same range", the phase interval and the sampling interval open; the
-//! defaults are our reading, argued in `docs/papers/majhor.md`. Any positive scaling of the layers gives the same
-//! product up to a factor that step 5 removes, so that neither the range chosen in step 3 nor `G` matters.
+//! The paper does not specify the filter widths, what "near the same range" means, the phase interval or the sampling
+//! interval; the defaults are our reading, justified in `docs/papers/majhor.md`. Any positive scaling of the layers gives the
+//! same product up to a factor that step 5 removes, so neither the range chosen in step 3 nor `G` matters.
 //!
-//! The product is an amplitude-modulated surface; whether it is multifractal in the strict sense is a question for its
+//! The product is an amplitude-modulated surface; whether it is multifractal in the strict sense depends on its
 //! scaling exponents (`sastrugi_roughness::multifractality`).
 //!
 //! # Cost
@@ -40,7 +40,7 @@ const ZERO_LEVEL: u16 = 32768;
 const LEVELS_ABOVE_ZERO: f64 = 32767.0;
 
 impl Layer {
-    /// The layer, filtered, without mean, largest absolute value 1.
+    /// The filtered layer, with mean removed and largest absolute value 1.
     fn generate(&self, streams: &Streams) -> Result<Grid, TerrainError> {
         let surface = self.surface.surface(&streams.child(self.name))?;
         let level = ops::without_mean(&gaussian_low_pass(&surface, self.sigma_px));
@@ -48,7 +48,7 @@ impl Layer {
     }
 }
 
-/// The grid over its largest absolute value.
+/// The grid divided by its largest absolute value.
 fn unit_range(grid: Grid, part: &'static str) -> Result<Grid, TerrainError> {
     let largest = ops::max_abs(&grid);
     if largest > 0.0 { Ok(grid.map(|v| v / largest)) } else { Err(TerrainError::Flat { part }) }
@@ -95,7 +95,7 @@ impl Generator for Multifractal {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // The product so far beside a layer at work; a filter holds two grids more.
+        // The product so far, plus the layer being computed; a filter needs two more grids.
         let layer = self.layers.iter().map(|l| l.surface.memory_bytes()).max().unwrap_or(0);
         layer.max(3 * 8 * self.size.cells()) + 8 * self.size.cells()
     }

@@ -10,29 +10,29 @@ use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
 
-/// How the product of the layers becomes 16-bit levels.
+/// How the product of the layers is scaled to 16-bit levels.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Scaling {
     /// `32768 + 32767 p / max|p|`: height 0 stays at the middle level.
     Symmetric,
-    /// `32768 + 32767 (p - min p) / (max p - min p)`: the lowest height is 0, and half of the levels are used.
+    /// `32768 + 32767 (p - min p) / (max p - min p)`: the lowest height is 0, and only half of the levels are used.
     MinMax,
 }
 
-/// One layer of the product. What is not given stays at that layer's default.
+/// One layer of the product. Parameters left out keep that layer's defaults.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-#[schemars(transform = nothing_is_required)]
+#[schemars(transform = without_required)]
 pub struct RawLayer {
     /// Number of ridge directions M (Table 1: 16, 32, 64).
     pub ridges: u32,
-    /// Fractal dimension D, between 2 and 3 (Table 1: 2.2, 2.45, and 2.3 or 2.45 or 2.6).
+    /// Fractal dimension D, between 2 and 3 (Table 1: 2.2, 2.45, and 2.3, 2.45 or 2.6).
     pub fractal_dimension: f64,
-    /// Elevation scaling G, m (Table 1: 1e-6, 8e-8, 1e-8). Without effect on the product, whose layers are scaled to one
-    /// range; kept because the paper lists it.
+    /// Elevation scaling G, m (Table 1: 1e-6, 8e-8, 1e-8). Has no effect on the product, because all layers are scaled to the
+    /// same range; kept because the paper lists it.
     pub elevation_scale_m: f64,
-    /// Standard deviation of the Gaussian low-pass, cells (not published; 8, 8 and 1 is our reading).
+    /// Standard deviation of the Gaussian low-pass filter, cells (not published; 8, 8 and 1 are our reading).
     pub sigma_px: f64,
 }
 
@@ -40,10 +40,10 @@ pub struct RawLayer {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawMultifractal {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 1009 x 1009 when no size is given (Majhor and Bos, section 2.2).
+    /// Number of cells east and north; 1009 x 1009 if no size is given (Majhor and Bos, section 2.2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (section 2.2).
@@ -54,10 +54,10 @@ pub struct RawMultifractal {
     pub frequency_ratio: f64,
     /// Sampling length L, m (Table 1).
     pub sampling_length_m: f64,
-    /// Phases are uniform in 0 to this, rad. The paper prints pi, which adds the same corner spike to every layer; 2 pi
-    /// does not.
+    /// Upper bound of the phases, which are uniform from 0, rad. The paper prints pi, which adds the same spike in one corner to
+    /// every layer; 2 pi does not.
     pub phase_max_rad: f64,
-    /// Which waves enter the layers.
+    /// Which waves the layers contain.
     pub mode: Mode,
     /// Low-frequency layer.
     pub low: RawLayer,
@@ -65,9 +65,9 @@ pub struct RawMultifractal {
     pub mid: RawLayer,
     /// High-frequency layer; the paper varies its fractal dimension (2.3, 2.45, 2.6).
     pub high: RawLayer,
-    /// How the product becomes levels (not published; symmetric is our reading).
+    /// How the product is scaled to levels (not published; symmetric is our reading).
     pub scaling: Scaling,
-    /// Vertical scale of the 16-bit levels, percent: a level is this / 128 cm (section 2.2: 0.75 %, 3.84 m in all).
+    /// Vertical scale of the 16-bit levels, per cent: one level is this / 128 cm (section 2.2: 0.75 %, or 3.84 m over all levels).
     pub z_scale_percent: f64,
 }
 
@@ -131,7 +131,8 @@ impl TryFrom<RawMultifractal> for Multifractal {
 
 impl Layer {
     fn check(name: &'static str, common: &RawMultifractal, layer: &RawLayer) -> Result<Self, ParameterError> {
-        let surface = WeierstrassMandelbrot::try_from(layer.as_monofractal(common)).map_err(|e| place(e, name))?;
+        let surface =
+            WeierstrassMandelbrot::try_from(layer.as_monofractal(common)).map_err(|e| within_layer(e, name))?;
         let side = surface.size().px[0].min(surface.size().px[1]);
         let sigma_px = layer.sigma_px;
         if (0.0..=f64::from(side)).contains(&sigma_px) {
@@ -161,15 +162,15 @@ impl RawLayer {
     }
 }
 
-/// An error about a layer's own parameter says which layer; one about a common parameter does not.
-fn place(error: ParameterError, layer: &str) -> ParameterError {
+/// Prefixes the key of a layer's own parameter with the layer; keys of common parameters stay.
+fn within_layer(error: ParameterError, layer: &str) -> ParameterError {
     match error.key.as_str() {
         "ridges" | "fractal_dimension" | "elevation_scale_m" => error.within(layer),
         _ => error,
     }
 }
 
-/// A layer may be given in part.
-fn nothing_is_required(schema: &mut Schema) {
+/// A layer may be given in part: no parameter is required.
+fn without_required(schema: &mut Schema) {
     schema.remove("required");
 }

@@ -21,24 +21,24 @@ fn percent(shares: Shares) -> [f64; 3] {
     [100.0 * shares.low, 100.0 * shares.semi, 100.0 * shares.high]
 }
 
-fn medians<const N: usize>(figures: &[[f64; N]]) -> [f64; N] {
-    std::array::from_fn(|k| sums::median(&figures.iter().map(|f| f[k]).collect::<Vec<_>>()))
+fn medians<const N: usize>(values: &[[f64; N]]) -> [f64; N] {
+    std::array::from_fn(|k| sums::median(&values.iter().map(|f| f[k]).collect::<Vec<_>>()))
 }
 
-/// The product varies from place to place, its factors do not. Medians over 16 seeds
+/// The roughness of the product varies from place to place, that of its factors does not. Medians over 16 seeds
 /// of the coefficient of variation of 2.5 m tiles and of the 1 px increment flatness, for the product and for the
-/// filtered layers; ratio of the product's variation to the most variable factor's. Over single seeds the product's
-/// variation is 0.76 to 1.02, the factors' 0.06 to 0.35, and flatness 10.9 to 18 against 2.8 to 3.2: medians of 16 stay
-/// within about a quarter of these ranges, so that a right implementation fails with less than 1e-6 except on the
+/// filtered layers; ratio of the product's variation to that of the most variable factor. For single seeds the product's
+/// variation is 0.76 to 1.02, the factors' 0.06 to 0.35, and flatness 10.9 to 18 against 2.8 to 3.2. Medians of 16 stay
+/// within about a quarter of these ranges, so a correct implementation fails with probability below 1e-6, except on the
 /// ratio (2.5 against a median near 2.8 with standard error 0.08: 1e-4).
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_the_product_varies_and_its_factors_do_not() {
     let m = Multifractal::try_from(RawMultifractal::default()).unwrap();
-    let figures = |grid: &Grid| [tile_variation(&moore_gradient(grid), 2.5), increment_flatness(grid)];
+    let statistics = |grid: &Grid| [tile_variation(&moore_gradient(grid), 2.5), increment_flatness(grid)];
     let of_seed = |seed: u64| -> [[f64; 2]; 4] {
-        let layers = m.layers.each_ref().map(|layer| figures(&layer.generate(&seeded(seed)).unwrap()));
-        [figures(&m.surface(&seeded(seed)).unwrap()), layers[0], layers[1], layers[2]]
+        let layers = m.layers.each_ref().map(|layer| statistics(&layer.generate(&seeded(seed)).unwrap()));
+        [statistics(&m.surface(&seeded(seed)).unwrap()), layers[0], layers[1], layers[2]]
     };
     let all: Vec<[[f64; 2]; 4]> = (0..16).into_par_iter().map(of_seed).collect();
     let median_of = |part: usize| medians(&all.iter().map(|a| a[part]).collect::<Vec<_>>());
@@ -53,13 +53,16 @@ fn stat_the_product_varies_and_its_factors_do_not() {
     assert!(factors.iter().all(|[v, _]| variation / v >= 2.5));
 }
 
-/// Heights through 16-bit levels have the shares of heights that were not rounded.
+/// Rounding heights to 16-bit levels does not change the shares of the roughness classes.
 #[test]
 fn val_rounding_to_levels_keeps_the_shares() {
     let m = Multifractal::try_from(RawMultifractal::default()).unwrap();
     for seed in 0..2 {
         let smooth = m.scaled(&m.product(&seeded(seed)).unwrap()).map(|level| level * m.metres_per_level());
-        let (before, after) = (percent(shares_of(&smooth)), percent(shares_of(&m.surface(&seeded(seed)).unwrap())));
+        let rounded = m.surface(&seeded(seed)).unwrap();
+        let moved = ops::max_abs(&ops::combine(&smooth, &rounded, |a, b| a - b));
+        assert!(moved > 0.0 && moved <= 0.5 * m.metres_per_level() + 1e-12, "seed {seed}: {moved}");
+        let (before, after) = (percent(shares_of(&smooth)), percent(shares_of(&rounded)));
         for k in 0..3 {
             assert!((before[k] - after[k]).abs() < 0.05, "seed {seed}: {before:?} {after:?}");
         }
@@ -71,7 +74,7 @@ fn val_levels_return_the_heights() {
     for scaling in ["symmetric", "min_max"] {
         let generator = multifractal(json!({"size_px": [120, 90], "scaling": scaling}));
         let heights = generator.generate(&seeded(1), &[]).unwrap().heights;
-        // Also from single precision, as a release stores them.
+        // Also after rounding to single precision, as a release stores them.
         let levels = generator.levels(&heights.as_stored()).unwrap();
         assert!((levels.metres_per_level * 65536.0 - 3.84).abs() < 1e-12);
         let back = levels.grid.map(|l| (f64::from(l) - f64::from(levels.zero_level)) * levels.metres_per_level);
@@ -83,7 +86,28 @@ fn val_levels_return_the_heights() {
     }
 }
 
-/// The range of the layers and G cancel: only the shape of each layer matters.
+/// A product of -0.5, 0 and 1 in both scalings, by hand: `32767 p / max|p|` and `32767 (p - min p) / (max p - min p)`.
+#[test]
+fn val_scalings_by_hand() {
+    let product = Grid::new(Geometry::square(1, 3, 1.0), vec![-0.5, 0.0, 1.0]);
+    let levels = |scaling: Scaling| {
+        let raw = RawMultifractal { size_px: Some([40, 30]), scaling, ..RawMultifractal::default() };
+        Multifractal::try_from(raw).unwrap().scaled(&product).values
+    };
+    assert_eq!(levels(Scaling::Symmetric), [-16_383.5, 0.0, 32_767.0]);
+    let min_max = levels(Scaling::MinMax);
+    assert!((min_max[1] - 32_767.0 / 3.0).abs() < 1e-9 && (min_max[0], min_max[2]) == (0.0, 32_767.0), "{min_max:?}");
+}
+
+/// Layers are scaled to a largest absolute value of 1; a flat one is an error that names it.
+#[test]
+fn val_flat_layers_are_an_error() {
+    let grid = |values: [f64; 3]| Grid::new(Geometry::square(1, 3, 1.0), values.to_vec());
+    assert_eq!(unit_range(grid([-4.0, 0.0, 2.0]), "low").unwrap().values, [-1.0, 0.0, 0.5]);
+    assert_eq!(unit_range(grid([0.0; 3]), "mid"), Err(TerrainError::Flat { part: "mid" }));
+}
+
+/// The range of the layers and G cancel out: only the shape of each layer matters.
 #[test]
 fn prop_elevation_scale_has_no_effect() {
     let one = multifractal(json!({"size_px": [100, 80]})).generate(&seeded(1), &[]).unwrap().heights;
@@ -103,9 +127,9 @@ fn prop_same_bits_on_any_number_of_threads() {
     assert!(one == two && one == eight);
 }
 
-/// Levels of an independent program: NumPy 2.4 sums the waves of the same phases one by one, SciPy 1.17's
-/// `gaussian_filter` filters; all 3000 levels were equal, six are kept here. They also freeze the names of layers and
-/// streams and the order of the phases: should they change, say in the commit message why released terrains change.
+/// Levels from an independent program: NumPy 2.4 sums the waves of the same phases one by one, SciPy 1.17's
+/// `gaussian_filter` filters. All 3000 levels were equal; six are kept here. They also freeze the names of layers and
+/// streams and the order of the phases: if they change, say in the commit message why released terrains change.
 #[test]
 fn val_levels_of_an_independent_program() {
     let generator = multifractal(json!({"size_px": [60, 50]}));
@@ -135,14 +159,14 @@ fn val_impossible_parameters_are_refused() {
 }
 
 const DIMENSIONS: [f64; 3] = [2.3, 2.45, 2.6];
-/// Steps of the medians of 20 terrains from one dimension to the next, points of low, semi and high (Majhor and Bos,
-/// section 3.1).
+/// Differences between the medians of 20 terrains from one dimension to the next, percentage points of low, semi and high
+/// (Majhor and Bos, section 3.1).
 const PUBLISHED_STEPS: [[f64; 3]; 2] = [[-13.8, 11.7, 1.54], [-7.16, 5.63, 3.33]];
-/// Medians over 100 seeds of another implementation of this reading, %; low, semi, high by dimension.
+/// Medians over 100 seeds from another implementation of this reading, %; low, semi, high by dimension.
 const REFERENCE_MEDIANS: [[f64; 3]; 3] = [[87.5, 11.9, 0.6], [81.8, 17.0, 1.6], [69.3, 25.5, 6.2]];
 const REFERENCE_SEEDS: f64 = 100.0;
 
-/// Shares in percent of `seeds` terrains for each dimension, all with layers of their own.
+/// Class shares in per cent of `seeds` terrains for each dimension; no two terrains share a layer.
 fn shares_by_dimension(params: &Value, seeds: usize) -> [Vec<[f64; 3]>; 3] {
     DIMENSIONS.map(|dimension| {
         let mut params = params.clone();
@@ -156,7 +180,7 @@ fn shares_by_dimension(params: &Value, seeds: usize) -> [Vec<[f64; 3]>; 3] {
     })
 }
 
-/// Steps between medians of 20 terrains each, drawn again and again from the sample.
+/// Bootstrap draws of the differences between medians of 20 terrains each.
 fn resampled_steps(sample: &[Vec<[f64; 3]>; 3], draws: usize) -> Vec<[[f64; 3]; 2]> {
     let mut stream = Streams::for_seed(1, "terrain-test").stream("resampling");
     let mut group = |all: &Vec<[f64; 3]>| {
@@ -167,8 +191,8 @@ fn resampled_steps(sample: &[Vec<[f64; 3]>; 3], draws: usize) -> Vec<[[f64; 3]; 
     (0..draws).map(|_| steps([group(&sample[0]), group(&sample[1]), group(&sample[2])])).collect()
 }
 
-/// Share of the draws whose two steps lie at least as far from the draws' mean (Mahalanobis distance) as the published
-/// ones.
+/// Share of the draws whose two steps are at least as far from the draws' mean (Mahalanobis distance) as the published
+/// steps.
 fn joint_p(draws: &[[[f64; 3]; 2]], class: usize) -> f64 {
     let values = |step: usize| draws.iter().map(|d| d[step][class]).collect::<Vec<f64>>();
     let (first, second) = (values(0), values(1));
@@ -185,10 +209,10 @@ fn joint_p(draws: &[[[f64; 3]; 2]], class: usize) -> f64 {
     draws.iter().filter(|d| distance(d) >= published).count() as f64 / draws.len() as f64
 }
 
-/// Medians over 200 seeds against the reference medians over 100: null, the same distribution; threshold 5
+/// Medians over 200 seeds against the reference medians over 100. Null: the same distribution. Threshold: 5
 /// standard errors of the difference (median of n: 1.2533 sd / sqrt(n), approximately, both samples counted), 6e-7 for
-/// each of the nine figures; it would catch a shift of the low share by 6, 7 and 8 points. (The levels themselves are checked cell by cell in `val_levels_of_an_independent_program`.)
-/// The printed table is that of `docs/papers/majhor.md`.
+/// each of the nine medians. Detects a shift of the low share by 6, 7 and 8 points. (The levels themselves are checked cell by cell in
+/// `val_levels_of_an_independent_program`.) The printed table is that of `docs/papers/majhor.md`.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_shares_by_fractal_dimension() {
@@ -218,8 +242,8 @@ fn stat_shares_by_fractal_dimension() {
     }
 }
 
-/// Why phases cover 2 pi and what the other reading of the paper gives: medians over 20 seeds, printed. With
-/// phases up to pi every terrain is smooth but for one corner: low above 91 % at every dimension.
+/// Why phases cover 2 pi, and what other readings of the paper give: prints medians over 20 seeds. With
+/// phases up to pi every terrain is smooth except in one corner: low above 91 % at every dimension.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_other_readings() {

@@ -1,4 +1,4 @@
-//! From checked parameters to a world.
+//! Assembles a world from checked parameters.
 
 use super::craters::population::{Population, PowerLaw, Secondaries};
 use super::craters::{Bombardment, Floor};
@@ -10,8 +10,8 @@ use super::texture::Amplitudes;
 use super::world::{Albedo, Base, Step, Texture, World};
 use sastrugi_numeric::{Counter, Streams};
 
-/// A world of processes on a lattice with points `spacing_m` apart and anchors of the texture `2^anchor` of them apart; rocks follow a
-/// raster of their potential where there is one.
+/// A world of processes on a lattice with points `spacing_m` apart and texture anchors `2^anchor` spacings apart; rocks follow a
+/// raster of their potential, if given.
 pub fn world(
     processes: &[RawProcess],
     spacing_m: f64,
@@ -22,16 +22,16 @@ pub fn world(
     Assembly::new(spacing_m, anchor).with(processes, streams, potential, |_| true)
 }
 
-/// A world in the making.
+/// Builder of a world.
 pub struct Assembly {
     spacing_m: f64,
     anchor: u32,
     steps: Vec<Step>,
     /// Texture of the surface so far, for the floors of craters.
     floor: Option<Floor>,
-    /// The nearest primaries above.
+    /// The nearest preceding primaries.
     primaries: Option<PowerLaw>,
-    /// Whether the next craters strike together with those of the last step.
+    /// Whether the next craters share the order of time with those of the last step.
     same_time: bool,
 }
 
@@ -47,7 +47,7 @@ impl Assembly {
         self.same_time = false;
     }
 
-    /// Adds roughness of `s_1` (m) and a Hurst exponent.
+    /// Adds roughness with `s_1` (m) and a Hurst exponent.
     pub fn add_texture(&mut self, roughness_m: f64, hurst: f64, counter: Counter) {
         let amplitudes = Amplitudes::new(hurst, self.spacing_m, self.anchor);
         self.floor = Some(Floor { roughness_m, amplitudes: amplitudes.clone(), anchor: self.anchor });
@@ -75,10 +75,10 @@ impl Assembly {
         }
     }
 
-    /// The world with the processes of a list that act, by their place in it; rocks follow a raster of their potential where there is one.
-    /// Draws of a process are named by its kind and its number among that kind in the whole list, and which craters strike in one order of time
-    /// goes by the whole list too: what the others do is the same whether a process acts or not. Secondaries around primaries that do not act
-    /// are where they were.
+    /// The world with those processes of a list that `acts` selects by their index; rocks follow a raster of their potential, if given.
+    /// The draws of a process are named by its kind and its number among that kind in the complete list, and the complete list also decides which
+    /// craters share an order of time: whether one process acts does not affect the others. Secondaries keep their positions even if their
+    /// primaries do not act.
     pub fn with(
         mut self,
         processes: &[RawProcess],
@@ -96,7 +96,7 @@ impl Assembly {
             let number = 1 + processes[..n].iter().filter(|p| p.kind() == kind).count();
             let counter = Counter::new(&mut streams.stream(&format!("{kind}-{number}")));
             if !acts(n) {
-                self.pass(process, n, counter);
+                self.skip(process, n, counter);
                 continue;
             }
             match process {
@@ -122,8 +122,8 @@ impl Assembly {
         World { steps: self.steps, rocks, albedo }
     }
 
-    /// Passes over a process that does not act.
-    fn pass(&mut self, process: &RawProcess, number: usize, counter: Counter) {
+    /// Skips a process that does not act.
+    fn skip(&mut self, process: &RawProcess, number: usize, counter: Counter) {
         match process {
             RawProcess::BaseSlope(_) | RawProcess::Texture(_) | RawProcess::Rocks(_) => self.same_time = false,
             RawProcess::PrimaryCraters(p) => {
@@ -143,7 +143,7 @@ fn of_surface(p: &RawAlbedo, dust: Option<&RawDust>, counter: Counter) -> Albedo
     }
 }
 
-/// A plane, or four corners joined bilinearly.
+/// A plane plus a bilinear surface through four corners.
 fn slope(p: &RawBaseSlope, spacing_m: f64, anchor: u32) -> Base {
     let [east, north] = p.gradient.map(|g| g * spacing_m);
     let [sw, se, nw, ne] = p.corner_heights_m.unwrap_or_default();

@@ -1,20 +1,20 @@
-//! Craters: where they strike, what they make of the ground, and in which order.
+//! Craters: where they strike, how they change the ground, and in which order.
 //!
-//! A crater annihilates the ground that it strikes. With `rho` the distance in radii, inside `rho = 1` the old heights are
-//! forgotten, beyond `rho = 2` they are kept, with a smooth change between; in their place comes a reference plane with a texture
-//! of its own (half as rough as the surface, unless asked otherwise; 0 at the retained points). Then its shape is added.
+//! A crater annihilates the ground that it strikes. With `rho` the distance in radii, the old heights are removed inside `rho = 1` and
+//! kept beyond `rho = 2`, with a smooth transition between. They are replaced by a reference plane with its own texture
+//! (by default half as rough as the surface; 0 at the retained points). Then the crater's shape is added.
 //!
 //! The plane is the least-squares plane through the retained points: lattice points of the coarsest spacing of half a radius or
 //! less with `1 <= rho <= 2`, at their heights just before the impact.
 //!
 //! # Where we depart
-//! Just before the impact those points have been changed by every earlier crater, whose planes hang on still earlier ones.
-//! Followed down to the smallest craters this chain would compute the world. The plane of a crater therefore sees wider craters
-//! only. A crater of half the diameter fills at most a twelfth of the ring, so that a plane that does not see it is off by about 3 % of
-//! the depth of the larger crater; smaller ones count by their area. The worst is an older crater of nearly the same diameter: one of
-//! 0.99 diameters, unseen, leaves the plane off by up to 7 % of the depth at the centre and 15 % at the rim.
+//! By the time of the impact, those points have been changed by every earlier crater, whose planes depend on still earlier ones.
+//! Followed down to the smallest craters, this chain would require the complete world. The plane of a crater therefore takes only wider
+//! craters into account. A crater of half the diameter fills at most a twelfth of the ring, so ignoring it shifts the plane by about 3 % of
+//! the depth of the larger crater; the effect of smaller ones scales with their area. The worst case is an older crater of nearly the same
+//! diameter: ignoring one of 0.99 diameters shifts the plane by up to 7 % of the depth at the centre and 15 % at the rim.
 //!
-//! Craters of processes that stand next to each other in the list strike in one order of time.
+//! Craters of processes that are adjacent in the list strike in a common order of time.
 
 pub mod index;
 pub mod population;
@@ -25,12 +25,12 @@ use super::texture::{Amplitudes, interpolate};
 use population::{Crater, Population};
 use shape::{EJECTA_RADII, fall};
 
-/// Beyond this the old ground stays, radii.
+/// Beyond this distance the old ground is kept, radii.
 const ANNIHILATION_RADII: f64 = 2.0;
-/// Radii in which the ground is all new.
+/// Within this distance the ground is completely new, radii.
 const NEW_GROUND_RADII: f64 = 1.0;
 
-/// Craters that strike in one order of time.
+/// Craters that strike in a common order of time.
 pub struct Bombardment {
     /// Sets of craters.
     pub populations: Vec<Box<dyn Population>>,
@@ -38,7 +38,7 @@ pub struct Bombardment {
     pub floor: Option<Floor>,
 }
 
-/// Texture of the surface, from which those of new floors are scaled.
+/// Texture of the surface, from which the texture of new floors is scaled.
 #[derive(Clone)]
 pub struct Floor {
     /// `s_1`, m.
@@ -49,7 +49,7 @@ pub struct Floor {
     pub anchor: u32,
 }
 
-/// The plane that a crater is set on: height at its centre (m) and slopes (m per lattice unit).
+/// The reference plane of a crater: height at its centre (m) and slopes (m per lattice unit).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
     level_m: f64,
@@ -61,7 +61,7 @@ pub fn retained_zoom(crater: &Crater) -> u32 {
     floor_log2(0.5 * crater.radius)
 }
 
-/// The window of a crater's retained points, those that are too near or too far included.
+/// The window that contains a crater's retained points; it also includes points that are too near or too far.
 pub fn retained_window(crater: &Crater) -> Window {
     Window::about(retained_zoom(crater), crater.centre, ANNIHILATION_RADII * crater.radius)
 }
@@ -106,7 +106,7 @@ impl Plane {
 }
 
 impl Bombardment {
-    /// Changes the heights of a window by one crater; `plane` is asked for only where old ground goes.
+    /// Applies one crater to the heights of a window; `plane` is called only if old ground is removed.
     pub fn strike(&self, window: &Window, heights: &mut [f64], crater: &Crater, plane: impl FnOnce() -> Plane) {
         let Some(part) = window.part(crater.centre, EJECTA_RADII * crater.radius) else { return };
         if let Some(inner) = window.part(crater.centre, ANNIHILATION_RADII * crater.radius) {
@@ -146,5 +146,21 @@ impl Bombardment {
             }
             None => vec![0.0; window.len()],
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand; points in a row leave the slope across them open, and no points leave everything open: level planes.
+    #[test]
+    fn val_planes_are_least_squares() {
+        let corners = [[0.0, 0.0, 0.0], [1.0, 0.0, 1.0], [0.0, 1.0, 0.0], [1.0, 1.0, 0.0]];
+        let plane = Plane::through(&corners);
+        assert_eq!(plane, Plane { level_m: 0.25, slopes: [0.5, -0.5] });
+        assert_eq!(plane.height_m(1.0, 0.0), 0.75);
+        assert_eq!(Plane::through(&[[0.0, 0.0, 1.0], [1.0, 0.0, 3.0]]), Plane { level_m: 2.0, slopes: [0.0; 2] });
+        assert_eq!(Plane::through(&[]), Plane { level_m: 0.0, slopes: [0.0; 2] });
     }
 }

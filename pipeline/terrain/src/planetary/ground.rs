@@ -1,8 +1,8 @@
-//! Ground of a world that is made where it is asked for.
+//! Ground of a world, generated on demand.
 //!
-//! Samples are made in square tiles of 256 cells and kept as files hold them, in single precision: any point has the bits of a patch of the
-//! whole surface. Tiles are shared by all that ask; the ones not asked for longest make room for new ones, which changes no value.
-//! Memory: about 0.6 MB a tile.
+//! Samples are generated in square tiles of 256 cells and kept in single precision, as in files: every point has the bits of a patch of the
+//! complete surface. Tiles are shared by all users; the least recently used ones are evicted, which changes no value.
+//! Memory: about 0.6 MB per tile.
 
 use super::World;
 use super::levels::{Window, spacing};
@@ -15,9 +15,9 @@ use std::sync::{Arc, Mutex, OnceLock, PoisonError};
 
 /// Cells along the side of a tile.
 const TILE: i64 = 256;
-/// Tiles that a view keeps at hand.
+/// Tiles that a view caches.
 const AT_HAND: usize = 8;
-/// Memory of a tile, bytes: height and albedo of 4, class of 1.
+/// Memory of a tile, bytes: 4 each for height and albedo, 1 for the class.
 pub const BYTES_PER_TILE: u64 = 9 * ((TILE + 1) * (TILE + 1)) as u64;
 
 /// A disk without rocks.
@@ -33,29 +33,47 @@ pub struct Clearing {
 type Place = [i64; 2];
 type Tile = Arc<OnceLock<GroundGrid>>;
 
-/// Ground of a world, at every point of it.
+/// Ground of a world, at every point.
 pub struct WorldGround {
     world: World,
     zoom: u32,
     cell_m: f64,
-    /// Most tiles that are kept.
+    /// Maximum number of tiles kept.
     capacity: usize,
     tiles: Mutex<Tiles>,
 }
 
 #[derive(Default)]
 struct Tiles {
-    /// With the time of the last request.
+    /// Tiles with the number of their last request.
     kept: HashMap<Place, (Tile, u64)>,
     requests: u64,
     made: u64,
 }
 
 impl Planetary {
-    /// Ground of the world with samples `cell_m` apart, without the rocks that reach into clearings. At most `tiles` are kept.
+    /// Ground of the world with samples `cell_m` apart, without the rocks that reach into clearings. Keeps at most `tiles` tiles.
     ///
     /// # Errors
-    /// A distance of samples that is no basic spacing times a power of 2, or an input that has not been read ([`Self::with_inputs`]).
+    /// A sample spacing that is not the basic spacing times a power of 2, or an input that has not been read ([`Self::with_inputs`]).
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_numeric::{Ground, Streams};
+    /// use sastrugi_terrain::planetary::{Planetary, RawPlanetary};
+    /// use serde_json::json;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let raw: RawPlanetary = serde_json::from_value(json!({
+    ///     "basic_spacing_m": 0.01, "processes": [{"kind": "base_slope", "gradient": [0.5, 0.0]}]
+    /// }))?;
+    /// let ground = Planetary::try_from(raw)?.ground(&Streams::for_seed(1, "terrain"), 0.02, &[], 4)?;
+    /// let here = ground.view().at(1.23, -7.7)?;
+    /// assert!((here.height_m - 0.5 * 1.23).abs() < 1e-6);
+    /// assert_eq!(ground.tiles_made(), 1);
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn ground(
         &self,
         streams: &Streams,
@@ -76,12 +94,12 @@ impl Planetary {
 }
 
 impl WorldGround {
-    /// The ground for one that moves about: it keeps the last few tiles at hand.
+    /// A view for one moving user: it caches the last few tiles.
     pub fn view(&self) -> View<'_> {
         View { ground: self, at_hand: RefCell::default() }
     }
 
-    /// How many tiles have been made so far; more than the world has where tiles had to make room.
+    /// Number of tiles generated so far, counting evicted tiles again.
     pub fn tiles_made(&self) -> u64 {
         self.tiles.lock().unwrap_or_else(PoisonError::into_inner).made
     }
@@ -99,7 +117,7 @@ impl WorldGround {
         tile
     }
 
-    /// The entry of a tile, which may not be made yet; an old one makes room for a new one.
+    /// The entry of a tile, which may not have been generated yet; evicts the least recently used tile if necessary.
     fn entry(&self, place: Place) -> Tile {
         let mut tiles = self.tiles.lock().unwrap_or_else(PoisonError::into_inner);
         tiles.requests += 1;
@@ -117,7 +135,8 @@ impl WorldGround {
         tile
     }
 
-    /// A tile, in cells from its south-west sample, with the first column and row of its neighbours: heights between them are known.
+    /// A tile, in cells from its south-west sample, with the first column and row of its neighbours, so that heights in between can be
+    /// interpolated.
     fn make(&self, [col, row]: Place) -> GroundGrid {
         let side = TILE as usize + 1;
         let window =
@@ -137,15 +156,15 @@ fn from_north<T: Copy, U>(values: &[T], cols: usize, of: impl Fn(T) -> U) -> Vec
     values.chunks_exact(cols).rev().flatten().map(|v| of(*v)).collect()
 }
 
-/// Ground of a world for one that moves about.
+/// A view of the ground for one moving user.
 pub struct View<'a> {
     ground: &'a WorldGround,
-    /// The last asked for in front.
+    /// The last used in front.
     at_hand: RefCell<Vec<(Place, Tile)>>,
 }
 
 impl View<'_> {
-    /// The ground at a position in cells, which lies in the tile.
+    /// The ground at a position in cells that lies in the tile.
     fn sample(&self, place: Place, position: [f64; 2]) -> Option<GroundPoint> {
         let mut at_hand = self.at_hand.borrow_mut();
         match at_hand.iter().position(|(known, _)| *known == place) {

@@ -13,43 +13,43 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Coarsest basic spacing that is chosen unasked, m.
+/// Coarsest basic spacing chosen by default, m.
 const SPACING_MAX_M: f64 = 0.0125;
-/// Samples of a patch when no size is given.
+/// Samples of a patch if no size is given.
 const DEFAULT_SIZE_PX: [u32; 2] = [512, 512];
 /// Largest K.
 const ANCHOR_LEVEL_MAX: u32 = 40;
-/// Lattice points are counted up to here, so that they are whole numbers in double precision.
+/// Largest lattice coordinate, so that coordinates are exact integers in double precision.
 pub(super) const LATTICE_MAX: f64 = (1u64 << 52) as f64;
-/// A quotient this near to a whole number is that number.
+/// A quotient this close to a whole number counts as that number.
 pub const WHOLE_TOLERANCE: f64 = 1e-6;
-/// How often the largest basic spacing chosen unasked is doubled.
+/// Maximum number of doublings from the default basic spacing to the sample spacing.
 const ZOOM_MAX: u32 = 61;
-/// Most craters and rocks that making a surface may have to look at, those that several tiles look at counted for each.
+/// Maximum number of craters and rocks that a surface may have to examine; counted once for each tile that does.
 const OBJECTS_MAX: f64 = (1u64 << 28) as f64;
 
 /// Planetary surface.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawPlanetary {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Samples east and north; 512 x 512 when no size is given.
+    /// Samples east and north; 512 x 512 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
-    /// Distance of the samples, m: the basic spacing times a power of 2 (the paper's rovers: 0.02).
+    /// Distance between samples, m: the basic spacing times a power of 2 (the paper's rovers: 0.02).
     pub cell_m: f64,
-    /// Distance of the lattice points, m (the paper: a few millimetres to 0.01). Part of the world: other spacings are other worlds.
-    /// When absent, `cell_m` over the power of 2 that makes it at most 0.0125 m.
+    /// Distance between lattice points, m (the paper: a few millimetres to 0.01). Part of the world: another spacing gives another world.
+    /// By default `cell_m` divided by the smallest power of 2 that gives at most 0.0125 m.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub basic_spacing_m: Option<f64>,
-    /// K: the coarsest points of the texture are 2^K basic spacings apart, at most 40 (our choice: 20).
+    /// K: the coarsest points of the texture are 2^K basic spacings apart; at most 40 (our choice: 20).
     pub anchor_level: u32,
-    /// Place of the south-west sample in the world, m: whole numbers of cells.
+    /// Position of the south-west sample in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
-    /// What shapes the surface, in order: tables with a `kind` of `base_slope`, `texture`, `primary_craters`, `secondary_craters`,
-    /// `rocks`, `albedo`, `dust`.
+    /// The processes that shape the surface, in order: tables with a `kind` of `base_slope`, `texture`, `primary_craters`,
+    /// `secondary_craters`, `rocks`, `albedo`, `dust`.
     pub processes: Vec<RawProcess>,
 }
 
@@ -81,7 +81,7 @@ pub struct Planetary {
     pub(super) spacing_m: f64,
     pub(super) window: Window,
     pub(super) work: Work,
-    /// The raster that the rocks follow, once it is read.
+    /// The raster of the rock potential, once it has been read.
     potential: Option<Potential>,
 }
 
@@ -107,21 +107,21 @@ impl TryFrom<RawPlanetary> for Planetary {
 }
 
 impl Planetary {
-    /// With what its parameters name ([`crate::Generator::inputs`], in that order).
+    /// The same with the inputs that its parameters name (in the order of [`crate::Generator::inputs`]).
     ///
     /// # Errors
     /// An input that is missing or cannot be used.
     pub fn with_inputs(&self, inputs: &[Input]) -> Result<Self, TerrainError> {
         let Some(named) = processes::potential(&self.raw.processes) else { return Ok(self.clone()) };
-        let Some(Input::Grid(raster)) = inputs.first() else { return Err(named.error("is not there")) };
+        let Some(Input::Grid(raster)) = inputs.first() else { return Err(named.error("is missing")) };
         let potential = Potential::new(raster, self.spacing_m, [0.0; 2]).map_err(|reason| named.error(reason))?;
         Ok(Self { potential: Some(potential), ..self.clone() })
     }
 
-    /// Whether it has all that its parameters name.
+    /// Checks that it has all inputs that its parameters name.
     ///
     /// # Errors
-    /// The key of what is missing.
+    /// The key of a missing input.
     pub(super) fn check_inputs(&self) -> Result<(), ParameterError> {
         match processes::potential(&self.raw.processes) {
             Some(named) if self.potential.is_none() => Err(ParameterError::new(named.key, "has not been read")),
@@ -129,25 +129,25 @@ impl Planetary {
         }
     }
 
-    /// Whether its world has samples `cell_m` apart.
+    /// Checks that its world has samples `cell_m` apart.
     ///
     /// # Errors
-    /// A distance that is no basic spacing times a power of 2.
+    /// A distance that is not the basic spacing times a power of 2.
     pub fn check_samples(&self, cell_m: f64) -> Result<(), ParameterError> {
         Lattice::check(Some(self.spacing_m), cell_m).map(|_| ())
     }
 
-    /// The parameters, all filled in.
+    /// The parameters, with defaults filled in.
     pub fn raw(&self) -> &RawPlanetary {
         &self.raw
     }
 
-    /// Distance of the lattice points, m.
+    /// Distance between lattice points, m.
     pub fn spacing_m(&self) -> f64 {
         self.spacing_m
     }
 
-    /// The world in which only the processes at some places of the list act, from 0; the others keep their number and their draws.
+    /// The world in which only the processes act whose index in the list (from 0) `acts` selects; their numbers and draws do not change.
     ///
     /// # Errors
     /// An input that has not been read ([`Self::with_inputs`]).
@@ -164,21 +164,21 @@ impl Planetary {
     }
 }
 
-/// Lattice points, and those of them that are samples.
+/// Spacings of the lattice and of the samples on it.
 pub struct Lattice {
     /// Basic spacing, m.
     pub spacing_m: f64,
-    /// How many times it is doubled to the distance of the samples.
+    /// Number of doublings from the basic spacing to the sample spacing.
     pub zoom: u32,
-    /// Distance of the samples, m: exactly that.
+    /// Distance between samples, m: exactly `spacing_m 2^zoom`.
     pub cell_m: f64,
 }
 
 impl Lattice {
-    /// The lattice of a basic spacing, or the one chosen for the distance of the samples.
+    /// The lattice with a given basic spacing, or with the default one for the distance between samples.
     ///
     /// # Errors
-    /// A distance that is no basic spacing times a power of 2.
+    /// A distance that is not the basic spacing times a power of 2.
     pub fn check(basic_spacing_m: Option<f64>, cell_m: f64) -> Result<Self, ParameterError> {
         ParameterError::positive("cell_m", cell_m)?;
         let Some(spacing_m) = basic_spacing_m else {
@@ -198,49 +198,54 @@ impl Lattice {
     }
 }
 
-/// Which column or row of samples lies at a place.
+/// The column or row of samples at a coordinate.
 fn column(at_m: f64, cell_m: f64) -> Result<i64, ParameterError> {
     let quotient = at_m / cell_m;
     if !quotient.is_finite() || quotient.abs() > LATTICE_MAX {
-        return Err(ParameterError::new("origin_m", format!("holds {at_m} m; the world ends at 2^52 basic spacings")));
+        return Err(ParameterError::new(
+            "origin_m",
+            format!("contains {at_m} m; the world ends at 2^52 basic spacings"),
+        ));
     }
-    // The quotient is as inexact as its own last digits.
+    // The quotient is only as exact as its own last digits.
     if (quotient - quotient.round()).abs() > WHOLE_TOLERANCE + 4.0 * f64::EPSILON * quotient.abs() {
         let nearest_m = quotient.round() * cell_m;
-        let message = format!("holds {at_m} m, no whole number of cells of {cell_m} m; the nearest is {nearest_m} m");
+        let message =
+            format!("contains {at_m} m, not a whole multiple of the {cell_m} m cell; the nearest is {nearest_m} m");
         return Err(ParameterError::new("origin_m", message));
     }
     Ok(quotient.round() as i64)
 }
 
-/// What a window asks of the craters and rocks of a world.
+/// Expected work for the craters and rocks of a window.
 #[derive(Clone, Copy, Debug)]
 pub struct Work {
-    /// Craters and rocks that one of its tiles is expected to hold in memory.
+    /// Craters and rocks that one tile is expected to hold in memory.
     pub tile_objects: f64,
-    /// Craters and rocks to look at, and places to look for them, in all tiles.
+    /// Craters and rocks to examine, and places to check for them, in all tiles.
     pub visits: f64,
-    /// Craters that all tiles are expected to meet.
+    /// Expected number of craters in all tiles.
     pub craters: f64,
-    /// Rocks that are set in all tiles: among samples that lie close to each other, and between others.
+    /// Rocks placed in all tiles: those wider than the sample spacing, and those narrower.
     pub rocks_set: [f64; 2],
-    /// Samples under rocks for each sample of the window, as often as rocks overlap.
+    /// Samples under rocks per sample of the window, counted once per rock where rocks overlap.
     pub under_rocks: f64,
     /// Whether the ground has a texture.
     pub is_textured: bool,
 }
 
-/// What a window of a world of some processes asks for.
+/// Expected work of a window in a world with these processes.
 ///
 /// # Errors
-/// A window beyond the end of the world, or more craters and rocks than it can be asked to look at.
+/// A window beyond the end of the world, or too many craters and rocks to examine.
 pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window) -> Result<Work, ParameterError> {
     let ends = [(window.west, window.cols), (window.south, window.rows)];
     let far = |(first, count): (i64, usize)| (first.unsigned_abs() as f64 + count as f64) * spacing(window.zoom);
     if ends.into_iter().any(|end| far(end) > LATTICE_MAX) {
-        return Err(ParameterError::new("origin_m", "leads out of the world, which ends at 2^52 basic spacings"));
+        let message = "puts the window beyond the end of the world, 2^52 basic spacings from its origin";
+        return Err(ParameterError::new("origin_m", message));
     }
-    // How many there are does not depend on the seed.
+    // The expected numbers do not depend on the seed.
     let world = assemble::world(processes, spacing_m, 0, &Streams::for_seed(0, "terrain"), None);
     let tile = widest_tile(window);
     let visits = world.expected_visits(&tile, 0.0) * tiles(window) as f64;
@@ -257,8 +262,8 @@ pub fn window_in_reach(processes: &[RawProcess], spacing_m: f64, window: &Window
         });
     }
     let message = format!(
-        "stand for {visits:.1e} craters and rocks that the surface would have to look at; the most is {OBJECTS_MAX:.1e}: \
-         raise their smallest diameters, or choose fewer cells"
+        "give {visits:.1e} craters and rocks to examine for this surface, above the limit of {OBJECTS_MAX:.1e}; raise their \
+         smallest diameters, or choose fewer cells"
     );
     Err(ParameterError::new("processes", message))
 }

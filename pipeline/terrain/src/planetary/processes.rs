@@ -1,4 +1,4 @@
-//! The processes that shape a surface: their parameters, and what of them is possible.
+//! The processes that shape a surface: their parameters and the checks on them.
 
 use super::craters::population::{PowerLawParameters, SecondaryParameters, Style};
 use super::rocks::{COVERAGE_MAX, RockParameters};
@@ -7,18 +7,18 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Smallest crater, basic spacings: its retained points need a spacing of a quarter of it.
+/// Smallest crater, basic spacings: its retained points need a quarter of its diameter as spacing.
 const CRATER_SPACINGS_MIN: f64 = 4.0;
-/// Largest crater, basic spacings: far above what fits a planet.
+/// Largest crater, basic spacings: far larger than any planet.
 const CRATER_SPACINGS_MAX: f64 = (1u64 << 40) as f64;
-/// Largest rock, m: the craters as far around a patch as rocks reach must be known.
+/// Largest rock, m: craters must be known as far around a patch as rocks reach.
 const ROCK_MAX_M: f64 = 50.0;
-/// Most craters of diameters D to 2 D in a diamond, which is ground of 32 D^2, in the mean. For A = 2 they are 24 times the density, so
-/// that this is 20 times saturation. Time goes with its square.
+/// Largest mean number of craters of diameters D to 2 D in a diamond, which covers 32 D^2 of ground. For A = 2 it is 24 times the density,
+/// so this limit is 20 times saturation. Time grows with its square.
 const CRATERS_PER_DIAMOND_MAX: f64 = 40.0;
-/// Least and largest exponent of a power law: beyond, powers of diameters leave double precision.
+/// Smallest and largest exponent of a power law: beyond these, powers of diameters exceed double precision.
 const EXPONENTS: [f64; 2] = [0.1, 20.0];
-/// Least ratio of the smallest to the largest secondary, for the same reason.
+/// Smallest ratio of the smallest to the largest secondary, for the same reason.
 const SMALLEST_SHARE_MIN: f64 = 1e-3;
 
 /// A smooth slope.
@@ -27,8 +27,8 @@ const SMALLEST_SHARE_MIN: f64 = 1e-3;
 pub struct RawBaseSlope {
     /// Rise to the east and to the north, m per m.
     pub gradient: [f64; 2],
-    /// Heights at the south-west, south-east, north-west and north-east corner of the square from the origin over one spacing of the
-    /// anchors, m; bilinear between them and beyond.
+    /// Heights at the south-west, south-east, north-west and north-east corners of a square with its south-west corner at the origin and
+    /// the anchor spacing as side, m; bilinear between and beyond them.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub corner_heights_m: Option<[f64; 4]>,
 }
@@ -39,7 +39,7 @@ pub struct RawBaseSlope {
 pub struct RawTexture {
     /// Standard deviation of a point about the mean of its parents 1 m away, m; 0 or above (not published; our choice).
     pub roughness_m: f64,
-    /// Hurst exponent H, above 0 to 1: spectra of profiles fall with 2 H + 1 (not published; our choice).
+    /// Hurst exponent H, above 0 to 1: the PSD of profiles falls as f^-(2 H + 1) (not published; our choice).
     pub hurst: f64,
 }
 
@@ -49,7 +49,7 @@ impl Default for RawTexture {
     }
 }
 
-/// Where the depth of a crater is counted from.
+/// Level from which the depth of a crater is measured.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Datum {
@@ -63,8 +63,8 @@ pub enum Datum {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawPrimaryCraters {
-    /// Craters wider than 1 m per square metre, if the law held there (0.079 is saturation: Trask, 1966; 0.008, a tenth of it, is our
-    /// choice).
+    /// Craters wider than 1 m per square metre, if the power law extended to 1 m (0.079 is saturation: Trask, 1966; 0.008, a tenth of it,
+    /// is our choice).
     pub density: f64,
     /// Exponent A of N(>D) = density D^-A, 0.1 to 20 (the paper: about 2).
     pub exponent: f64,
@@ -74,7 +74,7 @@ pub struct RawPrimaryCraters {
     pub diameter_max_m: f64,
     /// Depth over diameter of small craters (the paper: 0.2); no crater is deeper than 6 km.
     pub depth_ratio: f64,
-    /// Where the depth is counted from.
+    /// Level from which the depth is measured.
     pub datum: Datum,
     /// Roughness of new floors over that of the surface (not published; our choice).
     pub floor_roughness: f64,
@@ -94,21 +94,21 @@ impl Default for RawPrimaryCraters {
     }
 }
 
-/// Craters of what other impacts threw out.
+/// Craters formed by the ejecta of other impacts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSecondaryCraters {
-    /// Secondaries of primaries that are not in the list, everywhere alike: craters wider than 1 m per square metre, if the law held
-    /// there; 0 for none.
+    /// Uniformly distributed secondaries of primaries that are not in the list: craters wider than 1 m per square metre, if the power law
+    /// extended to 1 m; 0 for none.
     pub density: f64,
-    /// Smallest diameter of those, m; at least 4 basic spacings.
+    /// Smallest diameter of these uniform secondaries, m; at least 4 basic spacings.
     pub diameter_min_m: f64,
-    /// Largest diameter of those, m.
+    /// Largest diameter of these uniform secondaries, m.
     pub diameter_max_m: f64,
-    /// Exponent A of N(>D) = density D^-A, and around primaries, 0.1 to 20 (the paper: 3.5).
+    /// Exponent A of N(>D) = density D^-A, also for secondaries around primaries, 0.1 to 20 (the paper: 3.5).
     pub exponent: f64,
-    /// Secondaries around each wide crater of the nearest `primary_craters` above; 0 for none (our choice: one of the largest size by
-    /// the power law).
+    /// Secondaries around each wide crater of the nearest preceding `primary_craters`; 0 for none (our choice: the number for which the
+    /// power law gives one of the largest size).
     pub per_primary: u32,
     /// Smallest crater with secondaries, m (our choice).
     pub primary_min_m: f64,
@@ -120,7 +120,7 @@ pub struct RawSecondaryCraters {
     pub ring_radii: [f64; 2],
     /// Depth over diameter (Pike and Wilhelms, 1978: about half that of primaries).
     pub depth_ratio: f64,
-    /// Where the depth is counted from.
+    /// Level from which the depth is measured.
     pub datum: Datum,
     /// Roughness of new floors over that of the surface.
     pub floor_roughness: f64,
@@ -145,13 +145,13 @@ impl Default for RawSecondaryCraters {
     }
 }
 
-/// How many rocks make a coverage.
+/// How many rocks give a coverage.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum RockLaw {
-    /// So many that their union covers what the law says, although they overlap.
+    /// Enough for their union to cover the prescribed share, although they overlap.
     ExactUnion,
-    /// As published, for rocks that do not overlap: placed independently they cover less.
+    /// As published, for rocks that do not overlap: placed independently, they cover less.
     Literal,
 }
 
@@ -161,27 +161,27 @@ pub enum RockLaw {
 pub struct RawRocks {
     /// Share of the ground that all rocks cover, 0 to 0.6 (Golombek and Rapp, 1997: 0.069 at Viking 1, 0.176 at Viking 2).
     pub coverage: f64,
-    /// A raster of that share from place to place, in the coordinates of the surface: an id in a study (`<id>.rock-potential` for the map of a
-    /// terrain) or a file. Bilinear between its cells; where it has no data, `coverage` holds.
+    /// Raster of spatially varying coverage, in the coordinates of the surface: an id in a study (`<id>.rock-potential` for the map of a
+    /// terrain) or a file. Bilinear between its cells; where it has no data, `coverage` is used.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub potential: Option<String>,
     /// Smallest diameter, m; at least a basic spacing (our choice).
     pub diameter_min_m: f64,
     /// Largest diameter, m; at most 50 (our choice).
     pub diameter_max_m: f64,
-    /// How many rocks make a coverage.
+    /// How many rocks give a coverage.
     pub law: RockLaw,
     /// Height over diameter where rocks cover 0.069 (our choice, after Golombek and Rapp, 1997).
     pub height_ratio: f64,
-    /// Growth of that ratio with the coverage (0.506 at 0.176; our choice: rockier ground has taller rocks).
+    /// Increase of that ratio per unit of coverage (giving 0.506 at 0.176; our choice: rockier ground has taller rocks).
     pub height_gain: f64,
-    /// Added to every height, m (our choice).
+    /// Offset added to every height, m (our choice).
     pub height_offset_m: f64,
-    /// Share of the ground covered by what a wide crater strews, at its rim (our choice).
+    /// Coverage by the rocks that a wide crater strews, at its rim (our choice).
     pub crater_peak: f64,
-    /// Distance over which that falls by e, crater radii (our choice).
+    /// Distance over which that coverage falls by a factor e, crater radii (our choice).
     pub crater_decay_radii: f64,
-    /// Craters narrower than this strew none, m (our choice).
+    /// Craters narrower than this strew no rocks, m (our choice).
     pub crater_min_m: f64,
 }
 
@@ -203,17 +203,17 @@ impl Default for RawRocks {
     }
 }
 
-/// How bright the ground is.
+/// Albedo of the ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawAlbedo {
-    /// Mean of sand (our choice).
+    /// Mean albedo of sand (our choice).
     pub sand: f64,
-    /// Standard deviation from point to point.
+    /// Standard deviation of the sand's albedo from point to point.
     pub sand_deviation: f64,
-    /// Mean of rocks (our choice).
+    /// Mean albedo of rocks (our choice).
     pub rock: f64,
-    /// Standard deviation from rock to rock.
+    /// Standard deviation of the rocks' albedo from rock to rock.
     pub rock_deviation: f64,
 }
 
@@ -223,15 +223,15 @@ impl Default for RawAlbedo {
     }
 }
 
-/// Dust over everything: it buries rocks, and brightens where there is an albedo.
+/// Dust over everything: it buries rocks and, if there is an albedo, brightens the ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawDust {
-    /// Thickness, m: rocks stand out that much less, cover as much less ground, and lower ones vanish (our choice).
+    /// Thickness, m: rocks protrude by that much less and cover less ground; lower ones vanish (our choice).
     pub thickness_m: f64,
     /// Albedo of the dust (our choice).
     pub albedo: f64,
-    /// Share of every point that it covers, 0 to 1 (our choice).
+    /// Share of every point that the dust covers, 0 to 1 (our choice).
     pub cover: f64,
 }
 
@@ -251,11 +251,11 @@ pub enum RawProcess {
     Texture(RawTexture),
     /// Craters of impacts from space.
     PrimaryCraters(RawPrimaryCraters),
-    /// Craters of what other impacts threw out.
+    /// Craters formed by the ejecta of other impacts.
     SecondaryCraters(RawSecondaryCraters),
     /// Rocks.
     Rocks(RawRocks),
-    /// How bright the ground is.
+    /// Albedo of the ground.
     Albedo(RawAlbedo),
     /// Dust over everything.
     Dust(RawDust),
@@ -275,7 +275,7 @@ impl RawProcess {
         }
     }
 
-    /// What it is, in a few words.
+    /// A short description.
     pub fn summary(&self) -> String {
         match self {
             Self::BaseSlope(_) => "regional slope".to_owned(),
@@ -288,7 +288,7 @@ impl RawProcess {
         }
     }
 
-    /// Whether the process is possible by itself on a lattice with points `spacing_m` apart.
+    /// Checks the process by itself, on a lattice with points `spacing_m` apart.
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
         match self {
             Self::BaseSlope(p) => p.check(),
@@ -302,10 +302,10 @@ impl RawProcess {
     }
 }
 
-/// Whether a list of processes is possible on a lattice with points `spacing_m` apart.
+/// Checks a list of processes on a lattice with points `spacing_m` apart.
 ///
 /// # Errors
-/// The first value that is out of range, a process that may stand once only, or secondaries without primaries.
+/// The first value out of range, a repeated process that may occur only once, or secondaries without primaries.
 pub fn check(processes: &[RawProcess], spacing_m: f64) -> Result<(), ParameterError> {
     for (n, process) in processes.iter().enumerate() {
         let here = |e: ParameterError| e.within(&n.to_string()).within("processes");
@@ -313,7 +313,7 @@ pub fn check(processes: &[RawProcess], spacing_m: f64) -> Result<(), ParameterEr
         let before = &processes[..n];
         let once = matches!(process, RawProcess::Rocks(_) | RawProcess::Albedo(_) | RawProcess::Dust(_));
         if once && before.iter().any(|p| p.kind() == process.kind()) {
-            let message = format!("is `{}` for the second time; it may stand once in the list", process.kind());
+            let message = format!("is `{}` a second time; it may occur only once in the list", process.kind());
             return Err(here(ParameterError::new("kind", message)));
         }
         if let RawProcess::SecondaryCraters(p) = process
@@ -321,7 +321,7 @@ pub fn check(processes: &[RawProcess], spacing_m: f64) -> Result<(), ParameterEr
             && !before.iter().any(|p| matches!(p, RawProcess::PrimaryCraters(_)))
         {
             let message = format!(
-                "is {}, but no `primary_craters` stand above in the list; put them there, or set it to 0",
+                "is {}, but no `primary_craters` precede it in the list; add them before it, or set it to 0",
                 p.per_primary
             );
             return Err(here(ParameterError::new("per_primary", message)));
@@ -330,7 +330,7 @@ pub fn check(processes: &[RawProcess], spacing_m: f64) -> Result<(), ParameterEr
     Ok(())
 }
 
-/// The raster that the rocks of a list follow, if they follow one.
+/// The raster of the rock potential named in a list, if any.
 pub fn potential(processes: &[RawProcess]) -> Option<NamedInput> {
     let of = |(n, process): (usize, &RawProcess)| match process {
         RawProcess::Rocks(RawRocks { potential: Some(name), .. }) => {
@@ -343,12 +343,12 @@ pub fn potential(processes: &[RawProcess]) -> Option<NamedInput> {
 
 fn finite(key: &str, values: &[f64]) -> Result<(), ParameterError> {
     match values.iter().find(|v| !v.is_finite()) {
-        Some(v) => Err(ParameterError::new(key, format!("holds {v}; it must hold finite numbers"))),
+        Some(v) => Err(ParameterError::new(key, format!("contains {v}; all its numbers must be finite"))),
         None => Ok(()),
     }
 }
 
-/// From `low` to `high`, both included.
+/// Checks that a value lies in `low` to `high`, both included.
 fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), ParameterError> {
     if (low..=high).contains(&value) {
         Ok(())
@@ -357,30 +357,30 @@ fn within(key: &str, value: f64, low: f64, high: f64) -> Result<(), ParameterErr
     }
 }
 
-/// Two diameters of craters in order, as a lattice with points `spacing_m` apart carries them.
+/// Checks the smallest and largest crater diameter on a lattice with points `spacing_m` apart.
 fn crater_diameters(both: [f64; 2], spacing_m: f64) -> Result<(), ParameterError> {
     diameters(both, [CRATER_SPACINGS_MIN * spacing_m, CRATER_SPACINGS_MAX * spacing_m])
 }
 
-/// Two diameters in order, from `least_m` to `most_m`.
+/// Checks that two diameters are in order and lie in `least_m` to `most_m`.
 fn diameters([low, high]: [f64; 2], [least_m, most_m]: [f64; 2]) -> Result<(), ParameterError> {
     ParameterError::positive("diameter_min_m", low)?;
     ParameterError::positive("diameter_max_m", high)?;
     if low < least_m {
-        let message = format!("is {low} m; the lattice carries none below {least_m} m");
+        let message = format!("is {low} m; the lattice resolves diameters of at least {least_m} m");
         return Err(ParameterError::new("diameter_min_m", message));
     }
     if high > most_m {
         return Err(ParameterError::new("diameter_max_m", format!("is {high} m; it must be at most {most_m} m")));
     }
     if high < low {
-        let message = format!("is {high} m; it must not be below `diameter_min_m`, {low} m");
+        let message = format!("is {high} m; it must be at least `diameter_min_m`, {low} m");
         return Err(ParameterError::new("diameter_max_m", message));
     }
     Ok(())
 }
 
-/// Power law of craters: sizes that the lattice carries, no more of one size in one place than time allows for.
+/// Checks a power law of craters: diameters that the lattice resolves, and a density that can be computed in reasonable time.
 fn check_power_law(law: &PowerLawParameters, spacing_m: f64) -> Result<(), ParameterError> {
     ParameterError::not_negative("density", law.density)?;
     within("exponent", law.exponent, EXPONENTS[0], EXPONENTS[1])?;
@@ -392,7 +392,7 @@ fn check_power_law(law: &PowerLawParameters, spacing_m: f64) -> Result<(), Param
         return Ok(());
     }
     let message = format!(
-        "gives {mean:.3e} craters of diameters D to 2 D on every 32 D^2 of ground; the most is {CRATERS_PER_DIAMOND_MAX}, 20 times \
+        "gives {mean:.3e} craters of diameters D to 2 D per 32 D^2 of ground; the limit is {CRATERS_PER_DIAMOND_MAX}, 20 times \
          saturation"
     );
     Err(ParameterError::new("density", message))
@@ -411,7 +411,7 @@ impl RawTexture {
     }
 }
 
-/// Roughness and Hurst exponent of a texture.
+/// Checks roughness and Hurst exponent of a texture.
 ///
 /// # Errors
 /// A value out of range.
@@ -420,12 +420,12 @@ pub fn check_texture(roughness_m: f64, hurst: f64) -> Result<(), ParameterError>
     if hurst > 0.0 && hurst <= 1.0 {
         Ok(())
     } else {
-        Err(ParameterError::new("hurst", format!("is {hurst}; it must lie above 0 and be at most 1")))
+        Err(ParameterError::new("hurst", format!("is {hurst}; it must be above 0 and at most 1")))
     }
 }
 
 impl RawPrimaryCraters {
-    /// As the kernel takes them.
+    /// Parameters of the kernel.
     pub fn power_law(&self) -> PowerLawParameters {
         PowerLawParameters {
             density: self.density,
@@ -445,7 +445,7 @@ fn style(depth_ratio: f64, datum: Datum, floor_roughness: f64) -> Style {
 }
 
 impl RawSecondaryCraters {
-    /// Those that are everywhere alike.
+    /// The uniformly distributed secondaries.
     pub fn background(&self) -> PowerLawParameters {
         PowerLawParameters {
             density: self.density,
@@ -455,7 +455,7 @@ impl RawSecondaryCraters {
         }
     }
 
-    /// Those around primaries.
+    /// The secondaries around primaries.
     pub fn around_primaries(&self) -> SecondaryParameters {
         SecondaryParameters {
             primary_min_m: self.primary_min_m,
@@ -483,7 +483,7 @@ impl RawSecondaryCraters {
         let smallest_m = self.primary_min_m * self.largest_ratio * self.smallest_share;
         if self.per_primary > 0 && smallest_m < least_m {
             let message = format!(
-                "is {} m, which gives secondaries of {smallest_m} m; the lattice carries none below {least_m} m",
+                "is {} m, which gives secondaries of {smallest_m} m; the lattice resolves diameters of at least {least_m} m",
                 self.primary_min_m
             );
             return Err(ParameterError::new("primary_min_m", message));
@@ -493,7 +493,7 @@ impl RawSecondaryCraters {
 }
 
 impl RawRocks {
-    /// As the kernel takes them, buried to `buried_m`.
+    /// Parameters of the kernel, for rocks buried to `buried_m`.
     pub fn parameters(&self, buried_m: f64) -> RockParameters {
         RockParameters {
             coverage: self.coverage,
@@ -512,7 +512,7 @@ impl RawRocks {
     fn check(&self, spacing_m: f64) -> Result<(), ParameterError> {
         within("coverage", self.coverage, 0.0, COVERAGE_MAX)?;
         if self.potential.as_ref().is_some_and(String::is_empty) {
-            return Err(ParameterError::new("potential", "is empty; it names a raster"));
+            return Err(ParameterError::new("potential", "is empty; it must name a raster"));
         }
         diameters([self.diameter_min_m, self.diameter_max_m], [spacing_m, ROCK_MAX_M])?;
         ParameterError::not_negative("height_ratio", self.height_ratio)?;

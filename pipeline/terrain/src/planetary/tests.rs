@@ -1,4 +1,4 @@
-//! Numbers of the acceptance list stand at the tests.
+//! Acceptance criteria are documented at each test.
 
 mod agreement;
 mod craters;
@@ -32,7 +32,7 @@ fn heights(patch: &Patch, cell_m: f64) -> Grid {
     to_grid(Geometry::square(patch.window.rows, patch.window.cols, cell_m), &patch.heights)
 }
 
-/// Secondaries of both kinds in one process, as wide as the primaries, so that their bins are the same.
+/// Both kinds of secondaries in one process, as wide as the primaries, so that they share bins.
 fn families() -> Value {
     json!([
         {"kind": "texture"},
@@ -46,7 +46,7 @@ fn families() -> Value {
     ])
 }
 
-/// Every process, dense enough that a small patch holds all of them.
+/// Every process, dense enough for a small patch to contain all of them.
 fn everything() -> Value {
     json!([
         {"kind": "base_slope", "gradient": [0.05, -0.02], "corner_heights_m": [0.0, 3.0, -2.0, 7.0]},

@@ -2,19 +2,19 @@
 //!
 //! Anchors (points of the grid of spacing `2^anchor`) have height 0. Every other point has
 //! $$ h = \frac{1}{4} \sum_{\text{parents}} h_p + s_1 \left(\frac{d}{1\,\text{m}}\right)^{H} g $$
-//! with `d` the distance to its parents (m), `g` its own standard normal number, `s_1` the roughness (m) and `H` the Hurst exponent
-//! in (0, 1]. Averages are linear, so that the field added to a sloping base is the stochastic interpolation of that base.
+//! with `d` the distance to its parents (m), `g` its own standard normal deviate, `s_1` the roughness (m) and `H` the Hurst exponent
+//! in (0, 1]. Averages are linear, so the field added to a sloping base equals the stochastic interpolation of that base.
 //!
-//! Source: the amplitude is "a function of the spacing of the parents and of a random variable"; its form is left free. A power
-//! law gives spectra of profiles that fall with `-(2 H + 1)`. The paper also lets roughness vary from place to place; here `s_1` and `H`
-//! are those of a whole world.
+//! Source: in the paper the amplitude is "a function of the spacing of the parents and of a random variable"; its form is left open. With a
+//! power law, the PSD of profiles falls as `f^-(2 H + 1)`. The paper also lets roughness vary from place to place; here `s_1` and `H`
+//! are constant over a world.
 //!
-//! Cost: a normal number a point, and about twenty a level for a patch of any size.
+//! Cost: one normal deviate per point, and about twenty per level for a patch of any size.
 
 use super::levels::{Window, spacing};
 use sastrugi_numeric::Counter;
 
-/// How much a point may differ from the mean of its parents, at every spacing.
+/// Standard deviation of a point about the mean of its parents, at every spacing.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Amplitudes {
     /// `d^H` with d the distance (m) to the parents of the points of level `2 k + 1` and `2 k + 2`, for every `k`.
@@ -34,7 +34,7 @@ impl Amplitudes {
 ///
 /// `anchor` must not be above that of the amplitudes.
 pub fn interpolate(window: &Window, anchor: u32, counter: Counter, scale_m: f64, amplitudes: &Amplitudes) -> Vec<f64> {
-    // Grid that the points are of.
+    // Grid to which the points belong.
     let zoom = window.zoom - u32::from(window.centred);
     if zoom >= anchor || scale_m == 0.0 {
         return vec![0.0; window.len()];
@@ -48,7 +48,7 @@ pub fn interpolate(window: &Window, anchor: u32, counter: Counter, scale_m: f64,
     refine(window, &parents, &above, |i, j| counter.at(j << window.zoom).at(i << window.zoom), axis, diagonal)
 }
 
-/// A centred window from the points around its own.
+/// A centred window, from the grid points around its points.
 fn centre(window: &Window, above: &[f64], counter: Counter, diagonal: f64) -> Vec<f64> {
     let cols = window.cols + 1;
     let mut field = Vec::with_capacity(window.len());
@@ -63,7 +63,7 @@ fn centre(window: &Window, above: &[f64], counter: Counter, diagonal: f64) -> Ve
     field
 }
 
-/// The window from the points of twice its spacing.
+/// The window, from the points of twice its spacing.
 fn refine(
     window: &Window,
     parents: &Window,
@@ -72,7 +72,7 @@ fn refine(
     axis: f64,
     diagonal: f64,
 ) -> Vec<f64> {
-    // One point more on every side: parents of the outermost.
+    // One more point on every side, for the parents of the outermost points.
     let (cols, rows) = (window.cols + 2, window.rows + 2);
     let (west, south) = (window.west - 1, window.south - 1);
     let mut field = vec![0.0; cols * rows];
@@ -101,4 +101,45 @@ fn refine(
         }
     }
     (1..rows - 1).flat_map(|row| field[row * cols + 1..(row + 1) * cols - 1].iter().copied()).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::Streams;
+
+    const SPACING_M: f64 = 0.02;
+    const HURST: f64 = 0.7;
+    const ANCHOR: u32 = 3;
+
+    /// The definition of the header with `s_1` = 0.5 m, point by point.
+    fn defined([i, j]: [i64; 2], counter: Counter) -> f64 {
+        let zoom = (i | j).trailing_zeros();
+        if zoom >= ANCHOR {
+            return 0.0;
+        }
+        let step = 1i64 << zoom;
+        let diagonal = (i / step) & (j / step) & 1 == 1;
+        let offsets = if diagonal { [[-1, -1], [1, -1], [-1, 1], [1, 1]] } else { [[-1, 0], [1, 0], [0, -1], [0, 1]] };
+        let parents: f64 = offsets.iter().map(|[a, b]| defined([i + a * step, j + b * step], counter)).sum();
+        let distance_m = SPACING_M * step as f64 * if diagonal { 2f64.sqrt() } else { 1.0 };
+        0.25 * parents + 0.5 * libm::pow(distance_m, HURST) * counter.at(j).at(i).normal()
+    }
+
+    /// At every zoom and at cell centres, points are the mean of their parents plus a draw; anchors are 0.
+    #[test]
+    fn val_points_are_means_of_their_parents_plus_a_draw() {
+        let counter = Counter::new(&mut Streams::for_seed(1, "texture").stream("points"));
+        let amplitudes = Amplitudes::new(HURST, SPACING_M, ANCHOR);
+        for (zoom, centred) in [(0, false), (1, false), (2, false), (1, true), (2, true), (3, true)] {
+            let window = Window { zoom, west: -5, south: 2, cols: 11, rows: 9, centred };
+            let found = interpolate(&window, ANCHOR, counter, 0.5, &amplitudes);
+            for (k, z) in found.iter().enumerate() {
+                let place = window.place(k % 11, k / 11);
+                let wanted = defined(place, counter);
+                assert!((z - wanted).abs() < 1e-12, "zoom {zoom} {place:?}: {z} {wanted}");
+            }
+            assert!(found.iter().any(|z| z.abs() > 1e-3));
+        }
+    }
 }

@@ -1,4 +1,4 @@
-//! A world: everything that is the same for all of its patches, and how a patch of it is made.
+//! A world: the data common to all its patches, and the generation of a patch.
 
 use super::craters::index::Index;
 use super::craters::population::{Crater, Families, Near, Place, Population};
@@ -17,10 +17,10 @@ pub const SAND: u8 = 0;
 /// Code of rock in the class map.
 pub const ROCK: u8 = 1;
 
-/// Height of a smooth base at a place in lattice units, m.
+/// Height of a smooth base at a position in lattice units, m.
 pub type Base = Box<dyn Fn([f64; 2]) -> f64 + Send + Sync>;
 
-/// What shapes the ground, in order.
+/// One step that shapes the ground.
 pub enum Step {
     /// A smooth surface is added.
     Base(Base),
@@ -51,15 +51,15 @@ pub struct Albedo {
     pub sand: [f64; 2],
     /// Mean and standard deviation of rocks.
     pub rock: [f64; 2],
-    /// Albedo of the dust, and the share of the ground that it covers.
+    /// Albedo of the dust, and the share of every point that it covers.
     pub dust: [f64; 2],
 }
 
-/// Everything that patches of one world have in common.
+/// The data common to all patches of a world.
 pub struct World {
-    /// What shapes the ground, in order.
+    /// The steps that shape the ground, in order.
     pub steps: Vec<Step>,
-    /// The rocks, and how many of the steps precede them.
+    /// The rocks, and the number of steps that precede them.
     pub rocks: Option<(Rocks, usize)>,
     /// The albedo.
     pub albedo: Option<Albedo>,
@@ -72,50 +72,50 @@ pub struct Patch {
     pub window: Window,
     /// Heights, m.
     pub heights: Vec<f64>,
-    /// Albedo, 0 to 1; 0 in a world without.
+    /// Albedo, 0 to 1; 0 in a world without albedo.
     pub albedo: Vec<f64>,
     /// [`SAND`] or [`ROCK`].
     pub class: Vec<u8>,
-    /// Share of the ground that all rocks cover.
+    /// Share of the ground that rocks may cover.
     pub rock_potential: Vec<f64>,
 }
 
-/// What is asked of a world.
+/// A request for samples of a world.
 #[derive(Clone, Copy, Debug)]
 pub struct Request<'a> {
     /// The points.
     pub window: Window,
-    /// Craters and rocks that are not wider are left out, m; 0 leaves out none. The craters that stay are not changed by it, since the plane of
-    /// each sees wider ones only; rocks stay where they are, at the height of the ground without the craters that are left out.
+    /// Craters and rocks up to this width are left out, m; 0 leaves out none. The remaining craters do not change, because the plane of
+    /// each depends on wider ones only; rocks stay where they are, at the height of the ground without the omitted craters.
     pub feature_min_m: f64,
-    /// Once true, the patch is no longer wanted.
+    /// Set to true to cancel the request.
     pub cancel: Option<&'a AtomicBool>,
 }
 
-/// What was met on the way to one patch.
+/// Working data of one patch.
 struct Survey<'w> {
     world: &'w World,
     feature_min_m: f64,
     cancel: Option<&'w AtomicBool>,
-    /// For every step, the craters that may reach what is looked at.
+    /// For every step, the craters that may reach the window or its margin.
     craters: Vec<Index>,
     planes: RefCell<HashMap<Place, Plane>>,
     families: Families,
 }
 
 impl World {
-    /// The samples of a window: a pure function of the world, bit by bit the same whatever else is looked at.
+    /// The samples of a window: a pure function of the world, bit-identical whatever other windows are generated.
     pub fn patch(&self, window: &Window) -> Patch {
         self.made(&Request { window: *window, feature_min_m: 0.0, cancel: None })
     }
 
-    /// The samples that are asked for, made on this thread; `None` once they are no longer wanted.
+    /// The requested samples, computed on this thread; `None` if the request was cancelled.
     pub fn patch_for(&self, request: &Request<'_>) -> Option<Patch> {
         let patch = self.made(request);
         (!is_set(request.cancel)).then_some(patch)
     }
 
-    /// The samples of a request; of one that is no longer wanted any.
+    /// The samples of a request; arbitrary values if it was cancelled.
     pub(crate) fn made(&self, request: &Request<'_>) -> Patch {
         let window = &request.window;
         let count = window.len();
@@ -143,39 +143,39 @@ impl World {
         patch
     }
 
-    /// A window, with what must be known around it to set rocks on its ground.
+    /// A window, with the margin within which craters must be known to place rocks on its ground.
     fn near<'a>(&self, window: &'a Window) -> Near<'a> {
         Near { window, margin: self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.reach()), cancel: None }
     }
 
-    /// Expected number of craters and rocks that a patch holds in memory, not below the true one.
+    /// Expected number of craters and rocks that a patch holds in memory; never an underestimate.
     pub fn expected_objects(&self, window: &Window) -> f64 {
         let near = self.near(window);
         let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.held(window));
         self.populations().map(|p| p.held(&near)).sum::<f64>() + rocks
     }
 
-    /// Expected number of craters that a patch meets, not below the true one.
+    /// Expected number of craters that reach a patch; never an underestimate.
     pub fn expected_craters(&self, window: &Window) -> f64 {
         let near = self.near(window);
         self.populations().map(|p| p.held(&near)).sum()
     }
 
-    /// Expected number of rocks that are set in a patch: among samples that lie close to each other, and between others.
+    /// Expected number of rocks placed in a patch: those wider than the sample spacing, and those narrower.
     pub fn expected_rocks(&self, window: &Window) -> [f64; 2] {
         self.rocks.as_ref().map_or([0.0; 2], |(rocks, _)| rocks.set(window))
     }
 
-    /// How many rocks lie over a point on average, and the ground about them that is looked at with them.
+    /// Mean number of rocks over a point, including the surrounding ground that is examined with them.
     pub fn rock_layers(&self) -> f64 {
-        /// Rectangle about an ellipse of any direction over the ellipse.
+        /// Area of the bounding rectangle of an ellipse of any azimuth, over that of the ellipse.
         const RECTANGLE: f64 = 1.6;
         let coverage = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.parameters().coverage);
         -RECTANGLE * libm::log1p(-coverage)
     }
 
-    /// Expected number of craters and rocks wider than `feature_min_m` that a patch draws, and of the places where it looks for them; time
-    /// goes with it and with the number of points.
+    /// Expected number of craters and rocks wider than `feature_min_m` that a patch draws, plus the places where it looks for them; the time
+    /// grows with it and with the number of points.
     pub fn expected_visits(&self, window: &Window, feature_min_m: f64) -> f64 {
         let near = self.near(window);
         let rocks = self.rocks.as_ref().map_or(0.0, |(rocks, _)| rocks.work(window, feature_min_m));
@@ -206,12 +206,12 @@ impl Albedo {
 }
 
 impl Survey<'_> {
-    /// Points of which nothing beyond themselves must be known.
+    /// A window without margin.
     fn near<'a>(&'a self, window: &'a Window) -> Near<'a> {
         Near { window, margin: 0.0, cancel: self.cancel }
     }
 
-    /// For every step, the craters that may reach what is looked at.
+    /// For every step, the craters that may reach the window or its margin.
     fn index(&self, near: &Near<'_>) -> Vec<Index> {
         let of_step = |step: &Step| match step {
             Step::Bombardment(bombardment) => self.craters(bombardment, near, self.feature_min_m),
@@ -220,7 +220,7 @@ impl Survey<'_> {
         self.world.steps.iter().map(|step| Index::new(of_step(step), near)).collect()
     }
 
-    /// Craters wider than `diameter_min_m` that may reach what is looked at, in order of time.
+    /// Craters wider than `diameter_min_m` that may reach the window or its margin, in order of time.
     fn craters(&self, bombardment: &Bombardment, near: &Near<'_>, diameter_min_m: f64) -> Vec<Crater> {
         let mut found = Vec::new();
         bombardment.populations.iter().for_each(|p| p.find(near, diameter_min_m, &self.families, &mut found));
@@ -256,7 +256,7 @@ impl Survey<'_> {
         heights
     }
 
-    /// Lets a step act on the heights of a window.
+    /// Applies a step to the heights of a window.
     fn act<'c>(
         &self,
         number: usize,
@@ -277,7 +277,7 @@ impl Survey<'_> {
         }
     }
 
-    /// The plane that a crater of a step is set on.
+    /// The reference plane of a crater of a step.
     fn plane(&self, step: usize, crater: &Crater) -> Plane {
         if let Some(plane) = self.planes.borrow().get(&crater.place) {
             return *plane;
@@ -288,7 +288,7 @@ impl Survey<'_> {
         plane
     }
 
-    /// Rock potential, and rocks on the ground, whose place in the list is after so many steps.
+    /// Sets the rock potential and places the rocks; they follow the first `after` steps of the list.
     fn set_rocks(&self, rocks: &Rocks, after: usize, patch: &mut Patch) {
         let (window, later) = (patch.window, &self.craters[after..]);
         for (k, potential) in patch.rock_potential.iter_mut().enumerate() {
@@ -327,7 +327,7 @@ fn is_set(cancel: Option<&AtomicBool>) -> bool {
     cancel.is_some_and(|flag| flag.load(Ordering::Relaxed))
 }
 
-/// The rock coverage at a place after a crater.
+/// The rock coverage at a position after a crater.
 fn change(rocks: &Rocks, coverage: f64, crater: &Crater, [x, y]: [f64; 2]) -> f64 {
     let [dx, dy] = [x - crater.centre[0], y - crater.centre[1]];
     let rho = (dx * dx + dy * dy).sqrt() / crater.radius;

@@ -6,7 +6,20 @@ use serde_json::json;
 #[test]
 fn val_unknown_kinds_list_the_known_ones() {
     let error = prepare("fractal", &Value::Null).err().unwrap();
-    assert!(error.message.contains("`multifractal`") && error.message.contains("`weierstrass_mandelbrot`"));
+    assert_eq!(error.key, "kind");
+    assert!(error.message.starts_with("`fractal` is not a terrain generator"), "{error}");
+    for kind in kinds() {
+        assert!(error.message.contains(&format!("`{}`", kind.kind)), "{}: {error}", kind.kind);
+    }
+}
+
+/// Of two entries with the same name, the second would never be used.
+#[test]
+fn val_every_kind_has_its_own_name() {
+    let mut names: Vec<&str> = kinds().iter().map(|kind| kind.kind).collect();
+    names.sort_unstable();
+    names.dedup();
+    assert_eq!((names.len(), kinds().len()), (15, 15), "{names:?}");
 }
 
 #[test]
@@ -20,7 +33,7 @@ fn val_part_of_a_layer_leaves_the_rest_at_its_defaults() {
     assert_eq!(all["size_px"], json!([1009, 1009]));
 }
 
-/// Parameters of a small surface of every kind, and what it stands on.
+/// Parameters of a small surface of every kind, and its inputs.
 fn small(kind: &str) -> (Value, Vec<Input>) {
     let mut params = json!({"size_m": [1.6, 1.2], "cell_m": 0.05});
     let mut inputs = Vec::new();
@@ -38,29 +51,39 @@ fn prop_parameters_read_back_to_the_same_generator() {
         let (params, inputs) = small(kind.kind);
         let first = prepare(kind.kind, &params).unwrap();
         let second = prepare(kind.kind, &first.parameters()).unwrap();
+        assert_eq!(first.kind(), kind.kind);
         assert_eq!(first.parameters(), second.parameters());
         assert_eq!(first.geometry(), second.geometry());
+        assert_eq!((first.geometry().rows, first.geometry().cols), (24, 32), "{}", kind.kind);
         let streams = Streams::for_seed(1, "terrain");
         let made = first.generate(&streams, &inputs).unwrap();
         assert_eq!(made, second.generate(&streams, &inputs).unwrap());
         assert_eq!(made.heights.geometry, first.geometry());
+        for map in &made.maps {
+            assert_eq!(map.values.geometry, first.geometry(), "{} {}", kind.kind, map.name);
+            assert!(!map.kind().description.is_empty(), "{} {}", kind.kind, map.name);
+        }
     }
 }
 
 #[test]
-fn val_unknown_parameters_and_no_tables_are_refused() {
+fn val_unknown_parameters_and_non_tables_are_refused() {
     for kind in kinds() {
-        assert!(prepare(kind.kind, &json!({"sizes_px": [9, 9]})).is_err());
-        assert!(prepare(kind.kind, &json!([1, 2])).is_err());
+        let unknown = prepare(kind.kind, &json!({"sizes_px": [9, 9]})).err().unwrap();
+        assert!(unknown.to_string().contains("sizes_px"), "{}: {unknown}", kind.kind);
+        let list = prepare(kind.kind, &json!([1, 2])).err().unwrap();
+        assert!(list.message.contains("must be a table of parameters"), "{}: {list}", kind.kind);
     }
-    assert!(prepare("multifractal", &json!({"high": {"dimension": 2.3}})).is_err());
-    assert!(prepare("multifractal", &json!({"high": 2.3})).is_err());
+    let nested = prepare("multifractal", &json!({"high": {"dimension": 2.3}})).err().unwrap();
+    assert!(nested.to_string().contains("`dimension`"), "{nested}");
+    assert_eq!(prepare("multifractal", &json!({"high": 2.3})).err().unwrap().key, "high");
 }
 
 #[test]
 fn val_schemas_describe_every_parameter() {
     for kind in kinds() {
         let properties = kind.parameters["properties"].as_object().unwrap();
+        assert!(properties.len() > 3, "{}", kind.kind);
         assert!(properties.values().all(|p| p["description"].is_string()), "{}", kind.kind);
         assert!(kind.parameters.get("required").is_none());
     }

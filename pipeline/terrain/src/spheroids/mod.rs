@@ -1,22 +1,22 @@
 //! Hills as upper halves of random spheroids.
 //!
 //! # What
-//! For each of `n` spheroids: a centre node, drawn uniformly; a horizontal semi-axis r of 1 to `major_max_px` cells; a vertical
-//! semi-axis h of 1 to `min(minor_max_px, r)` cells, both whole and uniform. At every node whose distance d from the centre is
-//! below r,
+//! Each of `n` spheroids has a centre node, drawn uniformly; a horizontal semi-axis r of 1 to `major_max_px` cells; and a vertical
+//! semi-axis h of 1 to `min(minor_max_px, r)` cells, both uniform integers. At every node closer to the centre than r, at the
+//! distance d,
 //! $$ z \mathrel{+}= h \sqrt{1 - (d / r)^2} . $$
-//! Heights add up where hills meet. The rim of a hill is vertical in the formula, so that hills end in rings of steep cells.
+//! Heights add up where hills overlap. The rim of a hill is vertical in the formula, so hills end in rings of steep cells.
 //!
 //! # Source
-//! Bayrak (2008), Algorithm 10. Lengths are in cells, as there, and become metres with `cell_m`.
+//! Bayrak (2008), Algorithm 10. Lengths are in cells, as there; `cell_m` converts them to metres.
 //!
 //! # Readings
-//! "Axis of length r" may be the whole axis: `full_axis = true` halves both. The number of spheroids and the longest axes of the
-//! published maps are not given; the presets are ours, set so that the share of nodes which the thesis' vertex extraction (without
-//! height-difference threshold) marks on 1000 x 1000 nodes lies in the published band: `docs/papers/bayrak.md`.
+//! "Axis of length r" may mean the full axis: `full_axis = true` halves both. The number of spheroids and the longest axes of the
+//! published maps are not given. The presets are ours, chosen so that the share of nodes marked by the thesis's vertex extraction
+//! (without height-difference threshold) on 1000 x 1000 nodes lies in the published band: `docs/papers/bayrak.md`.
 //!
 //! # Cost
-//! One square root per node and hill that covers it; one grid.
+//! One square root per node and covering hill; one grid.
 
 mod params;
 #[cfg(test)]
@@ -32,10 +32,10 @@ use serde_json::Value;
 /// Name in the registry.
 pub const KIND: &str = "spheroids";
 
-/// Rough time of a cell that a hill covers at its widest, s.
+/// Rough time per cell covered by a hill at its widest, s.
 const SECONDS_PER_COVERED: f64 = 1e-9;
 
-/// Rows that one task fills.
+/// Rows per task.
 const BAND_ROWS: usize = 32;
 
 /// One hill; lengths in cells.
@@ -48,14 +48,14 @@ struct Hill {
 }
 
 impl Hill {
-    /// Height at a node, `None` off the hill.
+    /// Height at a node, `None` outside the hill.
     fn at(&self, col: usize, row: usize) -> Option<f64> {
         let [dx, dy] = [col as f64 - self.centre[0], row as f64 - self.centre[1]];
         let share = (dx * dx + dy * dy) / (self.radius * self.radius);
         (share < 1.0).then(|| self.height * (1.0 - share).sqrt())
     }
 
-    /// Columns or rows of a grid with `count` of them that the hill may reach.
+    /// Columns or rows, out of `count`, that the hill may reach.
     fn reach(&self, axis: usize, count: usize) -> std::ops::Range<usize> {
         let low = (self.centre[axis] - self.radius).max(0.0) as usize;
         let high = (self.centre[axis] + self.radius) as usize + 1;
@@ -78,7 +78,7 @@ impl Spheroids {
         (0..self.spheroids).map(hill).collect()
     }
 
-    /// Adds the hills to a band of rows from `first` on; hills in their order, so that sums do not depend on the bands.
+    /// Adds the hills to a band of rows starting at `first`; always in the same order, so that sums do not depend on the bands.
     fn fill(&self, hills: &[Hill], first: usize, band: &mut [f64]) {
         let cols = self.size.cols();
         let end = first + band.len() / cols;

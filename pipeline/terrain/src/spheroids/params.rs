@@ -5,24 +5,24 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Shape of the published maps of middle size (Bayrak, 2008, section 5.1).
+/// Shape of the medium-sized published maps (Bayrak, 2008, section 5.1).
 const DEFAULT_SIZE_PX: [u32; 2] = [1000, 1000];
-/// Most hills of a surface.
+/// Maximum number of hills.
 const SPHEROIDS_MAX: u32 = 1_000_000;
-/// Most cells that all hills may cover together, each at its widest: some minutes of one core.
+/// Maximum number of cells covered by all hills together, each at its widest: a few minutes on one core.
 const COVERED_MAX: f64 = 1e11;
 /// Longest semi-axis, cells.
 const AXIS_MAX_PX: u32 = 1_000_000;
 
-/// Hilliness of the three published kinds of map. Numbers of hills are per million nodes.
+/// Hilliness of the three published types of map. Numbers of hills are per million nodes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Preset {
     /// 34 low hills: vertex share 0.07 to 0.15 %.
     Plain,
-    /// 42 hills of up to 6 cells: vertex share 0.7 to 1.1 %.
+    /// 42 hills up to 6 cells high: vertex share 0.7 to 1.1 %.
     Rough,
-    /// 145 hills of up to 6 cells: vertex share 2.4 to 4.0 %.
+    /// 145 hills up to 6 cells high: vertex share 2.4 to 4.0 %.
     VeryRough,
 }
 
@@ -37,14 +37,14 @@ impl Preset {
     }
 }
 
-/// Hills as upper halves of random spheroids. What is not given is the preset's.
+/// Hills as upper halves of random spheroids. Parameters left out take the preset's values.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawSpheroids {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 1000 x 1000 when no size is given (Bayrak, 2008, section 5.1).
+    /// Number of cells east and north; 1000 x 1000 if no size is given (Bayrak, 2008, section 5.1).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m: one map unit of the thesis.
@@ -57,10 +57,10 @@ pub struct RawSpheroids {
     /// Longest horizontal semi-axis, cells.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub major_max_px: Option<u32>,
-    /// Longest vertical semi-axis, cells; no hill is higher than it is wide.
+    /// Longest vertical semi-axis, cells; a hill's vertical semi-axis never exceeds its horizontal one.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub minor_max_px: Option<u32>,
-    /// Axes are whole axes, twice the semi-axes (the other reading of the thesis).
+    /// Treat the drawn lengths as full axes, twice the semi-axes (the other reading of the thesis).
     pub full_axis: bool,
 }
 
@@ -87,7 +87,7 @@ pub struct Spheroids {
     pub(super) spheroids: u32,
     pub(super) major_max_px: u32,
     pub(super) minor_max_px: u32,
-    /// Cells that all hills cover together, each at its widest.
+    /// Cells covered by all hills together, each at its widest.
     pub(super) covered: f64,
 }
 
@@ -97,7 +97,7 @@ impl TryFrom<RawSpheroids> for Spheroids {
     fn try_from(raw: RawSpheroids) -> Result<Self, ParameterError> {
         let size = Size::check(raw.size_m, raw.size_px, raw.cell_m, DEFAULT_SIZE_PX)?;
         let (per_million, major, minor) = raw.preset.numbers();
-        // A preset has a hill even on the smallest map.
+        // Even the smallest map gets one hill from a preset.
         let of_preset = (per_million * size.cells() as f64 / 1e6).round().clamp(1.0, f64::from(SPHEROIDS_MAX)) as u32;
         let spheroids = count("spheroids", raw.spheroids.unwrap_or(of_preset), SPHEROIDS_MAX)?;
         let major_max_px = count("major_max_px", raw.major_max_px.unwrap_or(major), AXIS_MAX_PX)?;
@@ -115,7 +115,7 @@ impl TryFrom<RawSpheroids> for Spheroids {
     }
 }
 
-/// Cells that all hills cover together, each at its widest; refused where they would keep a machine busy for days.
+/// Cells covered by all hills together, each at its widest; refused where they would take a machine days.
 fn check_work(size: &Size, spheroids: u32, major_max_px: u32) -> Result<f64, ParameterError> {
     let across = |cells: u32| f64::from(cells).min(2.0 * f64::from(major_max_px));
     let covered = f64::from(spheroids) * size.px.map(across).iter().product::<f64>();
@@ -123,8 +123,8 @@ fn check_work(size: &Size, spheroids: u32, major_max_px: u32) -> Result<f64, Par
         return Ok(covered);
     }
     let message = format!(
-        "is {spheroids}; at their widest such hills cover {covered:.1e} cells together, the most is {COVERED_MAX:e}; \
-         choose fewer or narrower ones"
+        "is {spheroids}; at their widest, these hills cover {covered:.1e} cells in total, above the limit of {COVERED_MAX:e}; \
+         choose fewer or narrower hills"
     );
     Err(ParameterError::new("spheroids", message))
 }

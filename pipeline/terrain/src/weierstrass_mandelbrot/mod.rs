@@ -6,22 +6,22 @@
 //!    A = L \left(\frac{G}{L}\right)^{D-2} \sqrt{\frac{\ln\gamma}{M}}, \quad
 //!    u_m = x \cos\frac{\pi m}{M} + y \sin\frac{\pi m}{M} $$
 //! with M ridge directions, frequency ratio gamma > 1, fractal dimension 2 < D < 3, sampling length L (m), elevation
-//! scaling G (m), and phases phi uniform in 0 to `phase_max_rad`, drawn n first so that ending the sum earlier changes
-//! none of those that are kept.
+//! scaling G (m), and phases phi uniform in 0 to `phase_max_rad`, drawn in order of n, so that truncating the sum does not
+//! change the remaining phases.
 //!
 //! # Source
 //! Majhor and Bos, Eq. 1 and 2, after Ausloos and Berman (1985).
 //!
 //! # Where we depart
-//! * The paper writes `u_m` with `arctan(y / x)`, which is the same for x > 0, undefined at the origin, and mirrored for
-//!   x < 0. The plane waves above need no case.
+//! * The paper writes `u_m` with `arctan(y / x)`, which is equivalent for x > 0, undefined at the origin, and mirrored for
+//!   x < 0. The plane waves above need no case distinction.
 //! * Phases cover 2 pi, not pi: see `docs/papers/majhor.md`.
-//! * Waves above the grid's Nyquist frequency are left out unless `mode = "paper"` asks for their aliases. Even then
+//! * Waves above the grid's Nyquist frequency are left out unless `mode = "paper"` requests their aliases. Even then
 //!   the sum ends where double-precision phases are rounding noise (n about 66 of the published 1009).
 //!
 //! # Cost
-//! A surface is a constant less a sum of `K = M n` plane waves on a regular grid, computed by one non-uniform Fourier
-//! transform (`plane_waves`) for about the price of one real transform of 1.5 times the grid, whatever K.
+//! A surface is a constant minus a sum of `K = M n` plane waves on a regular grid. One non-uniform Fourier transform
+//! (`plane_waves`) computes it at about the cost of one real transform of 1.5 times the grid, whatever K.
 
 mod params;
 mod plane_waves;
@@ -43,12 +43,12 @@ use std::f64::consts::PI;
 /// Name in the registry.
 pub const KIND: &str = "weierstrass_mandelbrot";
 
-/// Rough time of a cell: its share of the transform, s.
+/// Rough time per cell for the transform, s.
 const SECONDS_PER_CELL: f64 = 1e-7;
-/// Rough time of a wave that is spread over the spectrum, s.
+/// Rough time to spread one wave over the spectrum, s.
 const SECONDS_PER_WAVE: f64 = 1e-6;
 
-/// Relief below this share of the summed amplitudes is too near to the transform's error of 1e-12 of them.
+/// Relief below this share of the summed amplitudes is too close to the transform's error of 1e-12 of that sum.
 const RELIEF_SHARE_MIN: f64 = 1e-7;
 
 impl WeierstrassMandelbrot {
@@ -67,14 +67,14 @@ impl WeierstrassMandelbrot {
         f64::from(self.raw.ridges) * sums::sum(&amplitudes)
     }
 
-    /// One phase per wave, n first.
+    /// One phase per wave, in order of n.
     fn phases(&self, streams: &Streams) -> Vec<f64> {
         let mut stream = streams.stream("phases");
         let count = self.frequencies as usize * self.raw.ridges as usize;
         (0..count).map(|_| stream.uniform_in(0.0, self.raw.phase_max_rad)).collect()
     }
 
-    /// The waves of the sum for given phases (n first); the constant is a last wave of frequency 0.
+    /// The waves of the sum for given phases (in order of n); the constant is added as a last wave of frequency 0.
     fn waves(&self, phases: &[f64]) -> Vec<PlaneWave> {
         let p = &self.raw;
         let directions: Vec<(f64, f64)> =
@@ -83,7 +83,7 @@ impl WeierstrassMandelbrot {
         let mut waves = Vec::with_capacity(phases.len() + 1);
         for (n, row) in (1..=self.frequencies).zip(phases.chunks_exact(directions.len())) {
             let amplitude = self.amplitude_m(n);
-            // Cycles per cell along the wave; whole cycles per cell change nothing on the grid.
+            // Cycles per cell along the wave; integer cycles per cell are invisible on the grid.
             let cycles = libm::pow(p.frequency_ratio, f64::from(n)) * (p.cell_m / p.sampling_length_m);
             for (&(sin, cos), &phase) in directions.iter().zip(row) {
                 let (phase_sin, phase_cos) = libm::sincos(phase);
@@ -96,7 +96,7 @@ impl WeierstrassMandelbrot {
         waves
     }
 
-    /// The surface for given phases (n first), m.
+    /// The surface for given phases (in order of n), m.
     fn heights(&self, phases: &[f64]) -> Grid {
         plane_waves::sum_on_grid(&self.waves(phases), self.size.geometry())
     }
@@ -104,7 +104,7 @@ impl WeierstrassMandelbrot {
     /// The surface, m.
     ///
     /// # Errors
-    /// A relief that drowns in rounding errors.
+    /// Relief below rounding error.
     pub(crate) fn surface(&self, streams: &Streams) -> Result<Grid, TerrainError> {
         let heights = self.heights(&self.phases(streams));
         let relief_m = heights.range().map_or(0.0, |(low, high)| high - low);
@@ -144,8 +144,8 @@ impl Generator for WeierstrassMandelbrot {
         let dropped = (self.raw.mode == Mode::Paper && self.frequencies < self.raw.frequencies).then(|| {
             let share = self.amplitude_m(self.frequencies + 1) / self.amplitude_m(1);
             format!(
-                "frequencies above n = {} are left out: in double precision their phases are rounding noise (amplitude \
-                 {share:.1e} of the first wave and below)",
+                "frequencies above n = {} are left out: in double precision their phases are rounding noise (their amplitudes are \
+                 at most {share:.1e} of the first wave's)",
                 self.frequencies
             )
         });

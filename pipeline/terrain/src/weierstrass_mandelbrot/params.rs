@@ -16,22 +16,22 @@ pub const DEFAULT_FREQUENCIES: u32 = 1009;
 pub const DEFAULT_FREQUENCY_RATIO: f64 = 1.5;
 /// `L` of Table 1, m.
 pub const DEFAULT_SAMPLING_LENGTH_M: f64 = 100.9;
-/// Most plane waves of one surface.
+/// Maximum number of plane waves of one surface.
 const MAX_WAVES: u64 = 1 << 22;
-/// Phase error that the double-precision phases of the highest wave in `paper` mode may reach, rad.
+/// Largest permitted error of the double-precision phases of the highest wave in `paper` mode, rad.
 const PHASE_ERROR_MAX_RAD: f64 = 1e-3;
-/// Relative error of a phase: the power, the product with the direction and the product with the place round once each,
-/// half a unit in the last place.
+/// Relative error of a phase: the power, the product with the direction and the product with the position each round once,
+/// by half a unit in the last place.
 const PHASE_RELATIVE_ERROR: f64 = 1.5 * f64::EPSILON;
 
-/// Which waves enter the sum.
+/// Which waves the sum contains.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
-    /// The waves that two cells can hold: wavelengths from `2 cell_m` up.
+    /// The waves that the grid resolves: wavelengths of at least `2 cell_m`.
     BandLimited,
-    /// Shorter waves too, aliased by the grid as in the published heightfields, up to where double-precision phases
-    /// still hold to 1e-3 rad.
+    /// Shorter waves too, aliased by the grid as in the published heightfields, as long as double-precision phases
+    /// are accurate to 1e-3 rad.
     Paper,
 }
 
@@ -39,10 +39,10 @@ pub enum Mode {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawWeierstrassMandelbrot {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 1009 x 1009 when no size is given (Majhor and Bos, section 2.2).
+    /// Number of cells east and north; 1009 x 1009 if no size is given (Majhor and Bos, section 2.2).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (section 2.2).
@@ -59,10 +59,10 @@ pub struct RawWeierstrassMandelbrot {
     pub sampling_length_m: f64,
     /// Elevation scaling G, m (Table 1, high-frequency layer).
     pub elevation_scale_m: f64,
-    /// Phases are uniform in 0 to this, rad. The paper prints pi, which adds the same corner spike to every surface;
-    /// 2 pi does not.
+    /// Upper bound of the phases, which are uniform from 0, rad. The paper prints pi, which adds the same spike in one corner to
+    /// every surface; 2 pi does not.
     pub phase_max_rad: f64,
-    /// Which waves enter the sum.
+    /// Which waves the sum contains.
     pub mode: Mode,
 }
 
@@ -89,7 +89,7 @@ impl Default for RawWeierstrassMandelbrot {
 pub struct WeierstrassMandelbrot {
     pub(super) raw: RawWeierstrassMandelbrot,
     pub(super) size: Size,
-    /// Frequency indices that enter the sum: 1 to this.
+    /// Highest frequency index in the sum, which starts at 1.
     pub(super) frequencies: u32,
 }
 
@@ -121,7 +121,7 @@ impl WeierstrassMandelbrot {
         let raw = &self.raw;
         if self.frequencies == 0 {
             let message = format!(
-                "is {} m, so that the first wave of {:e} m is too short for cells of {} m; it must be longer",
+                "is {} m, which makes the first wave, {:e} m, too short for cells of {} m; choose a longer one",
                 raw.sampling_length_m,
                 raw.sampling_length_m / raw.frequency_ratio,
                 raw.cell_m
@@ -130,12 +130,13 @@ impl WeierstrassMandelbrot {
         }
         let waves = u64::from(raw.ridges) * u64::from(self.frequencies);
         if waves > MAX_WAVES {
-            let message = format!("gives {waves} waves with {} frequencies; the most is {MAX_WAVES}", self.frequencies);
+            let message =
+                format!("gives {waves} waves with {} frequencies; at most {MAX_WAVES} are allowed", self.frequencies);
             return Err(ParameterError::new("ridges", message));
         }
         let amplitude = self.amplitude_sum_m();
         if !(2.0 * amplitude).is_normal() {
-            let message = format!("gives waves of together {amplitude:e} m; choose another scale");
+            let message = format!("gives waves whose amplitudes sum to {amplitude:e} m; choose another scale");
             return Err(ParameterError::new("elevation_scale_m", message));
         }
         Ok(self)
@@ -146,7 +147,7 @@ fn at_least_one(key: &str, value: u32) -> Result<(), ParameterError> {
     if value == 0 { Err(ParameterError::new(key, "is 0; it must be at least 1")) } else { Ok(()) }
 }
 
-/// The highest frequency index that enters the sum: `gamma^n` up to a bound that depends on the mode.
+/// The highest frequency index in the sum: `gamma^n` up to a bound that depends on the mode.
 fn kept_frequencies(raw: &RawWeierstrassMandelbrot, size: &Size) -> u32 {
     let bound = match raw.mode {
         Mode::BandLimited => raw.sampling_length_m / (2.0 * raw.cell_m),

@@ -6,9 +6,9 @@
 //!
 //! # How
 //! Each wave is spread over WIDTH x WIDTH points of the spectrum of a larger torus with the kernel
-//! `phi(t) = exp(beta (sqrt(1 - t^2) - 1))`, one real inverse transform of that torus follows, and the part that is the
+//! `phi(t) = exp(beta (sqrt(1 - t^2) - 1))`. One real inverse transform of that torus follows, and the part covered by the
 //! grid is divided by the transform of the kernel. Posts are counted from the middle of the grid, where that division
-//! amplifies least. The transform of the kernel is a trapezoid sum in `t = sin(u)`, which converges geometrically.
+//! amplifies least. The transform of the kernel is a trapezoidal sum in `t = sin(u)`, which converges geometrically.
 //!
 //! # Source
 //! Barnett, Magland and af Klinteberg, SIAM J. Sci. Comput. 41 (2019) C479, sections 2 and 3 (type 1 transform with
@@ -17,21 +17,21 @@
 //! # Error and cost
 //! Errors are below 1e-12 of the summed amplitudes and, on the published layers, about 1e-11 of the standard deviation (tested
 //! against a matrix product and the direct sum); they are largest in the corners, where the division amplifies rounding
-//! most. A torus of twice the grid would be ten times more accurate and half as fast. Time is that of the transform plus
-//! `2 WIDTH^2` complex multiplications a wave; memory is [`memory_bytes`].
+//! most. A torus of twice the grid would be ten times more accurate and half as fast. The time is that of the transform plus
+//! `2 WIDTH^2` complex multiplications per wave; for memory see [`memory_bytes`].
 
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Geometry, Grid};
 use std::f64::consts::{PI, TAU};
 
-/// Points that a wave is spread over along an axis.
+/// Points per axis that a wave is spread over.
 const WIDTH: usize = 17;
-/// Size of the torus over the size of the grid.
+/// Ratio of torus size to grid size.
 const UPSAMPLING: f64 = 1.5;
 /// Shape of the kernel: 0.98 of the value where the kernel's own cut-off meets the torus's first alias.
 const BETA: f64 = 0.98 * PI * WIDTH as f64 * (1.0 - 0.5 / UPSAMPLING);
-/// Intervals of the trapezoid sum over half of the kernel.
+/// Intervals of the trapezoidal sum over half of the kernel.
 const QUADRATURE_INTERVALS: usize = 64;
 
 /// One wave of the sum.
@@ -43,13 +43,13 @@ pub struct PlaneWave {
 }
 
 impl PlaneWave {
-    /// The wave of a frequency in cycles per cell east and north. Whole cycles per cell are dropped: the posts do not see
-    /// them.
+    /// The wave with a frequency in cycles per cell east and north. Integer cycles per cell are dropped: they are invisible at
+    /// the posts.
     pub fn new(frequency: [f64; 2], coefficient: Complex64) -> Self {
         Self { frequency: frequency.map(|f| f - f.round()), coefficient }
     }
 
-    /// The complex conjugate wave: the same real part.
+    /// The complex conjugate wave, with the same real part.
     fn conjugate(self) -> Self {
         Self { frequency: self.frequency.map(|f| -f), coefficient: self.coefficient.conj() }
     }
@@ -78,19 +78,19 @@ pub fn sum_on_grid(waves: &[PlaneWave], geometry: Geometry) -> Grid {
     Grid { geometry, values }
 }
 
-/// Peak memory of [`sum_on_grid`], its result included, bytes.
+/// Peak memory of [`sum_on_grid`], including its result, bytes.
 pub fn memory_bytes(geometry: &Geometry, waves: u64) -> u64 {
     let torus = torus_length(geometry.cols) as u64 * torus_length(geometry.rows) as u64;
-    // Half a spectrum of complex numbers twice, or once beside the torus of real numbers.
+    // Two complex half spectra, or one and the real torus.
     16 * torus + 8 * geometry.len() as u64 + size_of::<PlaneWave>() as u64 * waves
 }
 
 /// One axis of the grid and its torus.
 struct Axis {
     torus: usize,
-    /// Post that the transform counts from.
+    /// Post at the origin of the transform.
     middle: usize,
-    /// Torus length over the kernel's transform, by post.
+    /// Torus length divided by the kernel's transform, for each post.
     gain: Vec<f64>,
 }
 
@@ -108,12 +108,12 @@ impl Axis {
         Self { torus, middle, gain: gain.collect() }
     }
 
-    /// Where a post lies on the torus.
+    /// Index of a post on the torus.
     fn place(&self, post: usize) -> usize {
         (post + self.torus - self.middle) % self.torus
     }
 
-    /// First torus frequency that a wave reaches, in 0..torus, and the kernel at it and its successors.
+    /// First torus frequency that a wave is spread to, in 0..torus, and the kernel there and at the next points.
     fn reach(&self, frequency: f64) -> (usize, [f64; WIDTH]) {
         let position = frequency * self.torus as f64;
         let first = (position - 0.5 * WIDTH as f64).ceil();
@@ -143,10 +143,10 @@ fn spread(spectrum: &mut HalfSpectrum, across: &Axis, along: &Axis, wave: PlaneW
     let [east, north] = wave.frequency;
     let (first_col, col_weights) = across.reach(east);
     let (first_row, row_weights) = along.reach(north);
-    // The grid's first post is not the one the transform counts from.
+    // The origin of the transform is not the grid's first post.
     let turns = (east * across.middle as f64).fract() + (north * along.middle as f64).fract();
     let (sin, cos) = libm::sincos(TAU * turns);
-    // Half of the real part: the conjugate wave brings the other half.
+    // Half of the real part: the conjugate wave contributes the other half.
     let coefficient = wave.coefficient * Complex64::new(0.5 * cos, 0.5 * sin);
     let column_values = row_weights.map(|w| coefficient * w);
     for (k, weight) in col_weights.iter().enumerate() {

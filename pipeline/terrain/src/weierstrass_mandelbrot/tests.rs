@@ -5,7 +5,7 @@ use serde_json::json;
 
 mod reference;
 
-/// Checked parameters from JSON over the defaults.
+/// Checked parameters from the defaults, overridden by JSON.
 fn surface(params: Value) -> WeierstrassMandelbrot {
     let mut all = serde_json::to_value(RawWeierstrassMandelbrot::default()).unwrap();
     all.as_object_mut().unwrap().extend(params.as_object().unwrap().clone());
@@ -40,7 +40,7 @@ fn direct_sum(terms: &[Term], x: f64, y: f64) -> f64 {
 }
 
 /// `U^T V` with `U = [a cos(alpha_i + phi); -a sin(alpha_i + phi)]` and `V = [cos beta_j; sin beta_j]`, in
-/// blocks of posts that stay in the cache.
+/// blocks of posts that fit in the cache.
 fn matrix_product(s: &WeierstrassMandelbrot, phases: &[f64]) -> Vec<f64> {
     use rayon::prelude::*;
     const BLOCK: usize = 32;
@@ -89,8 +89,8 @@ fn matrix_product(s: &WeierstrassMandelbrot, phases: &[f64]) -> Vec<f64> {
     heights
 }
 
-/// Independent values at 60 digits. Absolute tolerance: 1e-11 of the summed amplitudes, a millionth of these heights
-/// (0.25 m wide samples of waves of up to 67 m).
+/// Independent values to 60 digits. Absolute tolerance: 1e-11 of the summed amplitudes, a millionth of these heights
+/// (0.25 m wide samples of waves up to 67 m long).
 #[test]
 fn val_independent_direct_sums() {
     let cases = [
@@ -112,8 +112,8 @@ fn val_independent_direct_sums() {
     }
 }
 
-/// Every post in `band_limited` mode, every 37th in `paper` mode, whose phases the direct sum itself only knows to 1e-3
-/// rad for the highest waves.
+/// Every post in `band_limited` mode, every 37th in `paper` mode, where the phases of the highest waves are accurate to only
+/// 1e-3 rad in the direct sum too.
 #[test]
 fn val_fast_path_equals_the_direct_sum() {
     for ridges in [16, 64] {
@@ -153,7 +153,7 @@ fn val_fast_path_equals_the_matrix_product() {
     }
 }
 
-/// With a doubling frequency ratio and the sampling length equal to the size, every wave sits on its own Fourier mode:
+/// With a frequency ratio of 2 and the sampling length equal to the size, every wave is one Fourier mode:
 /// amplitudes must follow `A gamma^((D - 3) n)` to rounding.
 #[test]
 fn val_amplitudes_follow_the_power_law() {
@@ -191,13 +191,13 @@ fn prop_ending_the_sum_earlier_keeps_the_other_phases() {
 }
 
 #[test]
-fn val_frequencies_that_enter_the_sum() {
+fn val_frequencies_in_the_sum() {
     let kept = |params| surface(params).frequencies;
     assert_eq!(kept(json!({})), 17);
     assert_eq!(kept(json!({"cell_m": 0.1})), 15);
     assert_eq!(kept(json!({"mode": "paper"})), 67);
     assert_eq!(kept(json!({"mode": "paper", "frequencies": 40})), 40);
-    // A wave of exactly two cells enters.
+    // A wave of exactly two cells is included.
     assert_eq!(kept(json!({"cell_m": 0.5, "sampling_length_m": 8.0, "frequency_ratio": 2.0})), 3);
     assert_eq!(surface(json!({})).notes().len(), 0);
     assert!(surface(json!({"mode": "paper"})).notes()[0].contains("n = 67"));
@@ -213,7 +213,7 @@ fn prop_same_bits_on_any_number_of_threads() {
     assert!(one == two && one == eight);
 }
 
-/// Freezes the streams, the order of the phases and the arithmetic. To refresh: print the bits, and say in the commit
+/// Freezes the streams, the order of the phases and the arithmetic. To refresh, print the bits, and explain in the commit
 /// message why released terrains change.
 #[test]
 fn gold_heights_are_frozen() {
@@ -242,8 +242,8 @@ fn val_impossible_parameters_are_refused() {
             assert_eq!(key(json!({name: value})).as_deref(), Some(name), "{name} = {value}");
         }
     }
-    // JSON has no other number; a null (where TOML had nan or inf) is no number either.
-    assert!(key(json!({"cell_m": null})).is_some());
+    // JSON cannot hold other numbers; null (where TOML had nan or inf) is not a number either.
+    assert_eq!(key(json!({"cell_m": null})).as_deref(), Some("cell_m"));
     assert_eq!(
         key(json!({"elevation_scale_m": 1e308, "sampling_length_m": 1e308})).as_deref(),
         Some("elevation_scale_m")
@@ -251,20 +251,20 @@ fn val_impossible_parameters_are_refused() {
 }
 
 #[test]
-fn val_not_finite_parameters_are_refused() {
+fn val_non_finite_parameters_are_refused() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let edits: [fn(&mut RawWeierstrassMandelbrot) -> &mut f64; 6] = [
-            |r| &mut r.cell_m,
-            |r| &mut r.frequency_ratio,
-            |r| &mut r.fractal_dimension,
-            |r| &mut r.sampling_length_m,
-            |r| &mut r.elevation_scale_m,
-            |r| &mut r.phase_max_rad,
+        let edits: [(&str, fn(&mut RawWeierstrassMandelbrot) -> &mut f64); 6] = [
+            ("cell_m", |r| &mut r.cell_m),
+            ("frequency_ratio", |r| &mut r.frequency_ratio),
+            ("fractal_dimension", |r| &mut r.fractal_dimension),
+            ("sampling_length_m", |r| &mut r.sampling_length_m),
+            ("elevation_scale_m", |r| &mut r.elevation_scale_m),
+            ("phase_max_rad", |r| &mut r.phase_max_rad),
         ];
-        for (k, field) in edits.iter().enumerate() {
+        for (name, field) in edits {
             let mut raw = RawWeierstrassMandelbrot::default();
             *field(&mut raw) = bad;
-            assert!(WeierstrassMandelbrot::try_from(raw).is_err(), "field {k} = {bad}");
+            assert_eq!(WeierstrassMandelbrot::try_from(raw).unwrap_err().key, name, "{bad}");
         }
     }
 }
@@ -277,7 +277,7 @@ fn val_relief_below_rounding_is_an_error() {
 
 proptest! {
     #![proptest_config(ProptestConfig { cases: 200, failure_persistence: None, ..ProptestConfig::default() })]
-    /// Whatever the parameters: refused, an error, or finite heights of the promised shape.
+    /// Any parameters are refused, give an error, or give finite heights of the stated shape.
     #[test]
     fn prop_any_parameters_are_refused_or_give_finite_heights(
         px in prop::array::uniform2(0u32..40), cell in any::<f64>(), ridges in 0u32..20, frequencies in 0u32..2000,

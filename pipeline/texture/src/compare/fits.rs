@@ -1,4 +1,4 @@
-//! Two fit files, by the intervals they hold.
+//! Compares two fit files by their intervals.
 
 use super::verdict::{Finding, Null, decide, overall};
 use super::{CompareParameters, CompareSettings, Comparison, Measure};
@@ -9,9 +9,9 @@ use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::{FitFile, Intervals};
 use sastrugi_statistics::normal;
 
-/// Points of a null.
+/// Points of a null distribution.
 const DRAWS: usize = 1999;
-/// Windows that differ by more than this share are named.
+/// Windows that differ by more than this share are noted.
 const WINDOW_SHARE: f64 = 0.05;
 /// Name of the null in results.
 const KIND: &str = "intervals of the fits";
@@ -19,7 +19,7 @@ const KIND: &str = "intervals of the fits";
 /// Compares two fit files.
 ///
 /// # Errors
-/// A fit whose model or parameters are wrong.
+/// A fit whose model or parameters are invalid.
 pub fn fits(
     a: &FitFile,
     b: &FitFile,
@@ -36,7 +36,7 @@ pub fn fits(
         values: [None, None],
         measure: Measure::Distance,
         bound: parameters.equivalence_heights,
-        known: Err("a fit file holds no heights: compare the DEMs".to_owned()),
+        known: Err("a fit file contains no heights: compare the DEMs".to_owned()),
         words: String::new(),
     });
     let quantities = decide(findings, parameters.alpha);
@@ -67,11 +67,11 @@ impl<'a> Side<'a> {
         Ok(Self { name, file, form: Form::parse(&file.model)?, covariance })
     }
 
-    /// The wider of the parameter's intervals, and its level in standard errors of a normal variable.
+    /// The wider of the parameter's intervals, and its half-width in standard errors of a normal variable.
     fn interval(&self, name: &str) -> Result<([f64; 2], f64), String> {
         let given = || [&self.file.intervals, &self.file.block_intervals].into_iter().flatten();
         if given().filter_map(|i| i.values.get(name)).any(|ends| ends.contains(&None)) {
-            return Err(format!("the interval of {name} of {} is open: its data knows no end", self.name));
+            return Err(format!("the interval of {name} of {} is open: its data does not bound it", self.name));
         }
         let of = |i: &Intervals| {
             let [low, high] = *i.values.get(name)?;
@@ -79,7 +79,7 @@ impl<'a> Side<'a> {
         };
         let width = |(i, _): &([f64; 2], f64)| i[1] - i[0];
         given().filter_map(of).max_by(|x, y| width(x).total_cmp(&width(y))).ok_or_else(|| {
-            format!("{} holds no interval of {name}: fit it with a bootstrap (`fit --bootstrap 99`)", self.name)
+            format!("{} has no interval of {name}: fit it with a bootstrap (`fit --bootstrap 99`)", self.name)
         })
     }
 
@@ -88,11 +88,13 @@ impl<'a> Side<'a> {
         let ([low, high], z) = self.interval(name)?;
         let error = (libm::log(high) - libm::log(low)) / (2.0 * z);
         let sound = low > 0.0 && error.is_finite() && error > 0.0;
-        sound.then_some(error).ok_or_else(|| format!("the interval of {name} of {} has no logarithm", self.name))
+        sound
+            .then_some(error)
+            .ok_or_else(|| format!("the interval of {name} of {} is not positive or has no width", self.name))
     }
 }
 
-/// Sigma, b and shapes of two fits of one model.
+/// Sigma, b and shapes of two fits with the same model.
 fn shared(sides: &[Side; 2], parameters: &CompareParameters) -> Vec<Finding> {
     let [a, b] = sides;
     let one_model = a.form.isotropic().name() == b.form.isotropic().name();
@@ -108,7 +110,7 @@ fn shared(sides: &[Side; 2], parameters: &CompareParameters) -> Vec<Finding> {
         let known = match one_model {
             true => log_ratio(sides, &parameter),
             false => Err(format!(
-                "A is {}, B is {}: their parameters are different quantities; fit both with one model",
+                "A is {}, B is {}: their parameters are not comparable; fit both with one model",
                 a.form.name(),
                 b.form.name()
             )),
@@ -133,8 +135,8 @@ fn log_ratio([a, b]: &[Side; 2], parameter: &Parameter) -> Result<(f64, Null), S
     Ok((difference, Null { kind: KIND, draws, widened: 1.0 }))
 }
 
-/// The axes, where both fits have one: elongations scatter along the axis as the logarithm of the ratio does, and across it
-/// as twice the azimuth does.
+/// Anisotropy, if both fits are anisotropic. Elongations scatter along the axis like the logarithm of the ratio, and across it
+/// like twice the azimuth.
 fn anisotropy(sides: &[Side; 2], parameters: &CompareParameters, streams: &Streams) -> Finding {
     let [a, b] = sides;
     let elongations = sides.each_ref().map(|s| elongation(&s.covariance));
@@ -143,7 +145,7 @@ fn anisotropy(sides: &[Side; 2], parameters: &CompareParameters, streams: &Strea
         if let Some(side) = sides.iter().find(|s| !s.form.is_anisotropic()) {
             let name = side.form.with_axis();
             return Err(format!(
-                "{} has no axis: fit both with --model {}, or compare the DEMs",
+                "{} is isotropic: fit both with --model {}, or compare the DEMs",
                 side.name,
                 name.name()
             ));
@@ -170,7 +172,7 @@ fn anisotropy(sides: &[Side; 2], parameters: &CompareParameters, streams: &Strea
     }
 }
 
-/// Standard errors of the elongation along its axis and across.
+/// Standard errors of the elongation along and across its axis.
 fn errors(side: &Side) -> Result<[f64; 2], String> {
     let along = side.log_error("ratio")?;
     let ([low, high], z) = side.interval("azimuth_deg")?;
@@ -193,7 +195,8 @@ fn notes([a, b]: [&FitFile; 2]) -> Vec<String> {
         && (p[0] - q[0]).abs() > WINDOW_SHARE * p[0].max(q[0])
     {
         notes.push(format!(
-            "A was fitted in a window of {:.3} m, B of {:.3} m: parameters of a surface without one scale differ by that alone",
+            "A was fitted with a window of {:.3} m, B with {:.3} m: for a surface without scale separation the parameters differ for \
+             that reason alone",
             p[0], q[0]
         ));
     }

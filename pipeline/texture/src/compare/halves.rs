@@ -1,12 +1,12 @@
-//! Does a texture look like its site? One half of the site is fitted, the texture compared with the other half.
+//! Split-half test of a texture: one half of the site is fitted, and textures from the fit are compared with the other half.
 //!
-//! The site is cut in two across its longer side. The first half is fitted with an axis. Textures are normal fields with
-//! parameters drawn from the fit's parametric bootstrap (what the fit does not know is part of the null), on the second
-//! half's grid and mask, through the same moving average. Compared is what the fit does not set
-//! ([`sastrugi_roughness::unfitted_statistics`]): the distance of the second half from the mean of all, root mean square over
-//! a statistic's values, relative for those with a unit. Under the null the half is one more member of the ensemble, so that the
-//! share of members at least as far out is an exact p-value whatever the statistic's distribution. Sigma and b are not reported:
-//! the texture was given them.
+//! The site is cut in two across its longer side. The first half is fitted with an anisotropic model. Textures are normal fields with
+//! parameters drawn from the fit's parametric bootstrap (so that the uncertainty of the fit is part of the null), on the second
+//! half's grid and mask, after the same moving average. The comparison uses statistics that the fit does not set
+//! ([`sastrugi_roughness::unfitted_statistics`]): the distance of the second half from the mean of all members, as the root mean square
+//! over a statistic's values, relative for those with a unit. Under the null the half is one more member of the ensemble, so that the
+//! share of members at least as far from the mean is an exact p-value whatever the statistic's distribution. Sigma and b are not
+//! reported, since the texture was given them.
 //!
 //! Cost: one fit, and per simulation a refit and two surfaces of half a site of at most two million cells.
 
@@ -48,12 +48,12 @@ pub fn halves(site: &Grid, settings: &CompareSettings, streams: &Streams) -> Res
     let quantities = decide(findings, parameters.alpha);
     let (answer, sentence) = overall(&quantities);
     let mut notes = vec![format!(
-        "A stands for textures of the first half's {} model, B for the second half; sigma and b are not compared, since the \
-         textures were given them",
+        "A denotes textures of the first half's {} model, B the second half; sigma and b are not compared, since the textures were \
+         given them",
         side.long.form.name()
     )];
     if examined.values.len() < site.values.len() {
-        notes.push(format!("the middle {} x {} cells were looked at", examined.rows(), examined.cols()));
+        notes.push(format!("only the middle {} x {} cells were compared", examined.rows(), examined.cols()));
     }
     Ok(Comparison {
         what: "halves",
@@ -68,7 +68,7 @@ pub fn halves(site: &Grid, settings: &CompareSettings, streams: &Streams) -> Res
     })
 }
 
-/// The whole site, or its middle.
+/// The complete site, or its middle.
 fn middle(site: &Grid) -> Grid {
     let share = (2.0 * CELLS_MAX as f64 / site.values.len() as f64).sqrt();
     if share >= 1.0 {
@@ -78,7 +78,7 @@ fn middle(site: &Grid) -> Grid {
     site.window((site.rows() - rows) / 2, (site.cols() - cols) / 2, rows, cols)
 }
 
-/// Two halves across the longer side: west and east, or north and south.
+/// Splits a site across its longer side: west and east, or north and south.
 fn cut(site: &Grid) -> (Grid, Grid) {
     let (rows, cols) = (site.rows(), site.cols());
     let [width, height] = site.geometry.size();
@@ -100,21 +100,21 @@ fn statistics(case: &Case, residual: Vec<f64>) -> Vec<Statistic> {
     unfitted_statistics(&Grid::new(case.geometry, residual), lag_max)
 }
 
-/// One statistic of all members, the last of which is the site.
+/// One statistic over all members, the last of which is the site.
 fn finding(members: &[Vec<Statistic>], k: usize, bound: f64) -> Finding {
     let Statistic { name, has_unit, .. } = members[0][k];
     let all: Vec<&[f64]> = members.iter().map(|m| m[k].values.as_slice()).collect();
-    // Values that some member lacks (an empty class) are nobody's.
-    let whole: Vec<usize> = (0..all[0].len()).filter(|&i| all.iter().all(|v| v[i].is_finite())).collect();
-    let known = if whole.is_empty() {
-        Err(format!("there is too little data for {name}"))
+    // Values that any member lacks (an empty class) are left out.
+    let common: Vec<usize> = (0..all[0].len()).filter(|&i| all.iter().all(|v| v[i].is_finite())).collect();
+    let known = if common.is_empty() {
+        Err(format!("too little data for {name}"))
     } else {
         let means: Vec<f64> =
-            whole.iter().map(|&i| sums::mean(&all.iter().map(|v| v[i]).collect::<Vec<_>>())).collect();
+            common.iter().map(|&i| sums::mean(&all.iter().map(|v| v[i]).collect::<Vec<_>>())).collect();
         let size = if has_unit { root_mean_square(&means) } else { 1.0 };
         let mut distances: Vec<f64> = all
             .iter()
-            .map(|v| root_mean_square(&whole.iter().zip(&means).map(|(&i, m)| (v[i] - m) / size).collect::<Vec<_>>()))
+            .map(|v| root_mean_square(&common.iter().zip(&means).map(|(&i, m)| (v[i] - m) / size).collect::<Vec<_>>()))
             .collect();
         let site = distances.pop().unwrap_or(f64::NAN);
         Ok((site, Null::distances(distances, 1.0)))
@@ -131,4 +131,25 @@ fn finding(members: &[Vec<Statistic>], k: usize, bound: f64) -> Finding {
 
 fn root_mean_square(values: &[f64]) -> f64 {
     sums::mean(&values.iter().map(|v| v * v).collect::<Vec<_>>()).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::Geometry;
+
+    /// A site is cut across its longer side, in metres and not in cells, and the odd row or column goes to the second half.
+    #[test]
+    fn val_sites_are_cut_across_their_longer_side() {
+        let numbered = |rows: usize, cols: usize, cell: [f64; 2]| {
+            let geometry = Geometry { rows, cols, cell, origin: [0.0; 2] };
+            Grid::new(geometry, (0..rows * cols).map(|k| k as f64).collect())
+        };
+        let (west, east) = cut(&numbered(2, 5, [1.0, 1.0]));
+        assert_eq!((west.values, east.values), (vec![0.0, 1.0, 5.0, 6.0], vec![2.0, 3.0, 4.0, 7.0, 8.0, 9.0]));
+        // Five columns of 1 m, two rows of 4 m.
+        let (north, south) = cut(&numbered(2, 5, [1.0, 4.0]));
+        assert_eq!((north.values[4], south.values[0], north.rows(), south.rows()), (4.0, 5.0, 1, 1));
+        assert_eq!((north.geometry.origin, south.geometry.origin), ([0.0, 4.0], [0.0, 0.0]));
+    }
 }

@@ -1,36 +1,36 @@
-//! Are two textures statistically the same?
+//! Tests whether two textures are statistically the same.
 //!
-//! # What
+//! # Answers
 //! Every quantity gets one of three answers:
 //! * `same`: the interval of the difference lies within stated bounds (equivalence; Schuirmann, 1987);
 //! * `different`: equality is ruled out, and equivalence is not shown;
 //! * `cannot tell`: neither, with the reason.
 //!
-//! Quantities of two DEMs: sigma, b (and a model's shape) as the logarithm of their ratio; anisotropy as the distance of
-//! the two elongations `ln(1 / ratio) (cos 2 a, sin 2 a)`, a the azimuth of the long axis, which has no seam and is 0 for an
-//! isotropic surface; the distribution of heights as the root mean square distance of the quantiles of standardised
-//! residuals (a Wasserstein distance of order 2). Of two fits: what they hold.
+//! Quantities of two DEMs: sigma, b (and a model's shape) as the logarithm of their ratio; anisotropy as the distance between
+//! the two elongations `ln(1 / ratio) (cos 2 a, sin 2 a)`, a the azimuth of the long axis, which are continuous in a and 0 for an
+//! isotropic surface; the distribution of heights as the root mean square distance between the quantiles of standardised
+//! residuals (a Wasserstein distance of order 2). Of two fits: those that the fit files contain.
 //!
-//! # Nulls
-//! Cells of one surface are correlated, so no table of a test for independent values holds (Kolmogorov-Smirnov, F,
-//! chi-squared). The null is simulated: surfaces with the pooled fitted covariance and Gaussian phases, on each side's own
-//! grid and mask, through the same moving average, trimming, correlation and fit (Davison and Hinkley, 1997, section 4.2).
-//! The heights' null also takes the pooled quantiles for its marginal (normal score), so that heavy tails that both sides
-//! share scatter as they do. Where the blocks of a site scatter more than surfaces of the model do, the null of sigma, b and
-//! anisotropy is widened by that factor: a site that is not one surface tells less. Two fits without fields: the null
-//! is normal, with the standard errors that their bootstrapped intervals imply.
+//! # Null distributions
+//! Cells of one surface are correlated, so standard tests for independent values (Kolmogorov-Smirnov, F, chi-squared) do not
+//! apply. The null is simulated: surfaces with the pooled fitted covariance and Gaussian phases, on each side's own
+//! grid and mask, go through the same moving average, trimming, correlation and fit (Davison and Hinkley, 1997, section 4.2).
+//! The null for the heights also uses the pooled quantiles as its marginal (normal score), so that heavy tails common to both
+//! sides are included in its scatter. If the blocks of a site scatter more than surfaces of the model do, the null of sigma, b and
+//! anisotropy is widened by that factor, since a heterogeneous site carries less information. For two fit files, without heights,
+//! the null is normal, with the standard errors implied by their bootstrapped intervals.
 //!
-//! Intervals come from the same simulations, as differences less quantiles of the null's; they hold near
+//! Intervals come from the same simulations, as differences minus quantiles of the null; they hold near
 //! equality, which is where equivalence is decided, and are approximate for surfaces far apart.
 //!
 //! # Split halves
-//! A texture has its site's sigma and b because it was given them: comparing those is circular, and not done here. What a texture
-//! is judged by is what was not fitted, on ground that was not fitted ([`halves`]).
+//! A texture has its site's sigma and b by construction: comparing those would be circular, and is not done here. A texture is
+//! instead judged by statistics that were not fitted, on ground that was not fitted ([`halves`]).
 //!
-//! # Errors
+//! # Error rates
 //! Equality: Holm's (1979) adjustment, so that the probability of any wrong `different` is at most alpha (0.05) over all
-//! quantities. Equivalence: two one-sided tests, each wrong `same` has a probability of at most alpha; that all are the
-//! same together too (intersection-union test; Berger, 1982), so no adjustment is needed for that.
+//! quantities. Equivalence: two one-sided tests, so that each wrong `same` has a probability of at most alpha. The joint answer
+//! `same` has the same error rate (intersection-union test; Berger, 1982) and needs no adjustment.
 //!
 //! # Cost
 //! One fit of each side, and per simulation a surface of at most a million cells and two searches for each side.
@@ -83,16 +83,16 @@ pub struct Quantity {
     pub p: Option<f64>,
     /// The same, adjusted for the number of quantities (Holm).
     pub p_adjusted: Option<f64>,
-    /// Null.
+    /// Null distribution.
     pub null: Option<NullSummary>,
     /// Answer.
     pub answer: Answer,
-    /// Why.
+    /// Reason for the answer, in a sentence.
     pub why: String,
 }
 
 impl Quantity {
-    /// A difference in words: ratios as ratios.
+    /// A difference as text; log ratios are shown as ratios.
     pub fn shown(&self, difference: f64) -> String {
         match self.measure {
             Measure::LogRatio => format!("x{:.3}", libm::exp(difference)),
@@ -100,7 +100,7 @@ impl Quantity {
         }
     }
 
-    /// The differences that count as the same, in words.
+    /// The equivalence bounds as text.
     pub fn bounds_shown(&self) -> String {
         match self.measure {
             Measure::LogRatio => format!("{} to {}", self.shown(-self.bound), self.shown(self.bound)),
@@ -109,7 +109,7 @@ impl Quantity {
     }
 }
 
-/// What a null was made of.
+/// Summary of a null distribution.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NullSummary {
     /// `simulated surfaces`, or `intervals of the fits`.
@@ -120,7 +120,7 @@ pub struct NullSummary {
     pub mean: f64,
     /// Its standard deviation.
     pub standard_deviation: f64,
-    /// Factor by which it was widened because blocks of the sites scatter more than the model does.
+    /// Factor by which it was widened because blocks of the sites scatter more than surfaces of the model do.
     pub widened: f64,
 }
 
@@ -131,7 +131,7 @@ pub struct Comparison {
     pub what: &'static str,
     /// Every quantity.
     pub quantities: Vec<Quantity>,
-    /// `different` when any is, `same` when all are.
+    /// `different` if any quantity is, `same` if all are.
     pub answer: Answer,
     /// The answer in a sentence.
     pub sentence: String,
@@ -143,11 +143,11 @@ pub struct Comparison {
     pub simulations: usize,
     /// Name of the random streams.
     pub streams: String,
-    /// What a reader must know.
+    /// Caveats for the reader.
     pub notes: Vec<String>,
 }
 
-/// Two textures that cannot be compared.
+/// Why two textures cannot be compared.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CompareError {
     /// A parameter is out of its range.
@@ -161,9 +161,9 @@ pub enum CompareError {
         /// Why.
         error: FitError,
     },
-    /// The likelihood of one side has no shape.
+    /// The covariance of one side's lags is singular.
     #[error(
-        "{side}: the covariance of its lags cannot be inverted, so that its parameters have no weights; mask what is no texture, or take a larger outer scale"
+        "{side}: the covariance of the lags is singular, so the fit has no weights; mask what is not texture, or use a larger outer scale"
     )]
     NoLikelihood {
         /// `A` or `B`.

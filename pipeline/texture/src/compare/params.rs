@@ -19,19 +19,21 @@ pub struct CompareParameters {
     pub outer_scale_m: f64,
     /// Significance level at which residuals are trimmed. Default 0.05.
     pub trim: f64,
-    /// Covariance model of both, one term, with `+nugget` where wanted. Default `exponential`.
+    /// Covariance model of both sides: a single term, optionally with `+nugget`. Default `exponential`.
     pub model: String,
     /// Relative difference of sigma that still counts as the same. Default 0.1.
     pub equivalence_sigma: f64,
-    /// Relative difference of b. Default 0.25.
+    /// Relative difference of b that still counts as the same. Default 0.25.
     pub equivalence_range: f64,
-    /// Relative difference of a shape (smoothness, Hurst exponent). Default 0.25.
+    /// Relative difference of a shape (smoothness, Hurst exponent) that still counts as the same. Default 0.25.
     pub equivalence_shape: f64,
-    /// Relative difference of the ratio of axes. Default 0.25.
+    /// Relative difference of the ratio of axes that still counts as the same. Default 0.25.
     pub equivalence_anisotropy: f64,
-    /// Root mean square distance of the quantiles of standardised heights, standard deviations. Default 0.1.
+    /// Root mean square distance of the quantiles of standardised heights that still counts as the same, in standard deviations.
+    /// Default 0.1.
     pub equivalence_heights: f64,
-    /// Root mean square relative difference of a statistic that was not fitted (split halves). Default 0.25.
+    /// Root mean square relative difference of a statistic that was not fitted (split halves) that still counts as the same.
+    /// Default 0.25.
     pub equivalence_agreement: f64,
     /// Simulated surfaces of each side, at least 6 / alpha - 1. Default 199.
     pub simulations: u32,
@@ -82,11 +84,11 @@ impl TryFrom<CompareParameters> for CompareSettings {
             ParameterError::positive(name, bound)?;
         }
         ParameterError::between("alpha", p.alpha, 0.0, 0.5)?;
-        // The least p-value is one over simulations and one; Holm's first step must be able to accept it.
+        // The smallest p-value is 1 / (simulations + 1); it must be able to pass the first step of Holm's adjustment.
         let least = (QUANTITIES_MAX / p.alpha).ceil() - 1.0;
         if f64::from(p.simulations) < least || p.simulations > SIMULATIONS_MAX {
             let message = format!(
-                "is {}; it must lie in [{least}, {SIMULATIONS_MAX}] at alpha = {}: fewer could never find a difference",
+                "is {}; it must lie in [{least}, {SIMULATIONS_MAX}] at alpha = {}: with fewer, no difference could be significant",
                 p.simulations, p.alpha
             );
             return Err(ParameterError::new("simulations", message));
@@ -104,18 +106,19 @@ impl TryFrom<CompareParameters> for CompareSettings {
     }
 }
 
-/// A form whose parameters mean the same on both sides.
+/// A single-term form, whose parameters mean the same on both sides.
 fn one_term(model: &str) -> Result<Form, ParameterError> {
     let refuse = || {
-        let message =
-            format!("is `{model}`; a comparison takes one model of one term, as `exponential` or `matern+nugget`");
+        let message = format!(
+            "is `{model}`; a comparison needs one model with one term, such as `exponential` or `matern+nugget`"
+        );
         ParameterError::new("model", message)
     };
     if model.contains(',') || model.trim() == "auto" {
         return Err(refuse());
     }
     let form = Form::parse(model.trim())?;
-    // An axis is fitted in any case.
+    // Anisotropy is fitted in any case.
     if form.terms().len() == 1 { Ok(form.isotropic()) } else { Err(refuse()) }
 }
 

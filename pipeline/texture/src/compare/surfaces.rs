@@ -1,4 +1,4 @@
-//! Two measured surfaces.
+//! Compares two measured surfaces.
 
 use super::heights::HeightCurve;
 use super::verdict::{Finding, Null, decide, overall};
@@ -14,12 +14,12 @@ use rayon::prelude::*;
 use sastrugi_numeric::{Grid, Streams, sums};
 use std::f64::consts::PI;
 
-/// Block bootstraps of each side, times the four that the fit draws for each.
+/// Block bootstraps of each side; each gives four replicates.
 const BLOCK_DRAWS: usize = 25;
 /// Level of the warning that a model does not describe a side.
 const MISFIT_LEVEL: f64 = 0.01;
 
-/// What is compared of one surface.
+/// The quantities of one surface that are compared.
 #[derive(Clone, Debug)]
 struct Measured {
     /// Search coordinates of the isotropic fit.
@@ -31,17 +31,17 @@ struct Measured {
     misfit_ratio: f64,
 }
 
-/// One side: its data, estimators on rings and on bins by direction, and estimates to start searches from.
+/// One side: its data, estimators on rings and on bins by direction, and the isotropic and anisotropic estimates.
 pub(super) struct Side<'a> {
     rings: Estimator<'a>,
     pub(super) directions: Estimator<'a>,
     round: Estimate,
-    /// The fit with an axis.
+    /// The anisotropic fit.
     pub(super) long: Estimate,
     heights: HeightCurve,
 }
 
-/// Compares two DEMs in metres with NaN where there is no data. Their grids may differ; a side is simulated on its own.
+/// Compares two DEMs in metres with NaN where there is no data. Their grids may differ; each side is simulated on its own grid.
 ///
 /// # Errors
 /// A side that cannot be fitted (see [`FitError`]).
@@ -83,7 +83,7 @@ pub(super) fn case<'a>(
     Case::new(dem, &settings.fit).map_err(|error| CompareError::Side { side, error })
 }
 
-/// The weight of A: its share of the area that was correlated.
+/// The weight of A: its share of the area used for the covariances.
 fn weight(cases: &[Case; 2]) -> f64 {
     let [a, b] = cases.each_ref().map(|c| c.survey.kept as f64 * c.geometry.cell[0] * c.geometry.cell[1]);
     a / (a + b)
@@ -124,8 +124,8 @@ impl<'a> Side<'a> {
         }
     }
 
-    /// Surfaces of a covariance on this side's grid and mask, measured as the side was. A part's deviations are brought to
-    /// the size of the whole.
+    /// Surfaces of a covariance on this side's grid and mask, measured as the side was. Deviations on a part are scaled to those of
+    /// the complete raster.
     fn simulated(&self, covariance: &Covariance, count: usize, streams: &Streams) -> Vec<Measured> {
         let case = self.rings.case;
         let part = Part::of(case);
@@ -173,7 +173,7 @@ impl<'a> Side<'a> {
     }
 }
 
-/// The fit with an axis on bins by direction, from the isotropic one there.
+/// The anisotropic fit on bins by direction, starting from the isotropic one there.
 fn lengthened(directions: &Estimator, round: &Estimate) -> Option<Estimate> {
     let (sigma_m, range_m) = (round.covariance.sigma_m(), round.covariance.range_m());
     let near = directions.fit(&round.form, sigma_m, range_m);
@@ -185,7 +185,7 @@ fn lengthened(directions: &Estimator, round: &Estimate) -> Option<Estimate> {
     Some(Estimate { covariance, at: end.at, ..from })
 }
 
-/// An estimate at a covariance, with the weights that belong to it, to fit its surfaces from.
+/// An estimate at a given covariance, with that covariance's weights, from which to fit simulated surfaces.
 fn centred(estimator: &Estimator, form: &Form, covariance: &Covariance) -> Estimate {
     let isotropic = !form.is_anisotropic();
     let round = Covariance { ratio: 1.0, azimuth_deg: 0.0, ..scaled(covariance, covariance.ratio.sqrt()) };
@@ -197,7 +197,7 @@ fn centred(estimator: &Estimator, form: &Form, covariance: &Covariance) -> Estim
     Estimate { form: form.clone(), covariance, at, steps: 0, likelihood }
 }
 
-/// Ranges times a factor, where the model has one.
+/// Multiplies ranges by a factor, where the model has a range.
 fn scaled(covariance: &Covariance, factor: f64) -> Covariance {
     let mut scaled = covariance.clone();
     for term in &mut scaled.structures {
@@ -206,12 +206,12 @@ fn scaled(covariance: &Covariance, factor: f64) -> Covariance {
     scaled
 }
 
-/// The last two coordinates of a form with an axis.
+/// The elongation: the last two coordinates of an anisotropic form.
 fn elongation(at: &[f64]) -> [f64; 2] {
     [at[at.len() - 2], at[at.len() - 1]]
 }
 
-/// The covariance between both sides: geometric means of sigma, b and shape, means of nugget and elongation.
+/// The pooled covariance of both sides: geometric means of sigma, b and shape, arithmetic means of nugget and elongation.
 fn pool(sides: &[Side; 2], measured: &[Measured; 2], share: f64) -> Covariance {
     let [a, b] = sides.each_ref().map(|s| &s.round.covariance);
     let mean = |x: f64, y: f64| share * x + (1.0 - share) * y;
@@ -245,8 +245,8 @@ fn elongation_spread(all: &[[f64; 2]]) -> f64 {
 struct Widening {
     coordinates: Vec<f64>,
     elongation: f64,
-    /// Sides with too few blocks to tell.
-    untold: bool,
+    /// Whether a side has too few blocks for this.
+    unknown: bool,
 }
 
 impl Widening {
@@ -258,8 +258,8 @@ impl Widening {
         });
         let named = streams.child("blocks");
         let blocks = [("a", 0), ("b", 1)].map(|(name, k)| sides[k].block_scatter(&named.child(name)));
-        let untold = blocks.iter().any(Option::is_none);
-        // Without blocks a side scatters as the model says.
+        let unknown = blocks.iter().any(Option::is_none);
+        // A side without blocks is assumed to scatter like the model.
         let found = [0, 1].map(|k| blocks[k].clone().unwrap_or_else(|| models[k].clone()));
         let factor = |f: [f64; 2], m: [f64; 2]| {
             let ratio = (f[0] * f[0] + f[1] * f[1]).sqrt() / (m[0] * m[0] + m[1] * m[1]).sqrt();
@@ -269,7 +269,7 @@ impl Widening {
         Self {
             coordinates: (0..models[0].0.len()).map(coordinate).collect(),
             elongation: factor([found[0].1, found[1].1], [models[0].1, models[1].1]),
-            untold,
+            unknown,
         }
     }
 }
@@ -317,7 +317,7 @@ fn findings(
         known: Ok((apart(&measured[0], &measured[1]), Null::distances(draws, widened.elongation))),
         words: elongation_words(one, other),
     });
-    // A part's heights scatter more than the whole's.
+    // The heights of a part scatter more than those of the complete raster.
     let scale = sides.each_ref().map(|s| Part::of(s.rings.case).scale);
     let scale = scale[0].max(scale[1]);
     let distance = |(a, b): (&Measured, &Measured)| {
@@ -333,7 +333,7 @@ fn findings(
             Null::distances(pairs().map(distance).collect(), 1.0),
         )),
         words: format!(
-            "the distance of the height distributions (skewness {:.2} and {:.2}), in standard deviations,",
+            "the distance between the height distributions (skewness {:.2} and {:.2}), in standard deviations,",
             measured[0].heights.skewness(),
             measured[1].heights.skewness()
         ),
@@ -341,10 +341,10 @@ fn findings(
     all
 }
 
-/// The axes of both sides in words.
+/// The elongations of both sides as text.
 pub fn elongation_words(a: &Covariance, b: &Covariance) -> String {
     format!(
-        "the distance of the elongations (ratio {:.2} along {:.0} degrees, {:.2} along {:.0} degrees)",
+        "the distance between the elongations (ratio {:.2} along {:.0} degrees, {:.2} along {:.0} degrees)",
         a.ratio, a.azimuth_deg, b.ratio, b.azimuth_deg
     )
 }
@@ -356,24 +356,23 @@ fn notes(measured: &[Measured; 2], nulls: &[Vec<Measured>; 2], form: &Form, wide
         let p = upper_p(own.misfit_ratio, &ratios);
         if p <= MISFIT_LEVEL {
             notes.push(format!(
-                "{side}: the {} model does not describe its residual (p = {p:.3}); sigma and b are then those of this window \
-                 and model, and their null is too narrow or too wide",
+                "{side}: the {} model does not describe the residual (p = {p:.3}); sigma and b therefore depend on window and \
+                 model, and their null distribution is too narrow or too wide",
                 form.name()
             ));
         }
     }
     if form.has_nugget() {
-        notes.push("the nugget is fitted, and not compared".to_owned());
+        notes.push("the nugget is fitted but not compared".to_owned());
     }
-    if widened.untold {
-        notes.push(
-            "a side has fewer than nine blocks of two windows: whether it is one site was not looked at".to_owned(),
-        );
+    if widened.unknown {
+        notes.push("a side has fewer than nine blocks of two windows, so its stationarity was not examined".to_owned());
     }
     let most = widened.coordinates.iter().copied().fold(widened.elongation, f64::max);
     if most > 1.5 {
         notes.push(format!(
-            "blocks of the sites scatter up to {most:.1} times as much as surfaces of the model; the nulls were widened by that"
+            "blocks of the sites scatter up to {most:.1} times as much as surfaces of the model; the null distributions were widened \
+             accordingly"
         ));
     }
     notes

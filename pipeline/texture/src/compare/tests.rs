@@ -36,7 +36,7 @@ fn answer(comparison: &Comparison, name: &str) -> Answer {
     comparison.quantities.iter().find(|q| q.name == name).unwrap().answer
 }
 
-/// A surface and one of 1.3 times its heights: sigma is different; the other three quantities are those of one surface.
+/// Two surfaces of one covariance, one with 1.3 times the heights: sigma is different.
 #[test]
 fn val_a_taller_surface_is_different() {
     let covariance = exponential(0.1, 0.12);
@@ -47,10 +47,10 @@ fn val_a_taller_surface_is_different() {
     assert!(comparison.differs() && comparison.sentence.contains("sigma_m"));
 }
 
-/// A surface against itself is the same in everything that its own size can show, and never different.
+/// A surface compared with itself has the same sigma, differs in nothing, and has no difference in any quantity.
 #[test]
 #[ignore = "slow: ./test --full"]
-fn val_a_surface_is_like_itself() {
+fn val_a_surface_equals_itself() {
     let a = surface(&exponential(0.1, 0.12), 200, "self");
     let comparison = compared(&a, &a, 119, "self");
     assert_eq!(answer(&comparison, "sigma_m"), Answer::Same, "{comparison:#?}");
@@ -58,7 +58,7 @@ fn val_a_surface_is_like_itself() {
     assert!(comparison.quantities.iter().all(|q| q.difference == Some(0.0)));
 }
 
-/// Different cells, shapes and masks on the two sides are no difference of the surfaces.
+/// Different cells, shapes and masks on the two sides do not make the surfaces different.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn val_grids_may_differ() {
@@ -74,10 +74,10 @@ fn val_grids_may_differ() {
     assert!(!comparison.differs(), "{comparison:#?}");
 }
 
-/// Null: both sides are one exponential. 60 pairs of 128 x 128 cells, 119 simulations each; a pair has any wrong `different`
-/// with probability 0.05 at most, so that more than 11 of 60 has a false-alarm probability of 3e-5 (binomial). A null that
-/// took cells as independent would call nearly all pairs different. Power: 1.3 times the sigma is found in at least 40 of 60,
-/// and its interval of sigma holds 1.3 in all but 12 of 60 (90 % nominal; 4e-3 were it exact, and
+/// Null: both sides have the same exponential covariance. 60 pairs of 128 x 128 cells, 119 simulations each; a pair has any wrong
+/// `different` with probability at most 0.05, so that more than 11 of 60 has a false-alarm probability of 3e-5 (binomial). A null that
+/// treated cells as independent would call nearly all pairs different. Power: 1.3 times the sigma is detected in at least 40 of 60,
+/// and the interval of sigma covers 1.3 in all but 12 of 60 (90 % nominal; false alarm 4e-3 if it were exact, and
 /// blocks only widen it). Measured with 99 simulations: 2 of 60, 60 of 60, 54 of 60.
 #[test]
 #[ignore = "slow: ./test --full"]
@@ -110,8 +110,8 @@ fn compared_fits(a: &FitFile, b: &FitFile) -> Comparison {
     fits(a, b, &settings(119), &Streams::for_seed(3, "compare-test")).unwrap()
 }
 
-/// By hand: intervals of 0.95 and factors of 1.0198 (2 % each way) are standard errors of 0.01; the difference of two has
-/// 0.01414, so that a ratio of 1.04 (0.0392) is 2.77 of them (p = 0.0056), and its 90 % interval is exp(0.0392 +- 0.02326).
+/// By hand: 95 % intervals with factors of 1.0198 (2 % each way) mean standard errors of 0.01. The difference of two has
+/// 0.01414, so that a ratio of 1.04 (0.0392) is 2.77 standard errors (p = 0.0056), and its 90 % interval is exp(0.0392 +- 0.02326).
 #[test]
 fn val_fits_by_hand() {
     let e = libm::exp(1.959_964 * 0.01);
@@ -129,7 +129,7 @@ fn val_fits_by_hand() {
     assert_eq!(compared_fits(&a, &fit_file("exponential", &[sigma(0.13), range])).answer, Answer::Different);
 }
 
-/// What two files do not hold is `cannot tell`, with the reason.
+/// Quantities that two files lack are `cannot tell`, with the reason.
 #[test]
 fn val_fits_say_what_they_lack() {
     let a = fit_file("exponential", &[("sigma_m", 0.1, [0.09, 0.11]), ("range_m", 0.3, [0.2, 0.4])]);
@@ -137,7 +137,7 @@ fn val_fits_say_what_they_lack() {
     let why = |c: &Comparison, k: usize| c.quantities[k].why.clone();
     let comparison = compared_fits(&a, &bare);
     assert_eq!(comparison.answer, Answer::CannotTell);
-    assert!(why(&comparison, 0).contains("B holds no interval of sigma_m"), "{comparison:?}");
+    assert!(why(&comparison, 0).contains("B has no interval of sigma_m"), "{comparison:?}");
     assert!(why(&comparison, 2).contains("anisotropic:exponential"));
     assert!(why(&comparison, 3).contains("no heights"));
     let mut open = a.clone();
@@ -164,28 +164,28 @@ fn oblong(covariance: &Covariance, name: &str) -> Grid {
     Grid::new(Geometry::square(100, 200, CELL_M), values)
 }
 
-fn half_answers(site: &Grid, name: &str) -> Comparison {
+fn compared_halves(site: &Grid, name: &str) -> Comparison {
     halves(site, &settings(119), &Streams::for_seed(2, "compare-test").child(name)).unwrap()
 }
 
-/// A site that is no normal surface: heights with a square added keep a covariance of the same kind and lose symmetry. What was
-/// not fitted tells; sigma and b are no part of it.
+/// A site that is not a normal surface: adding a squared term to the heights keeps a covariance of the same kind but breaks the symmetry.
+/// The statistics that were not fitted detect it; sigma and b are not among them.
 #[test]
-fn val_a_texture_is_told_from_a_site_that_is_not_normal() {
+fn val_a_texture_differs_from_a_site_that_is_not_normal() {
     let site = oblong(&exponential(0.1, 0.2), "squared").map(|z| z + 4.0 * z * z);
-    let comparison = half_answers(&site, "squared");
+    let comparison = compared_halves(&site, "squared");
     assert!(comparison.differs(), "{comparison:#?}");
     assert!(comparison.quantities.iter().all(|q| q.name != "sigma_m" && q.name != "range_m"));
 }
 
 /// Null: sites are normal surfaces of the fitted kind. 40 sites, 119 simulations; any wrong `different` has a probability of at most
-/// 0.05 a site: more than 9 of 40 has a false-alarm probability of 5e-5 (binomial).
+/// 0.05 per site: more than 9 of 40 has a false-alarm probability of 5e-5 (binomial).
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_split_halves_of_a_normal_site_agree() {
     let covariance = exponential(0.1, 0.12);
     let wrong =
-        (0..40).filter(|k| half_answers(&oblong(&covariance, &format!("h{k}")), &format!("h{k}")).differs()).count();
+        (0..40).filter(|k| compared_halves(&oblong(&covariance, &format!("h{k}")), &format!("h{k}")).differs()).count();
     println!("wrong {wrong} of 40");
     assert!(wrong <= 9, "{wrong}");
 }

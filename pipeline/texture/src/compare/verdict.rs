@@ -1,11 +1,11 @@
-//! From a difference and its null to an answer.
+//! Derives an answer from a difference and its null distribution.
 
 use super::{Answer, Comparison, Measure, NullSummary, Quantity};
 use crate::fit::resampling::upper_p;
 use sastrugi_numeric::sums;
 use sastrugi_statistics::holm;
 
-/// Draws of a difference when both sides are the same.
+/// Draws of a difference under the null hypothesis that both sides are the same.
 pub struct Null {
     pub kind: &'static str,
     pub draws: Vec<f64>,
@@ -13,7 +13,7 @@ pub struct Null {
 }
 
 impl Null {
-    /// Signed draws, widened about their middle.
+    /// Signed draws, widened about their median.
     pub fn signed(draws: Vec<f64>, widened: f64) -> Self {
         let middle = sums::median(&draws);
         let draws = draws.into_iter().map(|d| middle + widened * (d - middle)).collect();
@@ -42,7 +42,7 @@ impl Null {
     }
 }
 
-/// What is known of one quantity before the family is looked at.
+/// One quantity before adjustment for the number of quantities.
 pub struct Finding {
     pub name: String,
     pub values: [Option<f64>; 2],
@@ -51,7 +51,7 @@ pub struct Finding {
     pub bound: f64,
     /// Difference and null, or why there is none.
     pub known: Result<(f64, Null), String>,
-    /// What a sentence calls the values.
+    /// Subject of the sentence that states the result.
     pub words: String,
 }
 
@@ -63,15 +63,15 @@ pub fn decide(findings: Vec<Finding>, alpha: f64) -> Vec<Quantity> {
     findings.into_iter().zip(p.iter().zip(&adjusted)).map(|(f, (&p, &q))| answer(f, p, q, alpha)).collect()
 }
 
-/// Share of draws at least as far out: signed ones from their middle, which leaves smaller p-values to few draws than
-/// doubling the smaller tail does.
+/// Share of draws at least as extreme. Signed draws are measured from their median, which allows smaller p-values with few draws
+/// than doubling the smaller tail does.
 fn p_value(measure: Measure, difference: f64, null: &Null) -> f64 {
     let middle = if measure == Measure::Distance { 0.0 } else { sums::median(&null.draws) };
     let sizes: Vec<f64> = null.draws.iter().map(|d| (d - middle).abs()).collect();
     upper_p((difference - middle).abs(), &sizes)
 }
 
-/// Interval of the true difference at level `1 - 2 alpha`; of a distance by the triangle inequality, each end at `1 - alpha`.
+/// Interval of the true difference at level `1 - 2 alpha`; for a distance, by the triangle inequality, each end at `1 - alpha`.
 fn interval(measure: Measure, difference: f64, null: &Null, alpha: f64) -> [f64; 2] {
     match measure {
         Measure::LogRatio => [difference - null.quantile(1.0 - alpha), difference - null.quantile(alpha)],
@@ -122,7 +122,7 @@ fn answer(finding: Finding, p: f64, adjusted: f64, alpha: f64) -> Quantity {
     }
 }
 
-/// What an answer rests on.
+/// The evidence for an answer.
 struct Reason {
     measure: Measure,
     answer: Answer,
@@ -150,25 +150,25 @@ impl Reason {
         };
         let p = format!("p = {:.3}, {:.3} after Holm", self.p, self.adjusted);
         match self.answer {
-            Answer::Same if self.adjusted <= self.alpha => format!("{found}: inside {bounds}, though not equal ({p})"),
-            Answer::Same => format!("{found}: inside {bounds}"),
+            Answer::Same if self.adjusted <= self.alpha => format!("{found}: within {bounds}, though not equal ({p})"),
+            Answer::Same => format!("{found}: within {bounds}"),
             Answer::Different => format!("{found}: equality is ruled out ({p})"),
             Answer::CannotTell => {
-                format!("{found}: this reaches beyond {bounds}, and equality is not ruled out ({p})")
+                format!("{found}: the interval extends beyond {bounds}, and equality is not ruled out ({p})")
             }
         }
     }
 }
 
-/// The whole from its parts: `different` when any is, `same` when all are.
+/// The overall answer: `different` if any quantity is, `same` if all are.
 pub fn overall(quantities: &[Quantity]) -> (Answer, String) {
     let named = |answer: Answer| {
         let names: Vec<&str> = quantities.iter().filter(|q| q.answer == answer).map(|q| q.name.as_str()).collect();
         names.join(", ")
     };
     let (same, different, open) = (named(Answer::Same), named(Answer::Different), named(Answer::CannotTell));
-    let rest = if open.is_empty() { String::new() } else { format!("; the data cannot tell {open}") };
-    let agree = if same.is_empty() { String::new() } else { format!("; the same within bounds in {same}") };
+    let rest = if open.is_empty() { String::new() } else { format!("; the data cannot decide {open}") };
+    let agree = if same.is_empty() { String::new() } else { format!("; they are the same within bounds in {same}") };
     match (different.is_empty(), open.is_empty()) {
         (false, _) => (Answer::Different, format!("A and B differ in {different}{agree}{rest}")),
         (true, true) => (Answer::Same, format!("A and B are the same within the stated bounds in {same}")),
@@ -179,8 +179,72 @@ pub fn overall(quantities: &[Quantity]) -> (Answer, String) {
 }
 
 impl Comparison {
-    /// True when any quantity is different.
+    /// True if any quantity is different.
     pub fn differs(&self) -> bool {
         self.answer == Answer::Different
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn null(draws: &[f64]) -> Null {
+        Null { kind: "by hand", draws: draws.to_vec(), widened: 1.0 }
+    }
+
+    fn finding(measure: Measure, bound: f64, known: Result<(f64, Null), String>) -> Finding {
+        Finding { name: "x".to_owned(), values: [None, None], measure, bound, known, words: "the x".to_owned() }
+    }
+
+    /// By hand. Signed draws 1 to 5 have the median 3: a difference of 4.5 is 1.5 from it, which 1 and 5 exceed: (2 + 1) / 6. Of distances 1 to
+    /// 5, 3.5 is exceeded by 4 and 5. Quantiles at 25 and 75 % are 2 and 4.
+    #[test]
+    fn val_p_and_interval_by_hand() {
+        let null = null(&[4.0, 1.0, 5.0, 2.0, 3.0]);
+        assert_eq!(p_value(Measure::LogRatio, 4.5, &null), 3.0 / 6.0);
+        assert_eq!(p_value(Measure::LogRatio, 1.5, &null), 3.0 / 6.0);
+        assert_eq!(p_value(Measure::Distance, 3.5, &null), 3.0 / 6.0);
+        assert_eq!(p_value(Measure::Distance, 9.0, &null), 1.0 / 6.0);
+        assert_eq!(interval(Measure::LogRatio, 10.0, &null, 0.25), [6.0, 8.0]);
+        assert_eq!(interval(Measure::Distance, 10.0, &null, 0.25), [6.0, 14.0]);
+        assert_eq!(interval(Measure::Distance, 1.0, &null, 0.25), [0.0, 5.0]);
+    }
+
+    /// Widening keeps the median of signed draws and scales their distances from it; distances are scaled themselves.
+    #[test]
+    fn val_widening() {
+        assert_eq!(Null::signed(vec![1.0, 2.0, 4.0], 3.0).draws, [-1.0, 2.0, 8.0]);
+        assert_eq!(Null::distances(vec![1.0, 2.0, 4.0], 3.0).draws, [3.0, 6.0, 12.0]);
+    }
+
+    /// Each answer by a difference of 0.3 with a null of 99 draws between -0.1 and 0.1: `same` if the bound is wide, `different` if it is
+    /// narrow, `cannot tell` within the null and a narrow bound, or if there is no null. p = 1/100 is adjusted for the three known.
+    #[test]
+    fn val_answers() {
+        let draws: Vec<f64> = (-49..=49).map(|k| 0.1 * f64::from(k) / 49.0).collect();
+        let quantities = decide(
+            vec![
+                finding(Measure::LogRatio, 0.5, Ok((0.3, null(&draws)))),
+                finding(Measure::LogRatio, 0.05, Ok((0.3, null(&draws)))),
+                finding(Measure::LogRatio, 0.05, Ok((0.02, null(&draws)))),
+                finding(Measure::LogRatio, 0.05, Err("no interval".to_owned())),
+            ],
+            0.05,
+        );
+        let answers: Vec<Answer> = quantities.iter().map(|q| q.answer).collect();
+        assert_eq!(answers, [Answer::Same, Answer::Different, Answer::CannotTell, Answer::CannotTell]);
+        assert_eq!((quantities[0].p, quantities[0].p_adjusted), (Some(0.01), Some(0.03)));
+        assert!(quantities[3].p.is_none() && quantities[3].why == "no interval");
+        assert!(quantities[1].why.contains("equality is ruled out") && quantities[2].why.contains("extends beyond"));
+        assert_eq!(overall(&quantities).0, Answer::Different);
+        assert_eq!((overall(&quantities[..1]).0, overall(&quantities[2..]).0), (Answer::Same, Answer::CannotTell));
+        // An upper end just beyond the bound is not within it.
+        let reach = quantities[2].interval.unwrap()[1];
+        let with_bound = |bound: f64| {
+            let one = finding(Measure::LogRatio, bound, Ok((0.02, null(&draws))));
+            decide(vec![one], 0.05)[0].answer
+        };
+        assert_eq!((with_bound(reach), with_bound(0.999 * reach)), (Answer::Same, Answer::CannotTell));
     }
 }

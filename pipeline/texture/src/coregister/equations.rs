@@ -3,13 +3,12 @@
 use crate::fit::least_squares::Cholesky;
 use sastrugi_numeric::sums;
 
-/// Unknowns: two offsets, raise, two tilts.
+/// Number of unknowns: two offsets, raise, two tilts.
 pub const UNKNOWNS: usize = 5;
-/// Unknowns whose equations are closer to dependent than this cannot be told apart: smallest eigenvalue of the normal
-/// equations with unit diagonal.
+/// Smallest eigenvalue of the normal equations with unit diagonal below which the unknowns count as dependent.
 const DEPENDENT: f64 = 1e-9;
 
-/// Sums over cells: `sum w z z'`, `sum w z b'` (row-major), `sum w z d`, and the sum of the derivatives of `w d` by d.
+/// Sums over cells: `sum w z z'`, `sum w z b'` (row-major), `sum w z d`, and the sum of the derivatives of `w d` with respect to d.
 #[derive(Clone, Debug)]
 pub struct Equations(pub [f64; Self::LEN]);
 
@@ -38,7 +37,7 @@ impl Equations {
         total
     }
 
-    /// These less others.
+    /// `self` minus `others`.
     pub fn without(&self, others: &Self) -> Self {
         let mut rest = self.clone();
         rest.0.iter_mut().zip(&others.0).for_each(|(rest, other)| *rest -= other);
@@ -50,8 +49,8 @@ impl Equations {
         self.0[2 * (UNKNOWNS + 1)]
     }
 
-    /// By how much less the score follows the unknowns than with fixed weights: mean derivative of `w d` over mean w, as Huber
-    /// (1981), section 7.6, has it.
+    /// Sensitivity of the score to the unknowns relative to fixed weights: mean derivative of `w d` over mean w (Huber, 1981,
+    /// section 7.6).
     pub fn slackening(&self) -> f64 {
         self.0[Self::DERIVATIVES] / self.weight()
     }
@@ -65,7 +64,7 @@ impl Equations {
         &self.0[2 * Self::SQUARE + first..Self::DERIVATIVES]
     }
 
-    /// Gauss and Newton's step of the unknowns from `first` on; `None` when they cannot be told apart.
+    /// Gauss-Newton step of the unknowns from `first` on; `None` if they are not identifiable.
     pub fn downhill(&self, first: usize) -> Option<Vec<f64>> {
         let n = UNKNOWNS - first;
         let normal = self.square(0, first);
@@ -76,13 +75,13 @@ impl Equations {
         Some(Cholesky::new(&normal, n)?.solve(self.score(first)))
     }
 
-    /// Step of the unknowns from `first` on with the slopes of both; `None` when their products are singular.
+    /// Step of the unknowns from `first` on with the slopes of both DEMs; `None` if the matrix of their products is singular.
     pub fn straight(&self, first: usize) -> Option<Vec<f64>> {
         solve(self.square(Self::SQUARE, first), self.score(first).to_vec())
     }
 }
 
-/// Solution of `m x = v` by elimination with row pivots; `None` when m is singular.
+/// Solution of `m x = v` by elimination with row pivoting; `None` if m is singular.
 fn solve(mut m: Vec<f64>, mut v: Vec<f64>) -> Option<Vec<f64>> {
     let n = v.len();
     for k in 0..n {

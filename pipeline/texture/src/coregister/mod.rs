@@ -1,32 +1,32 @@
-//! Co-registration of one DEM to another, and their difference (snow depth: snow-on less snow-off).
+//! Co-registration of one DEM to another, and their difference (snow depth: snow-on minus snow-off).
 //!
-//! # What
-//! B is moved horizontally by (e, n), raised and tilted so that `A(x, y) - B(x - e, y - n) - w - p x - q y` is as small as
-//! can be, x and y from the centre of A. A is left where it is, and the difference is taken on its cells, B bilinear.
+//! # Model
+//! B is shifted horizontally by (e, n), raised by w and tilted by (p, q) to minimise `A(x, y) - B(x - e, y - n) - w - p x - q y`,
+//! x and y from the centre of A. A stays in place, and the difference is computed on its cells, with B interpolated bilinearly.
 //!
-//! # How
-//! Nuth and Kääb (2011), Eq. 2: B displaced by (u, v) leaves `dh / tan s = -u sin a - v cos a + w / tan s`, s slope and a
-//! aspect of the terrain: a cosine of the aspect. The horizontal shift is the amplitude and phase of that cosine; B is moved and the
-//! fit repeated until it moves no more.
+//! # Method
+//! Nuth and Kääb (2011), Eq. 2: if B is displaced by (u, v), `dh / tan s = -u sin a - v cos a + w / tan s`, s slope and a
+//! aspect of the terrain: a cosine of the aspect. The horizontal shift is the amplitude and phase of that cosine; B is shifted and
+//! the fit repeated until convergence.
 //!
-//! Where we depart: Nuth and Kääb fit medians of `dh / tan s` by aspect and leave out slopes below 5 degrees, where the quotient
-//! is noise. Noise is in the heights, so that the quotient's weight is `tan^2 s`; with this weight the cosine becomes
-//! `dh = u dz/dx + v dz/dy + w`, no slope is left out, and raise and tilt (`+ p x + q y`), which a hillside's
-//! slope would otherwise be taken for, are found in the same equations. Outliers (trees, cars, avalanches) count little: Tukey's
-//! biweight at 4.685 NMAD (Holland and Welsch, 1977) on `dh`; and cells are left out where the slopes of A and B disagree, since a
-//! tree on either falsifies the slopes of cells beside it that are right themselves. Slopes are A's, by central differences; their
-//! noise does not bias the shift, because that of a symmetric difference does not correlate with the height at its centre.
+//! Departures: Nuth and Kääb fit medians of `dh / tan s` by aspect and leave out slopes below 5 degrees, where the quotient
+//! is noise. The noise is in the heights, so that the quotient's weight is `tan^2 s`; with this weight the cosine becomes
+//! `dh = u dz/dx + v dz/dy + w`, no slope is left out, and raise and tilt (`+ p x + q y`), which could otherwise be mistaken for
+//! the slope of a hillside, are found by the same equations. Outliers (trees, cars, avalanches) are down-weighted by Tukey's
+//! biweight at 4.685 NMAD (Holland and Welsch, 1977) on `dh`. Cells are also left out where the slopes of A and B disagree, since a
+//! tree on either falsifies the slopes of neighbouring cells whose own heights are right. Slopes are A's, by central differences; their
+//! noise does not bias the shift, because that of a symmetric difference is uncorrelated with the height at its centre.
 //!
 //! # Uncertainty
 //! Standard errors are those of a delete-one-block jackknife (`uncertainty.rs`): residuals of neighbouring cells are correlated, and
-//! errors that took them for independent would be far too small. [`gained`](Coregistration::gained) says whether the shift is more
-//! than they explain; from a cell on NMAD must fall as well, which a shift that is wrong by more than the relief's range would not
-//! bring about. Within a cell NMAD proves nothing: B read between its cells has its noise averaged, so that NMAD falls without reason
-//! where B should be read at its cells, and rises at the right shift where B lay between them.
+//! standard errors that assumed independence would be far too small. [`gained`](Coregistration::gained) states whether the shift is
+//! larger than they explain. For a shift of one cell or more NMAD must decrease as well, which it would not if the shift were wrong by
+//! more than the range of the relief. Below one cell NMAD proves nothing: interpolating B between its cells averages its noise, so that
+//! NMAD decreases for no good reason if B should be read at its cells, and increases at the right shift if B lay between them.
 //!
-//! The fit starts from B where it is and finds shifts up to about the range of the terrain's relief; `nmad_after_m` says whether it
-//! did. On ground without slopes in two directions B is raised and tilted alone. Without stable terrain `raise_m` and
-//! `tilt` take the mean depth and its trend with them: the difference keeps the texture of the snow, not its mean depth.
+//! The fit starts from the position of B as given and finds shifts up to about the range of the terrain's relief; `nmad_after_m` shows
+//! whether it did. On ground without slopes in two directions B is only raised and tilted. Without stable terrain `raise_m` and
+//! `tilt` absorb the mean depth and its trend: the difference keeps the texture of the snow, not its mean depth.
 //!
 //! # Cost
 //! Some 100 operations per cell and round, usually under 10 rounds; 80 bytes per cell of A.
@@ -45,26 +45,26 @@ use uncertainty::Uncertainty;
 const CELLS_MIN: usize = 100;
 /// Most rounds.
 const ROUNDS: u32 = 50;
-/// A round that moves B by less than this share of a cell is the last.
+/// Converged when a round moves B by less than this share of a cell.
 const CONVERGED_CELLS: f64 = 0.005;
-/// A shift with a larger probability where none is needed has gained nothing.
+/// Largest p-value of a significant shift.
 pub const SIGNIFICANCE: f64 = 0.05;
 
 /// A difference of DEMs.
 #[derive(Clone, Debug)]
 pub struct Coregistered {
-    /// A less B as moved, on A's grid, m; NaN where either has no data.
+    /// A minus B as moved, on A's grid, m; NaN where either has no data.
     pub difference: Grid,
     /// How B was moved.
     pub coregistration: Coregistration,
 }
 
-/// DEMs that cannot be co-registered.
+/// Why two DEMs cannot be co-registered.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum CoregisterError {
-    /// They lie apart.
+    /// They do not overlap.
     #[error(
-        "the DEMs do not overlap: the first covers {a:?}, the second {b:?} (x0, y0, x1, y1); both must be in one coordinate system"
+        "the DEMs do not overlap: the first covers {a:?}, the second {b:?} (x0, y0, x1, y1); both must use the same coordinate system"
     )]
     Apart {
         /// Rectangle of the first, m.
@@ -72,19 +72,41 @@ pub enum CoregisterError {
         /// Rectangle of the second, m.
         b: [f64; 4],
     },
-    /// They have too little in common.
-    #[error("the DEMs have {cells} cells with data in common; a co-registration needs at least {CELLS_MIN}")]
+    /// Too few common cells.
+    #[error("the DEMs have only {cells} cells with data in common; co-registration needs at least {CELLS_MIN}")]
     TooFewCells {
         /// Common cells.
         cells: usize,
     },
-    /// Data is too scattered for slopes, or lies on one line.
+    /// Data is too sparse for slopes, or lies on one line.
     #[error("no plane can be fitted to the difference: too few common cells have data on all four sides")]
     Scattered,
 }
 
-/// Co-registers B to A and takes the difference. Both in metres and in one coordinate system; cells, origins and extents may
-/// differ.
+/// Co-registers B to A and computes the difference. Both must be in metres and in the same coordinate system; cells, origins and
+/// extents may differ.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_texture::coregister::coregister;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // Smooth ground with slopes in all directions, and the same ground 0.4 m too far east, 0.2 m too far south and 5 m too high.
+/// let ground = |x: f64, y: f64| 2.0 * (0.3 * x).sin() + 1.5 * (0.25 * y + 0.1 * x).cos();
+/// let g = Geometry::square(60, 60, 1.0);
+/// let grid = |height: &dyn Fn(f64, f64) -> f64| {
+///     Grid::new(g, (0..g.len()).map(|k| height(g.x(k % 60), g.y(k / 60))).collect())
+/// };
+/// let a = grid(&ground);
+/// let b = grid(&|x, y| ground(x - 0.4, y + 0.2) + 5.0);
+/// let found = coregister(&a, &b)?.coregistration;
+/// let shift = found.shift_m.unwrap();
+/// assert!((shift[0] + 0.4).abs() < 0.05 && (shift[1] - 0.2).abs() < 0.05);
+/// assert!((found.raise_m + 5.0).abs() < 0.05);
+/// assert!(found.converged && found.nmad_after_m < found.nmad_before_m);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
 /// See [`CoregisterError`].
@@ -133,11 +155,11 @@ pub fn coregister(a: &Grid, b: &Grid) -> Result<Coregistered, CoregisterError> {
     Ok(Coregistered { difference: Grid::new(a.geometry, difference), coregistration })
 }
 
-/// A less B as it was moved when it was co-registered to other cells of the same raster, as those of stable terrain; on A's grid, m.
+/// A minus B, with B moved by a co-registration to other cells of the same raster, such as stable terrain; on A's grid, m.
 pub fn difference(a: &Grid, b: &Grid, coregistration: &Coregistration) -> Grid {
     let offset = coregistration.shift_m.map_or([0.0; 2], |shift| shift.map(|s| -s));
     let terms = Terms { offset, raise: coregistration.raise_m, tilt: coregistration.tilt };
-    Grid::new(a.geometry, rounds::less(a, b, &terms))
+    Grid::new(a.geometry, rounds::minus(a, b, &terms))
 }
 
 /// Where the search for a shift ended.
@@ -148,7 +170,7 @@ struct Search {
     converged: bool,
 }
 
-/// Rounds from `start` until B moves by less than `resolution_m`; `None` where the ground has no slopes in two directions.
+/// Iterates from `start` until B moves by less than `resolution_m`; `None` if the ground has no slopes in two directions.
 fn shifted(overlay: &Overlay<'_>, start: Terms, resolution_m: f64) -> Option<Search> {
     let mut search = Search { terms: overlay.round(&start)?, iterations: 1, converged: false };
     let mut before = start;
@@ -158,7 +180,7 @@ fn shifted(overlay: &Overlay<'_>, start: Terms, resolution_m: f64) -> Option<Sea
         if search.converged || search.iterations == ROUNDS {
             return Some(search);
         }
-        // B may have been moved to where nothing is left in common.
+        // B may have been moved to where the two no longer overlap.
         let Some(next) = overlay.round(&search.terms) else { return Some(search) };
         before = search.terms;
         search = Search { terms: next, iterations: search.iterations + 1, converged: false };

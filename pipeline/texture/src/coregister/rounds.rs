@@ -1,11 +1,11 @@
 //! One round of the fit of shift, raise and tilt.
 //!
-//! Unknowns are the offset (east, north), the raise and the tilts; z is a cell's row `(dA/dx, dA/dy, 1, x, y)`, y being what A
-//! gives it, and b the same with the slopes of B as moved; d is the difference and w its weight. The fit ends where the score
-//! `sum w z d` is zero. Near there the step is `(sum w z b')^-1 sum w z d`: noise in the slopes of A and of B is independent and
-//! takes nothing from `z b'`, but adds to `z z'`, so that Gauss and Newton's step `(sum w z z')^-1 sum w z d` falls short of
-//! the end where slopes are mostly noise (attenuation). From afar slopes of A and B may disagree, and that shorter step is taken,
-//! which always leads downhill.
+//! Unknowns are the offset (east, north), the raise and the tilts. z is a cell's row `(dA/dx, dA/dy, 1, x, y)` with the slopes of A,
+//! and b the same with the slopes of B as moved; d is the difference and w its weight. The fit ends where the score
+//! `sum w z d` is zero. Near that point the step is `(sum w z b')^-1 sum w z d`: noise in the slopes of A and of B is independent and
+//! averages out of `z b'`, but adds to `z z'`, so that the Gauss-Newton step `(sum w z z')^-1 sum w z d` is too short
+//! where slopes are mostly noise (attenuation). Far from it the slopes of A and B may disagree; there the shorter Gauss-Newton step
+//! is taken, which always descends.
 
 use super::centre_and_spread;
 use super::equations::{Equations, UNKNOWNS};
@@ -17,15 +17,15 @@ use std::ops::Range;
 
 /// Tukey's constant: 95 % efficiency on normal data (Holland and Welsch, 1977).
 const BIWEIGHT: f64 = 4.685;
-/// Rounds of the plane alone.
+/// Rounds of the fit of raise and tilt alone.
 const PLANE_ROUNDS: usize = 10;
-/// Blocks that standard errors are from.
+/// Approximate number of blocks for standard errors.
 const BLOCKS: f64 = 25.0;
 
-/// Where B is read, and the plane that is added to it.
+/// Where B is sampled, and the plane that is added to it.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Terms {
-    /// B is read this far east and north of a cell of A, m.
+    /// B is sampled this far east and north of a cell of A, m.
     pub offset: [f64; 2],
     /// Added at the centre of A, m.
     pub raise: f64,
@@ -33,8 +33,8 @@ pub struct Terms {
     pub tilt: [f64; 2],
 }
 
-/// A less B as moved, m.
-pub fn less(a: &Grid, b: &Grid, terms: &Terms) -> Vec<f64> {
+/// A minus B as moved, m.
+pub fn minus(a: &Grid, b: &Grid, terms: &Terms) -> Vec<f64> {
     let g = a.geometry;
     let centre = centre(a);
     let mut all = vec![f64::NAN; g.len()];
@@ -59,7 +59,7 @@ fn centre(grid: &Grid) -> [f64; 2] {
 pub struct Overlay<'a> {
     a: &'a Grid,
     b: &'a Grid,
-    /// `dz/dx` and `dz/dy` of A; NaN beside cells without data.
+    /// `dz/dx` and `dz/dy` of A; NaN next to no-data cells.
     slopes: Vec<[f64; 2]>,
     centre: [f64; 2],
     /// Half the extent of A: unit of the columns of the tilt.
@@ -68,15 +68,15 @@ pub struct Overlay<'a> {
 
 /// A and B as moved, cell by cell of A.
 struct Compared {
-    /// A less B, m.
+    /// A minus B, m.
     difference: Vec<f64>,
     /// Median of the difference, m.
     centre: f64,
-    /// Distance from it where the biweight ends, m.
+    /// Distance from the median at which the biweight reaches 0, m.
     reach: f64,
-    /// `dz/dx` and `dz/dy` of B; NaN where it has none.
+    /// `dz/dx` and `dz/dy` of B; NaN where undefined.
     slopes: Vec<[f64; 2]>,
-    /// Weight by the agreement of the slopes of A and B; 0 where either has none.
+    /// Weight by the agreement of the slopes of A and B; 0 where either is undefined.
     agreement: Vec<f64>,
 }
 
@@ -90,12 +90,12 @@ impl<'a> Overlay<'a> {
         self.a.geometry.cell[0].min(self.a.geometry.cell[1])
     }
 
-    /// A less B as moved, m.
+    /// A minus B as moved, m.
     pub fn difference(&self, terms: &Terms) -> Vec<f64> {
-        less(self.a, self.b, terms)
+        minus(self.a, self.b, terms)
     }
 
-    /// Raise and tilt alone, B where it lies; `None` when the cells in common hold no plane.
+    /// Fits raise and tilt alone, without moving B; `None` if the common cells do not determine a plane.
     pub fn levelled(&self, start: Terms) -> Option<Terms> {
         (0..PLANE_ROUNDS).try_fold(start, |terms, _| {
             let step = self.equations(&self.compare(&terms)).downhill(2)?;
@@ -103,7 +103,7 @@ impl<'a> Overlay<'a> {
         })
     }
 
-    /// A round of all unknowns; `None` when they cannot be told apart.
+    /// One round for all unknowns; `None` if they are not identifiable.
     pub fn round(&self, terms: &Terms) -> Option<Terms> {
         let equations = self.equations(&self.compare(terms));
         let downhill = equations.downhill(0)?;
@@ -114,7 +114,7 @@ impl<'a> Overlay<'a> {
         Some(self.moved(terms, 0, &equations.straight(0).filter(near).unwrap_or(downhill)))
     }
 
-    /// Standard errors where the fit ended, with or without a shift among the unknowns; `None` for too little data.
+    /// Standard errors at the end of the fit, with or without a shift among the unknowns; `None` with too little data.
     pub fn uncertainty(&self, terms: &Terms, shifted: bool, resolution_m: f64) -> Option<Uncertainty> {
         let units = [1.0, 1.0, 1.0, 1.0 / self.reach[0], 1.0 / self.reach[1]];
         let blocks = self.blocks(&self.compare(terms));
@@ -145,7 +145,7 @@ impl<'a> Overlay<'a> {
         Compared { difference, centre, reach, slopes, agreement }
     }
 
-    /// Of all cells, row by row of A.
+    /// Equations of all cells, summed row by row of A.
     fn equations(&self, compared: &Compared) -> Equations {
         let g = self.a.geometry;
         let rows: Vec<Equations> =
@@ -153,7 +153,7 @@ impl<'a> Overlay<'a> {
         Equations::sum(&rows)
     }
 
-    /// Of a rectangle of A.
+    /// Equations of a rectangle of A.
     fn equations_of(&self, compared: &Compared, rows: Range<usize>, cols: Range<usize>) -> Equations {
         let g = self.a.geometry;
         let mut sum = Equations::NONE;
@@ -174,7 +174,7 @@ impl<'a> Overlay<'a> {
         sum
     }
 
-    /// Of nearly square blocks, some 25 of them over the rectangle that holds all cells in common.
+    /// Equations of some 25 nearly square blocks that cover the bounding rectangle of the common cells.
     fn blocks(&self, compared: &Compared) -> Vec<Equations> {
         let g = self.a.geometry;
         let Some([rows, cols]) = occupied(&compared.agreement, g.cols) else { return Vec::new() };
@@ -201,34 +201,34 @@ fn occupied(values: &[f64], cols: usize) -> Option<[Range<usize>; 2]> {
     found
 }
 
-/// About equal parts of a range, `count` of them or as many as it has members.
+/// Splits a range into `count` nearly equal parts, or into single members if it has fewer.
 fn parts(range: &Range<usize>, count: f64) -> Vec<Range<usize>> {
     let count = (count as usize).clamp(1, range.len().max(1));
     let end = |k: usize| range.start + k * range.len() / count;
     (0..count).map(|k| end(k)..end(k + 1)).collect()
 }
 
-/// Median, and where the biweight ends. Equal values have no spread, and nothing to weigh.
+/// Median, and the distance from it at which the biweight reaches 0; infinite if all values are equal.
 fn centre_and_reach(values: &[f64]) -> (f64, f64) {
     let (centre, spread) = centre_and_spread(&sums::finite(values));
     (centre, if spread > 0.0 { BIWEIGHT * spread } else { f64::INFINITY })
 }
 
-/// Tukey's biweight w, and the derivative of w times its argument, at a share below 1 of its reach.
+/// Tukey's biweight w, and the derivative of w times its argument, at a share (below 1) of its reach.
 fn biweight(share: f64) -> [f64; 2] {
     let rest = 1.0 - share * share;
     [rest * rest, rest * (1.0 - 5.0 * share * share)]
 }
 
-/// Weights by the difference of the slopes of A and B from its median, which a tilt of the whole surface moves: 1 up to half of its
-/// reach, then falling to 0 as the biweight does. A weight that fell within what noise makes would pick cells where the noise of A
-/// and of B agree, and noise would pass for relief.
+/// Weights by the difference between the slopes of A and B, from its median (which removes a tilt of the complete surface): 1 up to half
+/// the reach, then decreasing to 0 like the biweight. A weight that already decreased within the scatter of noise would favour cells where
+/// the noise of A and B happens to agree, and noise would be taken for relief.
 fn agreement(a: &[[f64; 2]], b: &[[f64; 2]]) -> Vec<f64> {
     let medians = [0, 1].map(|k| {
         let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a[k] - b[k]).collect();
         sums::median(&sums::finite(&differences))
     });
-    // With the sign of the eastward one its median is about 0.
+    // Given the sign of the eastward component, so that the median is about 0.
     let size = |(a, b): (&[f64; 2], &[f64; 2])| {
         let [p, q] = [0, 1].map(|k| a[k] - b[k] - medians[k]);
         (p * p + q * q).sqrt().copysign(p)
@@ -255,4 +255,46 @@ fn slopes(dem: &Grid) -> Vec<[f64; 2]> {
         false => [f64::NAN; 2],
     };
     (0..rows).into_par_iter().flat_map_iter(|r| (0..cols).map(move |c| at(r, c))).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::Geometry;
+
+    /// The second number is the derivative of the first times its argument, here by central differences.
+    #[test]
+    fn val_biweight_and_its_derivative() {
+        assert_eq!((biweight(0.0), biweight(1.0)), ([1.0, 1.0], [0.0, -0.0]));
+        for k in 1..20 {
+            let (share, step) = (0.05 * f64::from(k), 1e-5);
+            let product = |s: f64| s * biweight(s)[0];
+            let slope = (product(share + step) - product(share - step)) / (2.0 * step);
+            assert!((biweight(share)[1] - slope).abs() < 1e-8, "{share}: {slope}");
+        }
+        assert!((biweight(0.5)[0] - 0.5625).abs() < 1e-15);
+    }
+
+    /// Slopes of a plane on cells of 0.5 m by 2 m: east and north, signs included; undefined at the rim and next to a hole.
+    #[test]
+    fn val_slopes_of_a_plane() {
+        let g = Geometry { rows: 5, cols: 6, cell: [0.5, 2.0], origin: [3.0, 4.0] };
+        let mut plane = Grid::new(g, (0..30).map(|k| 0.25 * g.x(k % 6) - 0.5 * g.y(k / 6)).collect());
+        plane.values[13] = f64::NAN;
+        let found = slopes(&plane);
+        let defined: Vec<usize> = (0..30).filter(|k| found[*k][0].is_finite()).collect();
+        // The rows 1 to 3 and columns 1 to 4, but for the neighbours of (2, 1); the hole itself has four neighbours with data.
+        assert_eq!(defined, [8, 9, 10, 13, 15, 16, 20, 21, 22]);
+        assert!(defined.iter().all(|k| found[*k] == [0.25, -0.5]), "{found:?}");
+    }
+
+    /// Parts cover a range without gaps; a range of fewer members than parts is split into single ones.
+    #[test]
+    fn val_parts_cover_a_range() {
+        assert_eq!(parts(&(3..13), 3.0), [3..6, 6..9, 9..13]);
+        assert_eq!(parts(&(3..5), 7.0), [3..4, 4..5]);
+        assert_eq!(parts(&(0..4), 0.0).first(), Some(&(0..4)));
+        assert_eq!(occupied(&[0.0, 0.0, 1.0, 0.0, 2.0, 0.0, 0.0, 0.0], 4), Some([0..2, 0..3]));
+        assert_eq!(occupied(&[0.0; 6], 3), None);
+    }
 }

@@ -2,7 +2,7 @@ use super::*;
 use sastrugi_numeric::{Geometry, Streams};
 use std::f64::consts::TAU;
 
-/// A surface known everywhere: waves of all directions, lengths 1.5 to 30 m, slopes of some tens of degrees.
+/// An analytic surface: waves in all directions, lengths up to 30 m, slopes of some tens of degrees.
 struct Terrain {
     waves: Vec<[f64; 4]>,
 }
@@ -36,13 +36,13 @@ fn square() -> Geometry {
     Geometry { rows: 120, cols: 140, cell: [0.5; 2], origin: [1000.0, 2000.0] }
 }
 
-/// By how much the shift fails to undo a move of B, cells of 0.5 m.
+/// Error of the shift that should undo a move of B, in cells of 0.5 m.
 fn errors_cells(c: &Coregistration, moved: [f64; 2]) -> [f64; 2] {
     let shift = c.shift_m.unwrap();
     [0, 1].map(|k| (shift[k] + moved[k]) / 0.5)
 }
 
-/// Tilted about its centre.
+/// A grid tilted about its centre.
 fn tilted(grid: &Grid, tilt: [f64; 2]) -> Grid {
     let g = grid.geometry;
     let centre = [0, 1].map(|k| g.origin[k] + 0.5 * g.size()[k]);
@@ -53,7 +53,7 @@ fn tilted(grid: &Grid, tilt: [f64; 2]) -> Grid {
     Grid::new(g, (0..g.len()).map(height).collect())
 }
 
-/// Normal noise of standard deviation 1: white, or means over squares of `2 reach + 1` cells.
+/// Normal noise of standard deviation 1: white, or averaged over squares of `2 reach + 1` cells.
 fn noise(g: Geometry, reach: usize, s: &mut sastrugi_numeric::Stream) -> Vec<f64> {
     let side = 2 * reach + 1;
     let (rows, cols) = (g.rows + side - 1, g.cols + side - 1);
@@ -63,7 +63,7 @@ fn noise(g: Geometry, reach: usize, s: &mut sastrugi_numeric::Stream) -> Vec<f64
     (0..g.len()).map(|k| (0..side).map(|d| along[k + d * g.cols]).sum::<f64>() / side as f64).collect()
 }
 
-/// The shift that was made is the one that is undone, to 0.05 cells, from sub-cell to three cells, with and without noise of 3 cm.
+/// Shifts from sub-cell to three cells are recovered to 0.05 cells, with and without noise of 3 cm.
 #[test]
 fn val_shifts_are_recovered() {
     let terrain = Terrain::new(2.5);
@@ -81,7 +81,7 @@ fn val_shifts_are_recovered() {
     }
 }
 
-/// Raise and tilt beside a shift; trees on A (5 % of the cells, 6 m high) change nothing; holes of either stay holes.
+/// Raise and tilt together with a shift; trees on A (5 % of the cells, 6 m high) change nothing; holes of either stay holes.
 #[test]
 fn val_raise_tilt_trees_and_holes() {
     let terrain = Terrain::new(2.5);
@@ -100,7 +100,7 @@ fn val_raise_tilt_trees_and_holes() {
     let found = coregister(&a, &b).unwrap();
     let c = &found.coregistration;
     assert!(errors_cells(c, [0.3, -0.4]).iter().all(|e| e.abs() < 0.05), "{c:?}");
-    // The plane was added to B where it lay: moved back by the shift it is lower by tilt times shift.
+    // The plane was added to B at its original position: moved back by the shift it is lower by tilt times shift.
     assert!((c.raise_m + 4.0).abs() < 0.03, "{c:?}");
     assert!((c.tilt[0] + 0.01).abs() < 5e-4 && (c.tilt[1] - 0.02).abs() < 5e-4, "{c:?}");
     assert!(found.difference.at(70, 10).is_nan());
@@ -108,7 +108,7 @@ fn val_raise_tilt_trees_and_holes() {
     assert!(c.nmad_after_m < 0.05, "{c:?}");
 }
 
-/// B of other cells, origin and extent.
+/// B with a different cell size, origin and extent.
 #[test]
 fn val_grids_may_differ() {
     let terrain = Terrain::new(5.0);
@@ -135,7 +135,7 @@ fn prop_threads_change_no_bit() {
 }
 
 #[test]
-fn val_what_cannot_be_laid_is_refused() {
+fn val_what_cannot_be_coregistered_is_refused() {
     let terrain = Terrain::new(2.5);
     let a = terrain.grid(square(), [0.0; 2], 0.0, "a");
     let far = terrain.grid(Geometry { origin: [5000.0, 2000.0], ..square() }, [0.0; 2], 0.0, "b");
@@ -149,7 +149,7 @@ fn val_what_cannot_be_laid_is_refused() {
     assert_eq!(coregister(&a, &line).err(), Some(CoregisterError::TooFewCells { cells: 0 }));
 }
 
-/// Ground without slopes in two directions: raise, tilt and NMAD are found, and no shift is.
+/// Ground without slopes in two directions: raise, tilt and NMAD are found, but no shift.
 #[test]
 fn val_flat_ground_is_levelled() {
     let flat = Grid::filled(square(), 3.0);
@@ -163,8 +163,8 @@ fn val_flat_ground_is_levelled() {
     }
 }
 
-/// Data in two corners alone is too little for standard errors, and terrains 40 m apart may not converge: without a probability of the shift
-/// nothing is said of a gain.
+/// Data in only two corners is too little for standard errors, and terrains 40 m apart may not converge: without a p-value of the shift
+/// no gain is reported.
 #[test]
 fn val_a_gain_is_absent_where_it_was_not_examined() {
     let terrain = Terrain::new(2.5);
@@ -182,8 +182,8 @@ fn val_a_gain_is_absent_where_it_was_not_examined() {
     }
 }
 
-/// Of a terrain with sub-cell shifts, 1 % of tilt and noise of 3 cm, every shift comes back to 0.05 cells, is told from none, and its standard
-/// error is of the size of what is left: 32 errors, none beyond 5 standard errors.
+/// On a terrain with sub-cell shifts, 1 % of tilt and noise of 3 cm, every shift is recovered to 0.05 cells and is significant, and its
+/// standard error matches its error: 32 errors, none beyond 5 standard errors.
 #[test]
 fn val_sub_cell_shifts_with_one_percent_of_tilt() {
     let terrain = Terrain::new(2.5);
@@ -208,14 +208,14 @@ fn val_sub_cell_shifts_with_one_percent_of_tilt() {
     println!("largest error: {worst:.4} cells");
 }
 
-/// Half a cell on smooth ground under noise whose slopes are three times the terrain's: found within 5 standard errors of less than 0.15
-/// cells, and a gain, although NMAD rises, since B was read between its cells before.
+/// A shift of half a cell on smooth ground, under noise whose slopes are three times the terrain's: found within 5 standard errors of less
+/// than 0.15 cells, and a gain although NMAD increases, because B was interpolated between its cells before.
 #[test]
 fn val_a_shift_under_much_noise() {
     let terrain = Terrain::new(8.0);
     let a = terrain.grid(square(), [0.0; 2], 0.6, "a");
-    let beside = Geometry { origin: [1000.25, 1999.75], ..square() };
-    let b = terrain.grid(beside, [0.25, -0.25], 0.6, "b");
+    let offset_grid = Geometry { origin: [1000.25, 1999.75], ..square() };
+    let b = terrain.grid(offset_grid, [0.25, -0.25], 0.6, "b");
     let c = coregister(&a, &b).unwrap().coregistration;
     let standard = c.standard_errors.clone().unwrap().shift_m.unwrap().map(|e| e / 0.5);
     let errors = errors_cells(&c, [0.25, -0.25]);
@@ -224,9 +224,9 @@ fn val_a_shift_under_much_noise() {
     assert!(c.gained == Some(true) && c.nmad_after_m > c.nmad_plane_m, "{c:?}");
 }
 
-/// A tilt of one of two DEMs that are equal to rounding is a tilt, though no slopes of theirs agree before it is known.
+/// If one of two DEMs that are equal to rounding is tilted, a tilt is found and no shift, although none of their slopes agree at first.
 #[test]
-fn val_a_tilt_alone_is_no_shift() {
+fn val_a_tilt_alone_is_not_a_shift() {
     let a = Terrain::new(2.5).grid(square(), [0.0; 2], 0.0, "a");
     for (tilt, noise) in [([0.0; 2], 0.0), ([0.01, 0.0], 0.0), ([0.01, -0.02], 1e-6)] {
         let mut b = tilted(&a, tilt);
@@ -239,9 +239,9 @@ fn val_a_tilt_alone_is_no_shift() {
     }
 }
 
-/// What was found on part of A is taken off all of it.
+/// A co-registration found on part of A is applied to all of it.
 #[test]
-fn val_what_stable_terrain_gives_is_applied_everywhere() {
+fn val_a_coregistration_on_stable_terrain_applies_everywhere() {
     let terrain = Terrain::new(2.5);
     let mut a = terrain.grid(square(), [0.0; 2], 0.0, "a");
     let b = terrain.grid(square(), [0.3, -0.2], 0.0, "b");
@@ -263,7 +263,7 @@ fn val_what_stable_terrain_gives_is_applied_everywhere() {
     assert!((depth - 1.5).abs() < 0.01, "{depth}");
 }
 
-/// What coverage is counted of.
+/// Counts for the coverage of intervals.
 #[derive(Default)]
 struct Counted {
     replicates: u32,
@@ -293,7 +293,7 @@ fn replicates(count: u32, moved: [f64; 2], sigma: f64, reach: usize) -> Counted 
     let g = Geometry { rows: 72, cols: 84, ..square() };
     let (terrain, tilt) = (Terrain::new(2.5), [0.01, -0.005]);
     let (a, b) = (terrain.grid(g, [0.0; 2], 0.0, "a"), tilted(&terrain.grid(g, moved, 0.0, "b"), tilt));
-    // The plane was added to B where it lay: moved back it is lower by tilt times shift.
+    // The plane was added to B at its original position: moved back it is lower by tilt times shift.
     let raise = -(tilt[0] * moved[0] + tilt[1] * moved[1]);
     let truth = [-moved[0], -moved[1], raise, -tilt[0], -tilt[1]];
     let mut counted = Counted { replicates: count, ..Counted::default() };
@@ -321,8 +321,8 @@ fn replicates(count: u32, moved: [f64; 2], sigma: f64, reach: usize) -> Counted 
 
 /// Null: 95 % intervals of shift, raise and tilt miss the truth in 7 % of surfaces with white noise, in 10 % with noise that is correlated
 /// over 7 cells, half a block's side (calibrated with 600: 4 to 6 % and 6 to 7 %). 60 surfaces each; limits 17 and 21 misses for each of
-/// 5 unknowns: false-alarm probability below 1e-6 in all. Standard errors of independent cells would miss in more than half of the
-/// correlated surfaces, which is found surely; coverage of 0.6 in white noise is found nearly always.
+/// 5 unknowns: false-alarm probability below 1e-6 in all. Standard errors that assume independent cells would miss in more than half of the
+/// correlated surfaces, which this test certainly detects; a coverage of 0.6 in white noise is detected nearly always.
 #[test]
 fn stat_intervals_hold_the_truth() {
     for (reach, limit) in [(0, 17), (3, 21)] {
@@ -333,8 +333,8 @@ fn stat_intervals_hold_the_truth() {
     }
 }
 
-/// Null: where B needs no shift, one is called a gain in at most 8 % of surfaces. 60 surfaces, limit 19: false-alarm probability 2e-8; a
-/// rule that looked at NMAD alone would be misled, since reading B between its cells averages its noise.
+/// Null: if B needs no shift, one is called a gain in at most 8 % of surfaces. 60 surfaces, limit 19: false-alarm probability 2e-8. A
+/// rule based on NMAD alone would be misled, since interpolating B between its cells averages its noise.
 #[test]
 fn stat_noise_alone_gains_nothing() {
     let c = replicates(60, [0.0; 2], 0.3, 0);
@@ -342,10 +342,10 @@ fn stat_noise_alone_gains_nothing() {
     assert!(c.gained <= 19, "{} of 60 gained", c.gained);
 }
 
-/// As the quick ones, with 600 surfaces: limits 78 misses (null 7 %) in white noise and noise correlated over 3 cells, 101 (10 %) over 7
-/// cells, and 86 shifts where none is needed (8 %); false-alarm probability below 3e-6 in all. No standard error is too large by more than 30 % where noise dominates the reading
-/// of B between its cells. Where noise is as steep as the terrain only the step with
-/// the slopes of both arrives.
+/// As the quick tests, with 600 surfaces: limits 78 misses (null 7 %) in white noise and noise correlated over 3 cells, 101 (10 %) over 7
+/// cells, and 86 shifts where none is needed (8 %); false-alarm probability below 3e-6 in all. No standard error is too large by more than
+/// 30 % where noise dominates the interpolation of B between its cells. Where noise is as steep as the terrain, only the step with the
+/// slopes of both converges.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_intervals_hold_the_truth_in_many_surfaces() {

@@ -1,16 +1,15 @@
-//! Lag bins: rings, and rings cut into sectors.
+//! Lag bins: rings, and rings divided into sectors.
 //!
-//! Ring k holds the lags whose length rounds to k ring widths; bin 0 is lag zero alone. A bin's covariance is the sum of
-//! all products over the number of all pairs, and a model is brought to the bins in the same way, so that the width of a
-//! bin biases nothing.
+//! Ring k contains the lags whose length rounds to k ring widths; bin 0 is lag zero alone. A bin's covariance is the sum of
+//! all products over the number of all pairs. Models are binned in the same way, so that the width of a bin causes no bias.
 
 use super::lag::length_m;
 use super::masked::MaskedCovariance;
 
-/// How lags are put into bins.
+/// How lags are binned.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Layout {
-    /// Most rings beside lag zero; more only slow a fit down.
+    /// Most rings in addition to lag zero; more only slow a fit down.
     pub rings_max: usize,
     /// Sectors of each ring over half a turn; the first is centred north-south.
     pub sectors: usize,
@@ -28,13 +27,13 @@ impl Layout {
 pub struct LagBins {
     /// Mean lag of the pairs in each bin, m.
     pub lag_m: Vec<f64>,
-    /// Direction of the centre of each bin's sector, degrees clockwise from north; `None` for whole rings.
+    /// Direction of the centre of each bin's sector, degrees clockwise from north; `None` for complete rings.
     pub azimuth_deg: Vec<Option<f64>>,
     /// Covariance of each bin, m2.
     pub covariance_m2: Vec<f64>,
     /// Pairs in each bin.
     pub pairs: Vec<u64>,
-    /// The lags of all bins, by bin.
+    /// The lags of all bins, ordered by bin.
     pub members: Vec<Member>,
 }
 
@@ -51,7 +50,7 @@ pub struct Member {
 
 impl LagBins {
     /// Bins of `estimate` up to `max_lag_m`, for cells of `cell_m = [east-west, north-south]`. The ring width is the larger
-    /// cell size, or the maximum lag over the most rings where that is more. Bins without pairs are left out.
+    /// cell size, or `max_lag_m` over the largest number of rings if that is more. Bins without pairs are left out.
     pub fn of(estimate: &MaskedCovariance, cell_m: [f64; 2], max_lag_m: f64, layout: Layout) -> Self {
         let width = cell_m[0].max(cell_m[1]).max(max_lag_m / layout.rings_max as f64);
         let mut lags: Vec<Lag> = estimate
@@ -83,7 +82,7 @@ impl LagBins {
         self
     }
 
-    /// Covariance and pairs in these bins of another estimate of the same surface.
+    /// Sum of products and number of pairs of another estimate of the same surface in these bins.
     pub fn bin_sums(&self, estimate: &MaskedCovariance) -> Vec<(f64, u64)> {
         let mut sums = vec![(0.0, 0); self.len()];
         for m in &self.members {
@@ -94,7 +93,7 @@ impl LagBins {
         sums
     }
 
-    /// Covariance in these bins of another estimate of the same surface, m2; 0 in a bin without pairs.
+    /// Covariance of another estimate of the same surface in these bins, m2; 0 in a bin without pairs.
     pub fn means(&self, estimate: &MaskedCovariance) -> Vec<f64> {
         means(&self.bin_sums(estimate))
     }
@@ -104,12 +103,12 @@ impl LagBins {
         self.lag_m.len()
     }
 
-    /// True when no pair was found.
+    /// True if no pair was found.
     pub fn is_empty(&self) -> bool {
         self.lag_m.is_empty()
     }
 
-    /// A function of the lag in cells, brought to the bins as the data was.
+    /// Averages a function of the lag in cells over each bin, weighted like the data.
     pub fn average(&self, f: impl Fn([isize; 2]) -> f64) -> Vec<f64> {
         let mut binned = vec![0.0; self.len()];
         self.members.iter().for_each(|m| binned[m.bin] += m.weight * f(m.lag));
@@ -130,17 +129,17 @@ struct Lag {
 }
 
 impl Lag {
-    /// The lag with its pairs, or `None` when it has none.
+    /// The lag with its pairs, or `None` if it has none.
     fn of(estimate: &MaskedCovariance, cell_m: [f64; 2], lag: [isize; 2]) -> Option<Self> {
         let (pairs, sum) = estimate.at(lag[0], lag[1])?;
         (pairs > 0).then(|| Self { lag, length: length_m(lag, cell_m), pairs, sum })
     }
 }
 
-/// Sector of a lag's direction among `sectors` of half a turn.
+/// Sector of a lag's direction, of `sectors` over half a turn.
 fn sector([row, col]: [isize; 2], cell_m: [f64; 2], sectors: usize) -> usize {
     let turn = libm::atan2(col as f64 * cell_m[0], -(row as f64) * cell_m[1]) / std::f64::consts::PI;
-    // A direction and its opposite are one; a lag on the edge of two sectors goes to the second, as its mirror image does.
+    // Opposite directions are equivalent; a lag on the edge between two sectors goes to the second, as does its opposite.
     let place = (turn - turn.floor()) * sectors as f64 + 0.5;
     place as usize % sectors
 }

@@ -1,7 +1,7 @@
-//! Spectrum of a stationary covariance on a torus, also of one that reaches across it.
+//! Spectrum of a stationary covariance on a torus, even if its range is not small against the torus.
 //!
-//! A covariance cut to a torus has negative eigenvalues once it has not died away half way round. Exponential and Matern ones
-//! are then made from their spectral density, which no torus cuts ([`matern::eigenvalue`]).
+//! A covariance truncated to a torus has negative eigenvalues if it has not decayed half way around. Spectra of exponential and
+//! Matern covariances are then computed from their spectral density, which needs no truncation ([`matern::eigenvalue`]).
 
 use super::filtered::torus_covariance;
 use super::models::matern;
@@ -10,7 +10,7 @@ use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2};
 use std::f64::consts::PI;
 
-/// A torus this many ranges wide holds a covariance with a kink at lag zero.
+/// Width of a torus, in ranges, that is enough for a covariance with a kink at lag zero.
 pub const TORUS_RANGES: f64 = 16.0;
 
 /// Eigenvalues of a stationary covariance on a torus, m2, in the order of a half spectrum.
@@ -21,13 +21,13 @@ pub fn spectrum(covariance: &Covariance, torus: [usize; 2], cell_m: [f64; 2]) ->
     }
 }
 
-/// True when a covariance has not died away half way round the torus.
+/// True if a covariance has not decayed half way around the torus.
 fn reaches_across(covariance: &Covariance, [rows, cols]: [usize; 2], cell_m: [f64; 2]) -> bool {
     let side_m = (rows as f64 * cell_m[1]).min(cols as f64 * cell_m[0]);
     TORUS_RANGES * covariance.range_m() > side_m
 }
 
-/// Smoothness of each term as a Matern one; `None` where a term is none.
+/// Smoothness of each term as a Matern covariance; `None` if any term is not one.
 fn smoothnesses(covariance: &Covariance) -> Option<Vec<f64>> {
     let of = |term: &Structure| match term.model.kind().kind {
         "exponential" => Some(0.5),
@@ -67,8 +67,8 @@ mod tests {
     use super::*;
     use crate::covariance::Form;
 
-    /// Both ways to a spectrum agree where both are good: a torus of 40 ranges, oblong cells, an axis across them. The
-    /// tolerance is what the folding of far wavenumbers leaves: 0.3 % of the variance at an axis of 0.4.
+    /// The two ways to compute a spectrum agree where both are accurate: a torus of 40 ranges, oblong cells, an oblique axis. The
+    /// tolerance is the error from folding far wavenumbers: 0.3 % of the variance at a ratio of 0.4.
     #[test]
     fn val_the_density_gives_the_covariance() {
         for model in ["exponential", "anisotropic:exponential", "anisotropic:matern+nugget"] {

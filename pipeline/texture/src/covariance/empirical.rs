@@ -1,16 +1,16 @@
-//! The measured covariance of a residual by lag, and spectra made from it.
+//! The measured covariance of a residual by lag, and spectra derived from it.
 //!
-//! From the data: the mean product of trimmed residuals at each lag (both of two opposite ones), through the inverse of what trimming
-//! does to it ([`super::trimmed`]; no one factor undoes it), at lags up to [`REACH_WINDOWS`] windows.
+//! From the data: the mean product of trimmed residuals at each lag (pooled over the two opposite lags), corrected by the inverse of the
+//! effect of trimming ([`super::trimmed`]; a single factor does not undo it), at lags up to [`REACH_WINDOWS`] windows.
 //!
-//! To a torus: every lag where it belongs, tapered by a cosine from one window on, transformed; what is negative is set to 0, each ring of
-//! wavenumbers keeping its power, and all is scaled to the variance. With S the spectrum of the surface and D the response of the moving average this estimates
-//! `S (1 - D)^2`. Two spectra are made of it:
+//! Spectrum P: every lag is placed on a torus, tapered by a cosine beyond one window, and transformed. Negative values are set to 0 while
+//! each ring of wavenumbers keeps its power, and the total is scaled to the variance. With S the spectrum of the surface and D the response
+//! of the moving average, P estimates `S (1 - D)^2`. Two spectra are derived from it:
 //! * `residual`, what a measured background lacks: `S (1 - D^2) = P (1 + D) / (1 - D)`, so that background and texture together have S;
 //! * `surface`: `S = P / (1 - D)^2`.
 //!
-//! Where `(1 - D)^2` is below [`FLOOR`] the background has taken nearly all, and what is left tells little: there the spectrum has the shape
-//! of the fitted model's, at the level of the measured waves next to it.
+//! Where `(1 - D)^2` is below [`FLOOR`], the background has removed nearly everything and the remainder carries little information: there
+//! the spectrum has the shape of the fitted model's, at the level of the adjacent measured waves.
 
 use super::filtered::LagField;
 use super::masked::MaskedCovariance;
@@ -24,36 +24,36 @@ use std::f64::consts::PI;
 
 /// Largest lag of a measured covariance, windows.
 pub const REACH_WINDOWS: f64 = 1.5;
-/// Share of the largest lag from which on it is tapered: one window.
+/// Share of the largest lag beyond which the covariance is tapered: one window.
 const TAPER_FROM: f64 = 1.0 / REACH_WINDOWS;
-/// Share of a power spectrum that the background must leave for the measured one to be used.
+/// Smallest share of power that the background must leave for the measured spectrum to be used.
 const FLOOR: f64 = 0.1;
-/// The same up to which measured waves set the level of what continues them.
+/// The share up to which measured waves set the level of the model that continues them.
 const NEXT: f64 = 0.5;
 /// Correlations at which the trimming map is computed.
 const NODES: usize = 2048;
 
-/// What a spectrum is of.
+/// What a spectrum describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Purpose {
     /// The surface.
     Surface,
-    /// What a background over the window lacks of it.
+    /// The part of the surface that a background over the window lacks.
     Residual,
 }
 
-/// A spectrum in the order of a half spectrum, m2, and what it is made of.
+/// A spectrum in the order of a half spectrum, m2, and its composition.
 pub struct Composition {
-    /// Eigenvalues, none below 0.
+    /// Eigenvalues, all 0 or above.
     pub values: Vec<f64>,
     /// Share of the measured spectrum that was negative and set to 0.
     pub clip_share: f64,
-    /// Share of the variance that is the model's.
+    /// Share of the variance that comes from the model.
     pub continued_share: f64,
 }
 
-/// The covariance map of trimmed residuals; `normal` trims a unit normal as they were trimmed, `noise` is the covariance that the
-/// measurement's noise has in the residual: it is no texture.
+/// The covariance map of trimmed residuals. `normal` is a unit normal trimmed at the same level; `noise` is the covariance of the
+/// measurement noise in the residual, which is not texture and is subtracted.
 pub fn covariance_map(sums: &MaskedCovariance, normal: &TrimmedNormal, noise: &LagField, model: &str) -> CovarianceMap {
     let [rows, cols] = sums.max_lag.map(|l| l as isize);
     let untrimmed = Untrimmed::new(normal, sums.covariance(0, 0).unwrap_or(0.0));
@@ -63,7 +63,7 @@ pub fn covariance_map(sums: &MaskedCovariance, normal: &TrimmedNormal, noise: &L
     CovarianceMap { base, model, max_lag: sums.max_lag, covariance_m2: lags.map(value).collect() }
 }
 
-/// The covariance of a residual as textures have it: that of the map without what was negative in its spectrum.
+/// The covariance of a residual as textures have it: that of the map after negative eigenvalues are removed.
 pub struct Residual {
     torus: [usize; 2],
     covariance_m2: Vec<f64>,
@@ -87,7 +87,7 @@ impl Residual {
     }
 }
 
-/// The inverse of what trimming does to a covariance.
+/// The inverse of the effect of trimming on a covariance.
 struct Untrimmed {
     variance_m2: f64,
     /// Trimmed covariance of a unit normal at equally spaced correlations from -1 to 1.
@@ -110,29 +110,28 @@ impl Untrimmed {
     }
 }
 
-/// Checks a map that was read.
+/// Checks a map read from a file.
 ///
 /// # Errors
-/// A base that is not known; values that are too few, too many or not finite; a variance that is not positive.
+/// An unknown base; too few, too many or non-finite values; a variance that is not positive.
 pub fn check(map: &CovarianceMap) -> Result<(), ParameterError> {
     let [rows, cols] = map.max_lag;
     let needed = (rows.saturating_add(1)).saturating_mul(cols.saturating_mul(2).saturating_add(1));
     if map.base != "residual" && map.base != "surface" {
-        let message = format!("is `{}`; it is `residual` or `surface`", map.base);
+        let message = format!("is `{}`; it must be `residual` or `surface`", map.base);
         return Err(ParameterError::new("map.base", message));
     }
     if map.covariance_m2.len() != needed {
-        let message =
-            format!("holds {} values; lags up to {rows} x {cols} cells need {needed}", map.covariance_m2.len());
+        let message = format!("has {} values; lags up to {rows} x {cols} cells need {needed}", map.covariance_m2.len());
         return Err(ParameterError::new("map.covariance_m2", message));
     }
     if map.covariance_m2.iter().any(|c| !c.is_finite()) || map.covariance_m2[cols] <= 0.0 {
-        return Err(ParameterError::new("map.covariance_m2", "must hold finite values and a variance above 0"));
+        return Err(ParameterError::new("map.covariance_m2", "must have finite values and a variance above 0"));
     }
     Ok(())
 }
 
-/// The spectrum of a map on a torus of cells of the map.
+/// The spectrum of a map on a torus with the map's cells.
 pub fn spectrum(
     map: &CovarianceMap,
     model: &Covariance,
@@ -154,7 +153,7 @@ pub fn spectrum(
     let continuation = density::spectrum(model, torus, cell_m);
     let responses: Vec<f64> = (0..measured.values.len()).map(|k| response(window, torus, k)).collect();
     let left = |d: f64| (1.0 - d) * (1.0 - d);
-    // The model gives the shape of what is continued, the measured waves next to it the level.
+    // The model gives the shape of the continuation, the adjacent measured waves its level.
     let [mut own, mut models] = [0.0; 2];
     for (k, d) in responses.iter().enumerate().filter(|(_, d)| (FLOOR..NEXT).contains(&left(**d))) {
         own += times(torus, k) * measured.values[k].re / left(*d);
@@ -176,7 +175,7 @@ pub fn spectrum(
     Composition { values, clip_share, continued_share }
 }
 
-/// The spectrum of what a background over a window lacks of a model, on a torus.
+/// The spectrum of the part of a model that a background over a window lacks, on a torus.
 pub fn residual_spectrum(model: &Covariance, window: BoxWindow, torus: [usize; 2], cell_m: [f64; 2]) -> Vec<f64> {
     let surface = density::spectrum(model, torus, cell_m);
     surface.values.iter().enumerate().map(|(k, v)| v.re * lacking(response(window, torus, k))).collect()
@@ -205,15 +204,15 @@ fn on_torus(map: &CovarianceMap, [rows, cols]: [usize; 2]) -> Vec<f64> {
     field
 }
 
-/// 1 up to a window, from there a cosine to 0 just beyond the largest lag.
+/// 1 up to one window, then a cosine to 0 just beyond the largest lag.
 fn taper(lag: isize, max_lag: isize) -> f64 {
     let (lag, end) = (lag.unsigned_abs() as f64, max_lag as f64 + 1.0);
     let from = TAPER_FROM * end;
     if lag <= from { 1.0 } else { 0.5 + 0.5 * libm::cos(PI * (lag - from) / (end - from)) }
 }
 
-/// Sets negative eigenvalues to 0. Each ring of wavenumbers keeps its power: what scatter made negative here it made too large beside it, and
-/// setting it to 0 alone would add short waves. All are scaled to a variance. The share that was negative.
+/// Sets negative eigenvalues to 0 and returns the share that was negative. Each ring of wavenumbers keeps its power: where scatter makes
+/// some values negative it makes their neighbours too large, and clipping alone would add short waves. The total is scaled to a variance.
 fn clip(spectrum: &mut HalfSpectrum, variance_m2: f64, cell_m: [f64; 2]) -> f64 {
     let torus = [spectrum.rows, spectrum.cols];
     let rings: Vec<usize> = (0..spectrum.values.len()).map(|k| ring(torus, cell_m, k)).collect();
@@ -241,23 +240,110 @@ fn ring([rows, cols]: [usize; 2], [dx, dy]: [f64; 2], k: usize) -> usize {
     ((x * x + y * y).sqrt() * width_m.min(height_m)) as usize
 }
 
-/// How many modes of the whole spectrum one of the half stands for.
+/// How many modes of the full spectrum a mode of the half spectrum represents.
 fn times([rows, cols]: [usize; 2], k: usize) -> f64 {
     let kx = k / rows;
     if kx == 0 || 2 * kx == cols { 1.0 } else { 2.0 }
 }
 
-/// Response of a window's mean at one mode of a half spectrum.
+/// Response of the window mean at one mode of a half spectrum.
 fn response(window: BoxWindow, [rows, cols]: [usize; 2], k: usize) -> f64 {
     let [down, across] = window.cells();
     mean_of_cosine(down, k % rows, rows) * mean_of_cosine(across, k / rows, cols)
 }
 
-/// Mean of a cosine of k waves over n cells in `width` cells about its crest.
+/// Mean of a cosine of k waves over n cells, in `width` cells around its crest.
 fn mean_of_cosine(width: usize, k: usize, n: usize) -> f64 {
     if k == 0 {
         return 1.0;
     }
     let half_step = PI * k as f64 / n as f64;
     libm::sin(width as f64 * half_step) / (width as f64 * libm::sin(half_step))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::covariance::model;
+    use sastrugi_numeric::fft::Complex64;
+
+    /// The inverse of the effect of trimming: values T(rho) of a variance give back rho times that variance. 2048 nodes and linear
+    /// interpolation: 1e-6 of the variance; near 1, where T falls like a square root, half the distance of two nodes.
+    #[test]
+    fn val_trimming_is_undone() {
+        let normal = TrimmedNormal::new(1.96);
+        let untrimmed = Untrimmed::new(&normal, 4.0 * normal.covariance(1.0));
+        assert!((untrimmed.variance_m2 - 4.0).abs() < 1e-12);
+        let near = 1e-6;
+        for (rho, tolerance) in
+            [(-0.5, near), (0.0, near), (0.137, near), (0.5, near), (0.9, near), (0.9995, 5e-4), (1.0, 1e-9)]
+        {
+            let found = untrimmed.of(4.0 * normal.covariance(rho)) / 4.0;
+            assert!((found - rho).abs() < tolerance, "{rho}: {found}");
+        }
+    }
+
+    /// Full weight up to one window (two thirds of the way), half way down at five sixths, and 0 one lag beyond the largest.
+    #[test]
+    fn val_taper() {
+        assert_eq!([0, 1, -10, 20].map(|lag| taper(lag, 29)), [1.0; 4]);
+        assert!((taper(25, 29) - 0.5).abs() < 1e-12 && (taper(-25, 29) - 0.5).abs() < 1e-12);
+        assert!(taper(29, 29) > 0.02 && taper(29, 29) < 0.03, "{}", taper(29, 29));
+    }
+
+    /// The response of a window of 5 rows and 3 columns at every mode is its transform on the torus.
+    #[test]
+    fn val_response_is_the_transform_of_the_window() {
+        let (window, torus) = (BoxWindow { half: [2, 1] }, [12, 10]);
+        let mut box_mean = vec![0.0; 120];
+        for (r, c) in (-2..=2isize).flat_map(|r| (-1..=1isize).map(move |c| (r, c))) {
+            box_mean[r.rem_euclid(12) as usize * 10 + c.rem_euclid(10) as usize] = 1.0 / 15.0;
+        }
+        let spectrum = RealFft2::new(12, 10).forward(&box_mean);
+        assert_eq!(spectrum.values.len(), 12 * 6);
+        for (k, value) in spectrum.values.iter().enumerate() {
+            assert!((response(window, torus, k) - value.re).abs() < 1e-13, "{k}: {value}");
+        }
+    }
+
+    /// Clipping: no value stays negative, every ring keeps its power, and the total is the stated variance. By hand on a torus of 4 x 4: the mode
+    /// (1, 1) and its mirror images are alone in ring 1 with those on the axes.
+    #[test]
+    fn val_clipping_keeps_the_power_of_rings() {
+        let value = |k: i32| Complex64::new(if k == 5 { -0.5 } else { 1.0 + 0.1 * f64::from(k) }, 0.0);
+        let values = (0..12).map(value).collect();
+        let mut spectrum = HalfSpectrum { rows: 4, cols: 4, values };
+        let before = spectrum.clone();
+        let share = clip(&mut spectrum, 3.0, [1.0; 2]);
+        let sum = |s: &HalfSpectrum, of: &dyn Fn(usize) -> bool| -> f64 {
+            (0..12).filter(|k| of(*k)).map(|k| times([4, 4], k) * s.values[k].re).sum()
+        };
+        assert!(spectrum.values.iter().all(|v| v.re >= 0.0) && spectrum.values[5].re == 0.0);
+        assert!((sum(&spectrum, &|_| true) / 16.0 - 3.0).abs() < 1e-12);
+        // The mode is one of two equal ones: its share of all sizes.
+        let sizes: f64 = (0..12).map(|k| times([4, 4], k) * before.values[k].re.abs()).sum();
+        assert!((share - 2.0 * 0.5 / sizes).abs() < 1e-15, "{share}");
+        let scale = 3.0 * 16.0 / sum(&before, &|_| true);
+        for ring_of in 0..=2 {
+            let own = |k: usize| ring([4, 4], [1.0; 2], k) == ring_of;
+            let (was, is) = (sum(&before, &own), sum(&spectrum, &own));
+            assert!((is - scale * was).abs() < 1e-12, "ring {ring_of}: {was} {is}");
+        }
+    }
+
+    /// Background and texture of the residual together have the spectrum of the surface: `D^2 S + (1 - D^2) S`.
+    #[test]
+    fn prop_background_and_residual_add_up() {
+        let surface = Covariance::new(model("exponential").unwrap(), 0.2, 0.3).unwrap();
+        let (window, torus, cell_m) = (BoxWindow { half: [4, 3] }, [60, 48], [0.1, 0.12]);
+        let all = density::spectrum(&surface, torus, cell_m);
+        let residual = residual_spectrum(&surface, window, torus, cell_m);
+        assert_eq!(residual.len(), all.values.len());
+        for (k, (lacking, whole)) in residual.iter().zip(&all.values).enumerate() {
+            let d = response(window, torus, k);
+            assert!((lacking + d * d * whole.re - whole.re).abs() <= 1e-12 * whole.re.abs(), "{k}");
+        }
+        // The mean of the surface is all background.
+        assert!(residual[0].abs() < 1e-15 * all.values[0].re);
+    }
 }

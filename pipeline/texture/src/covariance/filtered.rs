@@ -1,4 +1,4 @@
-//! What the moving average leaves of a covariance.
+//! Effect of the moving average on a covariance.
 //!
 //! The residual of cell i is `z(i) - sum of D_i(j) z(j)` over the offsets j of its window, with `D_i(j) = m(i + j) / n(i)`
 //! ([`sastrugi_roughness::background`]). For a stationary field with covariance C the residuals of the cells i and i + h have
@@ -6,12 +6,12 @@
 //! `C(h) - sum of D_i(j) C(h - j) - sum of D_(i+h)(k) C(h + k) + sum of D_i(j) D_(i+h)(k) C(h + k - j)`.
 //!
 //! * Complete windows: D is the same everywhere, and the covariance is `IDFT[ DFT(C) (1 - D)^2 ]`, exact at every lag
-//!   on a torus so large that none wraps.
+//!   on a torus so large that no lag wraps around.
 //! * Partial windows (border, holes): the difference of the expression above from its value with complete windows,
-//!   averaged over the pairs of each lag bin. It depends on the lag and cannot be had from the average window: at a window
+//!   averaged over the pairs of each lag bin. It depends on the lag and cannot be computed from the average window: with a window
 //!   of two ranges that would leave an error of 0.2 % of the variance at the larger lags, and of 7 % in b. The average is
 //!   taken over pairs and offsets of a fixed low-discrepancy sequence (Kronecker with powers of the generalised golden
-//!   ratio: Roberts, 2018) and kept as weights of C by lag, so that it is made once and applied to any model.
+//!   ratio: Roberts, 2018) and stored as weights of C by lag, so that it is computed once and applied to any model.
 
 use super::Covariance;
 use super::lag::lag_m;
@@ -20,26 +20,26 @@ use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_roughness::background::BoxWindow;
 use std::f64::consts::PI;
 
-/// Largest lag at which a residual's covariance counts, windows.
+/// Largest lag at which a residual's covariance matters, windows.
 const REACH_WINDOWS: f64 = 1.5;
 
 /// How a surface was measured.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Measurement {
-    /// Standard deviation of the Gaussian point spread that blurs the surface, m; 0 for a sharp one.
+    /// Standard deviation of the Gaussian point spread function that blurs the surface, m; 0 for none.
     pub inner_scale_m: f64,
     /// Noise that the measurement adds.
     pub noise: Noise,
 }
 
-/// A torus on which covariances are brought through measurement and detrender.
+/// Passes covariances through measurement and detrending, on a torus.
 pub struct DetrendFilter {
     shape: [usize; 2],
     cell_m: [f64; 2],
     /// Largest lags, cells.
     reach: [usize; 2],
     measurement: Measurement,
-    /// Covariance of the measurement's noise.
+    /// Covariance of the measurement noise.
     noise: LagField,
     fft: RealFft2,
     /// `(1 - D)^2` of complete windows, in the order of a half spectrum.
@@ -78,8 +78,8 @@ impl DetrendFilter {
         Self { shape, cell_m, reach: max_lag, measurement, noise, fft, response }
     }
 
-    /// The filter for all lags at which residuals are correlated, and up to `max_lag` cells: beyond one and a half windows they
-    /// hardly are, whatever the surface.
+    /// The filter for lags up to `max_lag` cells, but at least for all lags at which residuals are correlated: beyond one and a half
+    /// windows they hardly are, whatever the surface.
     pub fn wide(window: BoxWindow, cell_m: [f64; 2], max_lag: [usize; 2], measurement: Measurement) -> Self {
         let width = window.cells();
         // Profiles have one row.
@@ -105,7 +105,7 @@ impl DetrendFilter {
         LagField { shape: self.shape, values }
     }
 
-    /// The same, 0 beyond the lags that the filter was made for: there the torus joins lags that differ.
+    /// Covariance of the residual, set to 0 beyond the filter's largest lags, where different lags coincide on the torus.
     pub fn residual_within_reach(&self, measured: &LagField) -> LagField {
         let mut residual = self.residual_covariance(measured);
         let beyond = |k: usize, place: usize| place.min(self.shape[k] - place) > self.reach[k];
@@ -117,12 +117,12 @@ impl DetrendFilter {
         residual
     }
 
-    /// Covariance that the measurement's noise has in the residual, windows complete.
+    /// Covariance of the measurement noise in the residual, for complete windows.
     pub fn residual_noise(&self) -> LagField {
         self.residual_covariance(&self.noise)
     }
 
-    /// Covariance of the residual of a field with the covariance `measured`, windows complete.
+    /// Covariance of the residual of a field with the covariance `measured`, for complete windows.
     pub fn residual_covariance(&self, measured: &LagField) -> LagField {
         let mut spectrum = self.fft.forward(&measured.values);
         spectrum.values.iter_mut().zip(&self.response).for_each(|(s, a)| *s = Complex64::new(s.re * a, 0.0));
@@ -137,8 +137,8 @@ impl DetrendFilter {
     }
 }
 
-/// What a Gaussian point spread of standard deviation `s` leaves of a power spectrum: `exp(-(2 pi f s)^2)`, f in cycles per
-/// m. The spectrum is that of a grid, so that spreads below half a cell blur a little less than this says.
+/// Multiplies a power spectrum by the effect of a Gaussian point spread function of standard deviation `s`: `exp(-(2 pi f s)^2)`, f in
+/// cycles per m. The spectrum is that of a grid, so that a spread below half a cell blurs slightly less than this.
 pub(crate) fn blur(spectrum: &mut HalfSpectrum, cell_m: [f64; 2], spread_m: f64) {
     let (rows, cols) = (spectrum.rows, spectrum.cols);
     let angle = |k: usize, n: usize, cell: f64| 2.0 * PI * k.min(n - k) as f64 / (n as f64 * cell) * spread_m;
@@ -148,7 +148,7 @@ pub(crate) fn blur(spectrum: &mut HalfSpectrum, cell_m: [f64; 2], spread_m: f64)
     }
 }
 
-/// A covariance on a torus of `shape` cells, each lag taken the short way round.
+/// A covariance on a torus of `shape` cells, each lag taken the shorter way around.
 pub(crate) fn torus_covariance(shape: [usize; 2], cell_m: [f64; 2], model: &Covariance) -> Vec<f64> {
     let [rows, cols] = shape;
     let mut field = vec![0.0; rows * cols];
@@ -162,12 +162,12 @@ pub(crate) fn torus_covariance(shape: [usize; 2], cell_m: [f64; 2], model: &Cova
         let line: Vec<f64> = (0..cols)
             .map(|c| match (2 * c).cmp(&cols) {
                 std::cmp::Ordering::Less => east[c],
-                // Half way round is east as well as west.
+                // Half way around, east and west coincide.
                 std::cmp::Ordering::Equal => 0.5 * (east[c] + west[c]),
                 std::cmp::Ordering::Greater => west[cols - c],
             })
             .collect();
-        // The row as far north holds the opposite lags; a row half way round is both.
+        // The row at the same distance north has the opposite lags; half way around, both coincide.
         let opposite = (rows - row) % rows;
         for c in 0..cols {
             let mirrored = line[(cols - c) % cols];

@@ -1,6 +1,6 @@
-//! The form of a covariance: which terms, whether a nugget, whether anisotropic, and the names of its parameters.
+//! The form of a covariance: its terms, with or without nugget and anisotropy, and the names of its parameters.
 //!
-//! `[anisotropic:]MODEL[+MODEL][+nugget]`, as `exponential`, `matern+nugget`, `anisotropic:exponential+gaussian`.
+//! `[anisotropic:]MODEL[+MODEL][+nugget]`, such as `exponential`, `matern+nugget`, `anisotropic:exponential+gaussian`.
 
 use super::{Covariance, Model, Structure, model};
 use sastrugi_schemas::ParameterError;
@@ -20,7 +20,7 @@ pub struct Form {
     anisotropic: bool,
 }
 
-/// What a parameter is.
+/// The role of a parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Role {
     /// Standard deviation of a term.
@@ -42,7 +42,7 @@ pub enum Role {
 pub struct Parameter {
     /// Name in fit files.
     pub name: String,
-    /// What it is.
+    /// Its role.
     pub role: Role,
 }
 
@@ -61,7 +61,7 @@ impl Parameter {
 }
 
 impl Form {
-    /// The form of that name.
+    /// Parses the name of a form.
     ///
     /// # Errors
     /// An unknown word, with the known ones; more than two terms.
@@ -79,7 +79,7 @@ impl Form {
             return Err(ParameterError::new("model", format!("is `{name}`; a sum has at most {TERMS_MAX} terms")));
         }
         if terms.len() > 1 && terms.iter().any(|t| t.scale_names().1.is_none()) {
-            let message = format!("is `{name}`; a self-affine surface has no variance and enters no sum");
+            let message = format!("is `{name}`; a self-affine surface has no variance and cannot be part of a sum");
             return Err(ParameterError::new("model", message));
         }
         Ok(Self { name: name.to_owned(), terms, nugget, anisotropic })
@@ -90,28 +90,28 @@ impl Form {
         &self.name
     }
 
-    /// Number of terms.
+    /// Its terms.
     pub fn terms(&self) -> &[&'static dyn Model] {
         &self.terms
     }
 
-    /// True with a nugget.
+    /// True if it has a nugget.
     pub fn has_nugget(&self) -> bool {
         self.nugget
     }
 
-    /// True when directions differ.
+    /// True if the range depends on direction.
     pub fn is_anisotropic(&self) -> bool {
         self.anisotropic
     }
 
-    /// The same form with one range in all directions.
+    /// The same form without anisotropy.
     pub fn isotropic(&self) -> Self {
         let name = self.name.strip_prefix("anisotropic:").unwrap_or(&self.name).to_owned();
         Self { name, anisotropic: false, ..self.clone() }
     }
 
-    /// The same form with a long axis.
+    /// The same form with anisotropy.
     pub fn with_axis(&self) -> Self {
         let name = format!("anisotropic:{}", self.isotropic().name);
         Self { name, anisotropic: true, ..self.clone() }
@@ -145,7 +145,7 @@ impl Form {
         let known = self.parameters();
         if let Some(key) = values.keys().find(|key| known.iter().all(|p| p.name != **key)) {
             let names: Vec<&str> = known.iter().map(|p| p.name.as_str()).collect();
-            let message = format!("is no parameter of model `{}`, which has {}", self.name, names.join(", "));
+            let message = format!("is not a parameter of model `{}`, which has {}", self.name, names.join(", "));
             return Err(ParameterError::new(key, message));
         }
         let mut covariance = self.unit();
@@ -198,7 +198,7 @@ impl Form {
     }
 }
 
-/// An axis' azimuth in [0, 180).
+/// An axis's azimuth reduced to [0, 180).
 pub fn half_turn(azimuth_deg: f64) -> f64 {
     let turned = azimuth_deg - 180.0 * (azimuth_deg / 180.0).floor();
     if turned < 180.0 { turned } else { 0.0 }
@@ -252,7 +252,7 @@ mod tests {
         assert!(with(0.0, 10.0).err().unwrap().to_string().contains("ratio"));
         let covariance = with(0.5, 200.0).unwrap();
         assert!((covariance.azimuth_deg - 20.0).abs() < 1e-12);
-        // Along the axis, 20 degrees east of north, distances are as they are; across, twice as long.
+        // Along the axis, 20 degrees east of north, distances are unchanged; across, they count double.
         let (sin, cos) = libm::sincos(20f64.to_radians());
         assert!((covariance.distance_m([sin, cos]) - 1.0).abs() < 1e-12);
         assert!((covariance.distance_m([cos, -sin]) - 2.0).abs() < 1e-12);

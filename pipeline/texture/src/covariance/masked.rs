@@ -2,18 +2,18 @@
 //!
 //! `C(h) = S(h) / N(h)`, `S(h) = sum of z(i) z(i + h)`, `N(h)` the number of pairs, over all i where both cells have
 //! data. S and N are autocorrelations of the data (0 where there is none) and of the mask, hence two Fourier transforms
-//! (Marcotte, 1996, Computers & Geosciences 22, 1175). No mean is taken off: a caller who wants that does it before.
+//! (Marcotte, 1996, Computers & Geosciences 22, 1175). No mean is subtracted; callers who need that do it beforehand.
 //!
-//! The raster is cut into strips of rows, and these into tiles, which overlap by the largest lag; what two neighbours share is
-//! counted twice and taken off once. So memory is bounded by the tile, not by the raster: about 50 bytes per padded cell of one,
+//! The raster is cut into strips of rows, and these into tiles, which overlap by the largest lag; the overlap of two neighbours is
+//! counted twice and subtracted once. Memory is thus bounded by the tile, not by the raster: about 50 bytes per padded cell of a tile,
 //! 65 MB for strips of 1024 rows and lags of 32 cells. Rounding: about 1e-15 of the zero-lag sum; pair counts are exact.
 
 use sastrugi_numeric::fft::{Complex64, RealFft2, smooth_length};
 use std::ops::Range;
 
-/// Rows that a strip adds, unless four times the largest lag is more.
+/// Rows per strip, without the overlap; at least four times the largest lag.
 const STRIP_ROWS: usize = 1024;
-/// Columns that a tile adds, unless four times the largest lag is more.
+/// Columns per tile, without the overlap; at least four times the largest lag.
 const TILE_COLS: usize = 1024;
 
 /// Pair sums of a raster for lags `(drow, dcol)` with `|drow| <= max_lag[0]`, `|dcol| <= max_lag[1]`.
@@ -30,7 +30,7 @@ pub struct MaskedCovariance {
 impl MaskedCovariance {
     /// Number of pairs and sum of their products at a lag in cells; `None` beyond the largest lag.
     pub fn at(&self, drow: isize, dcol: isize) -> Option<(u64, f64)> {
-        // The estimate is even in the lag; one of two opposite lags is read.
+        // The estimate is even in the lag, so only one of two opposite lags is stored.
         let (drow, dcol) = if (drow, dcol) < (0, 0) { (-drow, -dcol) } else { (drow, dcol) };
         let [max_row, max_col] = self.max_lag.map(|l| l as isize);
         let stored = drow <= max_row && dcol.abs() <= max_col;
@@ -53,6 +53,19 @@ impl MaskedCovariance {
 }
 
 /// Pair sums of row-major `values` in rows of `cols`; NaN is no data. Lags are cut to the raster's size.
+///
+/// ```
+/// use sastrugi_texture::covariance::masked_covariance;
+///
+/// // Two rows of three cells, one of them without data.
+/// let estimate = masked_covariance(&[1.0, 2.0, f64::NAN, 3.0, 4.0, 5.0], 3, [1, 2]);
+/// // Neighbours in a row: 1 x 2, 3 x 4, 4 x 5. Neighbours in a column: 1 x 3, 2 x 4.
+/// let close = |lag: Option<(u64, f64)>, pairs: u64, sum: f64| lag.is_some_and(|l| l.0 == pairs && (l.1 - sum).abs() < 1e-12);
+/// assert!(close(estimate.at(0, 1), 3, 34.0) && close(estimate.at(1, 0), 2, 11.0));
+/// // The estimate is even, and ends at the largest lag.
+/// assert_eq!(estimate.at(-1, 1), estimate.at(1, -1));
+/// assert_eq!(estimate.at(2, 0), None);
+/// ```
 pub fn masked_covariance(values: &[f64], cols: usize, max_lag: [usize; 2]) -> MaskedCovariance {
     let rows = values.len().checked_div(cols).unwrap_or(0);
     let max_lag = [max_lag[0].min(rows.saturating_sub(1)), max_lag[1].min(cols.saturating_sub(1))];
@@ -64,8 +77,8 @@ pub fn masked_covariance(values: &[f64], cols: usize, max_lag: [usize; 2]) -> Ma
     sums.finish()
 }
 
-/// Length of the parts, `most` or somewhat fewer, by which `len` rows or columns are transformed with the least work: cut
-/// evenly and padded little.
+/// Length of the parts into which to cut `len` rows or columns for the least work: at most `most`, evenly cut and with little
+/// padding.
 pub(crate) fn even_step(len: usize, most: usize, max_lag: usize) -> usize {
     let fewest = len.div_ceil(most.max(1)).max(1);
     let step = |parts: usize| len.div_ceil(parts).max(1);
@@ -73,12 +86,13 @@ pub(crate) fn even_step(len: usize, most: usize, max_lag: usize) -> usize {
     step((fewest..=fewest + fewest / 2).min_by_key(work).unwrap_or(fewest))
 }
 
-/// Pair sums of a raster that comes in strips.
+/// Pair sums of a raster that is supplied in strips.
 pub struct PairSums {
     cols: usize,
-    /// Rows and columns that a tile adds; at least the largest lag, so that no pair lies in more than two tiles each way.
+    /// Rows and columns of a tile without its overlap; at least the largest lag, so that no pair lies in more than two tiles in
+    /// either direction.
     step: [usize; 2],
-    /// Sums over tiles, over what they share with those below, with those to the east, and with both.
+    /// Sums over tiles, over their overlaps with the tiles below, with those to the east, and with both.
     tiles: TileSums,
     below: TileSums,
     east: TileSums,
@@ -96,7 +110,7 @@ impl PairSums {
         Self { cols, step, tiles, below, east, corner }
     }
 
-    /// Adds the next strip: its rows, and as many of those below as the largest lag, where there are any.
+    /// Adds the next strip: its rows, followed by up to the largest lag's number of rows from the next strip.
     pub fn add(&mut self, strip: &[f64]) {
         let (cols, [down, across]) = (self.cols, self.step);
         let below = strip.get(down * cols..).filter(|below| !below.is_empty());
@@ -123,22 +137,22 @@ impl PairSums {
     }
 }
 
-/// Sum of products and number of pairs, of two by two kinds of tiles.
+/// Sums of products and numbers of pairs, of the four kinds of tiles.
 type Four = (((f64, u64), (f64, u64)), ((f64, u64), (f64, u64)));
 
-/// Power spectra of data and mask, added up over tiles of one padded shape.
+/// Power spectra of data and mask, accumulated over tiles of one padded shape.
 struct TileSums {
     fft: RealFft2,
     shape: [usize; 2],
     max_lag: [usize; 2],
-    /// The tile at work.
+    /// Buffer for the current tile.
     padded: Vec<f64>,
     data_power: Vec<f64>,
     mask_power: Vec<f64>,
 }
 
 impl TileSums {
-    /// Sums over tiles of `tile` rows and columns or less.
+    /// Sums over tiles of at most `tile` rows and columns.
     fn new(tile: [usize; 2], max_lag: [usize; 2]) -> Self {
         let shape = [0, 1].map(|k| smooth_length(tile[k] + max_lag[k]));
         let half = shape[0] * (shape[1] / 2 + 1);
@@ -158,13 +172,13 @@ impl TileSums {
         add_power(&mut self.mask_power, &self.fft.forward(&self.padded).values);
     }
 
-    /// A figure of each cell of a tile, zeros beyond.
-    fn pad(&mut self, strip: &[f64], cols: usize, part: Range<usize>, figure: impl Fn(f64) -> f64) {
+    /// Fills the buffer with `value` of each cell of a tile, and with zeros beyond.
+    fn pad(&mut self, strip: &[f64], cols: usize, part: Range<usize>, value: impl Fn(f64) -> f64) {
         let filled = strip.len() / cols * self.shape[1];
         let (rows, beyond) = self.padded.split_at_mut(filled);
         for (out, row) in rows.chunks_exact_mut(self.shape[1]).zip(strip.chunks_exact(cols)) {
             let (cells, beyond) = out.split_at_mut(part.len());
-            cells.iter_mut().zip(&row[part.clone()]).for_each(|(o, v)| *o = figure(*v));
+            cells.iter_mut().zip(&row[part.clone()]).for_each(|(o, v)| *o = value(*v));
             beyond.fill(0.0);
         }
         beyond.fill(0.0);

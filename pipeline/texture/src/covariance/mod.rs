@@ -1,4 +1,4 @@
-//! Covariance: models (one file each), the estimate from a masked raster, and what detrending and trimming do to it.
+//! Covariance: models (one file each), the estimate from a masked raster, and the effects of detrending and trimming on it.
 
 pub mod bins;
 pub(crate) mod density;
@@ -23,23 +23,23 @@ pub use models::{MODELS, Model, model};
 /// One term of a covariance.
 #[derive(Clone, Copy)]
 pub struct Structure {
-    /// Its family.
+    /// Correlation model.
     pub model: &'static dyn Model,
     /// Standard deviation sigma, m (self-affine: of increments over 1 m).
     pub sigma_m: f64,
     /// Range b along the long axis, m (self-affine: 1).
     pub range_m: f64,
-    /// Shape; 0 for families without one.
+    /// Shape; 0 for models without one.
     pub shape: f64,
 }
 
-/// A covariance function `sum of sigma_i^2 R_i(rho' / b_i)`, plus a nugget at lag zero; rho' is the distance with what lies
+/// A covariance function `sum of sigma_i^2 R_i(rho' / b_i)`, plus a nugget at lag zero; rho' is the distance with the component
 /// across the long axis stretched by `1 / ratio` (geometric anisotropy).
 #[derive(Clone)]
 pub struct Covariance {
-    /// Terms, the first the leading one.
+    /// Terms, the leading one first.
     pub structures: Vec<Structure>,
-    /// White variance of each cell (noise of the measurement, or texture below the cell), m2.
+    /// Variance that is uncorrelated from cell to cell (measurement noise, or texture below the cell size), m2.
     pub nugget_m2: f64,
     /// Range across the long axis over range along it, in (0, 1].
     pub ratio: f64,
@@ -60,7 +60,26 @@ impl Covariance {
         Ok(Self { structures, nugget_m2: 0.0, ratio: 1.0, azimuth_deg: 0.0 })
     }
 
-    /// The covariance a fit file states: its `model` with that model's parameters; of an empirical fit, the model that continues it.
+    /// The covariance that a fit file states: its `model` with that model's parameters; for an empirical fit, the model that
+    /// extrapolates the map.
+    ///
+    /// ```
+    /// use sastrugi_schemas::fit::FitFile;
+    /// use sastrugi_texture::covariance::Covariance;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // The long axis points to the north; the range across it is half as long.
+    /// let parameters = [("sigma_m", 0.5), ("range_m", 2.0), ("ratio", 0.5), ("azimuth_deg", 0.0)];
+    /// let parameters = parameters.map(|(name, value)| (name.to_owned(), value)).into();
+    /// let fit = FitFile { model: "anisotropic:exponential".to_owned(), parameters, ..FitFile::default() };
+    /// let covariance = Covariance::of_fit(&fit)?;
+    /// assert_eq!(covariance.at([0.0, 0.0]), 0.25);
+    /// // Two metres north or one metre east: exp(-1) is left.
+    /// assert_eq!(covariance.at([0.0, 2.0]), covariance.at([1.0, 0.0]));
+    /// assert!((covariance.at([0.0, 2.0]) / 0.25 - (-1.0f64).exp()).abs() < 1e-12);
+    /// # Ok(())
+    /// # }
+    /// ```
     ///
     /// # Errors
     /// An unknown model; a parameter that is missing, unknown or out of range.
@@ -71,7 +90,7 @@ impl Covariance {
         if !(variance_m2.is_normal() && covariance.nugget_m2.is_finite()) {
             return Err(ParameterError::new(
                 "parameters",
-                format!("give a variance of {variance_m2:e} m2, beyond all computing"),
+                format!("give a variance of {variance_m2:e} m2, which is too large or too small to compute with"),
             ));
         }
         Ok(covariance)
@@ -82,14 +101,14 @@ impl Covariance {
         self.at_distance(self.distance_m(lag_m))
     }
 
-    /// Covariance in m2 at a distance along the long axis (any direction, when isotropic).
+    /// Covariance in m2 at a distance along the long axis (in any direction, if isotropic).
     pub fn at_distance(&self, distance_m: f64) -> f64 {
         let nugget = if distance_m == 0.0 { self.nugget_m2 } else { 0.0 };
         let term = |s: &Structure| s.sigma_m * s.sigma_m * s.model.correlation(distance_m / s.range_m, s.shape);
         self.structures.iter().map(term).sum::<f64>() + nugget
     }
 
-    /// Length of a lag `[east, north]` as the covariance sees it, m.
+    /// Effective length of a lag `[east, north]`: rho', m.
     pub fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
         if self.is_isotropic() {
             return (x * x + y * y).sqrt();
@@ -99,21 +118,21 @@ impl Covariance {
         (along * along + across * across).sqrt()
     }
 
-    /// True when no direction differs from another.
+    /// True if the range is the same in all directions.
     pub fn is_isotropic(&self) -> bool {
         self.ratio == 1.0
     }
 
-    /// True when the covariance is a true one: it has a variance.
+    /// True if all terms have a finite variance.
     pub fn is_stationary(&self) -> bool {
         self.structures.iter().all(|s| s.model.scale_names().1.is_some())
     }
 
-    /// A covariance with a variance that no one can tell from this one over distances well below `outer_m`: a self-affine
-    /// term becomes a Matern one of that range, with the same increments at short lags,
+    /// A stationary covariance that is indistinguishable from this one over distances well below `outer_m`: a self-affine
+    /// term becomes a Matern term with that range and the same increments at short lags,
     /// `sigma^2 = s^2 (2 b)^(2 H) Gamma(1 + H) / (2 Gamma(1 - H))`.
     pub fn stationary(&self, outer_m: f64) -> Self {
-        let twin = |s: &Structure| match s.model.scale_names().1 {
+        let stationary = |s: &Structure| match s.model.scale_names().1 {
             Some(_) => *s,
             None => {
                 let gammas = libm::tgamma(1.0 + s.shape) / (2.0 * libm::tgamma(1.0 - s.shape));
@@ -122,7 +141,7 @@ impl Covariance {
                 Structure { model: &models::matern::Matern, sigma_m, range_m: outer_m, shape: s.shape }
             }
         };
-        Self { structures: self.structures.iter().map(twin).collect(), ..self.clone() }
+        Self { structures: self.structures.iter().map(stationary).collect(), ..self.clone() }
     }
 
     /// Variance without the nugget, m2.
@@ -140,7 +159,7 @@ impl Covariance {
         self.structures.iter().map(|s| s.range_m).fold(0.0, f64::max)
     }
 
-    /// Its parameters by the names of fit files.
+    /// Its parameters, named as in fit files.
     pub fn parameters(&self, form: &Form) -> BTreeMap<String, f64> {
         form.parameters().into_iter().map(|p| (p.name.clone(), p.of(self))).collect()
     }

@@ -1,13 +1,14 @@
 //! Partial windows: see [`super::filtered`].
 //!
-//! The window is cut into blocks. A block stands at two of its cells with data, opposite each other about its middle, which move
-//! from pair to pair; its number of cells is exact. The weights of a window's cells fall linearly across it, from 4 / n to -2 / n at a
-//! border: each point has that of its place in the plane through all points ([`Moments::plane`]; a block's share of the cells alone would
-//! err by 1 to 7 % of the variance there). So the border, holes of a window's size and scattered cells are accounted for.
-//! Pairs and cells follow a low-discrepancy sequence (Kronecker with powers of the generalised golden ratio: Roberts, 2018):
+//! The window is divided into blocks. A block is represented by two of its cells with data, opposite each other about its middle, which
+//! change from pair to pair; its number of cells is exact. At a border the weights of a window's cells fall linearly across it, from 4 / n
+//! to -2 / n: each point has the weight of its place in the plane through all points ([`Moments::plane`]; using only a block's share of
+//! the cells would cause errors of 1 to 7 % of the variance there). This accounts for the border, holes of a window's size and scattered
+//! cells.
+//! Pairs and cells follow a low-discrepancy sequence (Kronecker with powers of the generalised golden ratio: Roberts, 2018);
 //! nothing is random. All bins have the same first cells and the same points, and a first cell counts in a bin by the share of the
-//! bin's lags that lead to a used cell: what the sampling errs by then changes smoothly from bin to bin, as covariances do. Errors of
-//! the same size that differ from bin to bin would be taken for structure by generalised least squares: 1e-4 of the variance moves
+//! bin's lags that lead to a used cell, so that the sampling error varies smoothly from bin to bin, as covariances do. Errors of
+//! the same size but independent from bin to bin would look like structure to generalised least squares: 1e-4 of the variance moves
 //! sigma and b of a Gaussian surface by a quarter.
 
 use super::bins::{LagBins, Member};
@@ -18,26 +19,26 @@ use rayon::prelude::*;
 use sastrugi_roughness::background::{BoxWindow, Moments};
 use std::ops::Range;
 
-/// Pairs with a partial window that are averaged over in each bin (about): the correction is good to 2e-4 of the variance, and from bin
-/// to bin to some 1e-5.
+/// Approximate number of pairs with a partial window averaged over in each bin: the correction is accurate to 2e-4 of the variance, and
+/// relative to neighbouring bins to some 1e-5.
 pub const PAIRS_FINE: f64 = 8192.0;
-/// The same where half that precision is enough.
+/// The same where lower accuracy is enough.
 pub const PAIRS_ROUGH: f64 = 1024.0;
 /// Most lags of a bin, evenly spread in direction, that are tried from a first cell.
 const LAGS_TRIED: usize = 32;
-/// Most pairs looked at in each bin.
+/// Most pairs examined in each bin.
 const PAIRS_MAX: f64 = 65_536.0;
 /// Blocks along a window for its covariance with a cell.
 const FINE_BLOCKS: usize = 6;
 /// Blocks along a window for its covariance with another window, which is smoother.
 const COARSE_BLOCKS: usize = 3;
 
-/// Pairs whose first windows are held at once.
+/// Number of pairs whose first windows are in memory at once.
 const SAMPLES_AT_ONCE: usize = 512;
-/// Most cells counted at once, besides those within reach.
+/// Most cells counted at once, apart from those within reach.
 const STRIP_CELLS: usize = 1 << 22;
 
-/// The raster's cells as the detrender saw them.
+/// The raster's cells as used by the detrending filter.
 pub struct DetrendedCells<'a> {
     /// Number of rows.
     pub rows: usize,
@@ -53,7 +54,7 @@ pub struct DetrendedCells<'a> {
     pub partial: usize,
 }
 
-/// What partial windows add to the covariance of the residual in each bin, as weights of the surface's covariance by lag.
+/// Contribution of partial windows to the covariance of the residual in each bin, as weights of the surface's covariance by lag.
 /// Memory: 4 bytes per cell of a strip of 4 million cells or six reaches (lag and two half windows), and 8 bytes per bin and
 /// lag within the largest lag and two windows, one of two opposite lags.
 pub struct PartialWindows {
@@ -111,7 +112,7 @@ impl PartialWindows {
         Self { reach, shares, weights: sums.into_iter().map(LagWeights::mean).collect() }
     }
 
-    /// What is added in each bin for a surface with the covariance `measured`, m2.
+    /// Contribution to each bin for a surface with the covariance `measured`, m2.
     pub fn correction(&self, measured: &LagField) -> Vec<f64> {
         if self.is_empty() {
             return vec![0.0; self.weights.len()];
@@ -121,7 +122,7 @@ impl PartialWindows {
         self.weights.iter().map(|line| line.iter().zip(&covariance).map(|(w, c)| w * c).sum()).collect()
     }
 
-    /// The same for surfaces whose covariance depends on the distance only, on cells of `cell_m`.
+    /// The same for surfaces whose covariance depends only on distance, on cells of `cell_m`.
     pub fn by_distance(&self, cell_m: [f64; 2]) -> ByDistance {
         let step_m = cell_m[0].min(cell_m[1]) / STEPS_PER_CELL;
         let [rows, cols] = self.reach;
@@ -141,29 +142,28 @@ impl PartialWindows {
         ByDistance { step_m, weights: self.weights.iter().map(spread).collect() }
     }
 
-    /// Share of each bin's pairs of which one or both windows are partial.
+    /// Share of each bin's pairs with one or two partial windows.
     pub fn shares(&self) -> &[f64] {
         &self.shares
     }
 
-    /// True when all windows are complete.
+    /// True if all windows are complete.
     pub fn is_empty(&self) -> bool {
         self.weights.iter().all(Vec::is_empty)
     }
 }
 
-/// Nodes per cell between which a covariance is taken for a straight line: for a range of four cells that errs by 1e-4 of
-/// the correction.
+/// Nodes per cell for linear interpolation of a covariance: for a range of four cells the error is 1e-4 of the correction.
 const STEPS_PER_CELL: f64 = 8.0;
 
-/// [`PartialWindows`] as weights of the covariance by distance: some hundred numbers instead of some ten thousand.
+/// [`PartialWindows`] as weights of the covariance by distance: hundreds of numbers instead of tens of thousands.
 pub struct ByDistance {
     step_m: f64,
     weights: Vec<Vec<f64>>,
 }
 
 impl ByDistance {
-    /// What is added in each bin for a surface with this covariance at a distance in m, m2.
+    /// Contribution to each bin for a surface with this covariance as a function of distance in m, m2.
     pub fn correction(&self, covariance_m2: impl Fn(f64) -> f64) -> Vec<f64> {
         let nodes = self.weights.iter().map(Vec::len).max().unwrap_or(0);
         let at: Vec<f64> = (0..nodes).map(|k| covariance_m2(k as f64 * self.step_m)).collect();
@@ -179,7 +179,7 @@ fn by_direction(members: &[Member]) -> Vec<[isize; 2]> {
     lags
 }
 
-/// First cells of the pairs, spread evenly over the cells used: the more, the fewer windows are partial; none when all
+/// First cells of the pairs, spread evenly over the used cells: more of them the fewer windows are partial, none if all
 /// are complete.
 fn centres(cells: &DetrendedCells, pairs: f64) -> Vec<usize> {
     if cells.partial == 0 {
@@ -191,7 +191,7 @@ fn centres(cells: &DetrendedCells, pairs: f64) -> Vec<usize> {
     cells.used.select(&ranks)
 }
 
-/// Places of two neighbouring rows of lags are this far apart.
+/// Distance between the places of two neighbouring rows of lags.
 fn stride(reach: [isize; 2]) -> isize {
     2 * reach[1] + 1
 }
@@ -200,7 +200,7 @@ fn stride(reach: [isize; 2]) -> isize {
 struct LagWeights {
     reach: [isize; 2],
     weights: Vec<f64>,
-    /// Pairs added, by the shares of lags that lead to used cells.
+    /// Number of pairs added, weighted by the shares of lags that lead to used cells.
     pairs: f64,
     /// Those of them with a partial window.
     partial: f64,
@@ -211,14 +211,14 @@ impl LagWeights {
         Self { reach, weights: vec![0.0; ((2 * reach[0] + 1) * stride(reach)) as usize], pairs: 0.0, partial: 0.0 }
     }
 
-    /// Adds so many times the weights of points at their offsets from a place.
+    /// Adds `times` the weights of points at their offsets from a place.
     fn add(&mut self, from: isize, sign: isize, points: &[Point], times: f64) {
         for p in points {
             self.weights[(from + sign * p.at) as usize] += times * p.weight;
         }
     }
 
-    /// Adds so many times the products of two windows' weights, less those of complete ones.
+    /// Adds `times` the products of two windows' weights, minus those of complete windows.
     fn add_product(&mut self, from: isize, near: &Window, far: &Window, times: f64) {
         near.points.iter().for_each(|n| self.add(from - n.at, 1, &far.points, times * n.weight));
         near.complete.iter().for_each(|n| self.add(from - n.at, 1, &far.complete, -times * n.weight));
@@ -229,7 +229,7 @@ impl LagWeights {
         (row + self.reach[0]) * stride(self.reach) + col + self.reach[1]
     }
 
-    /// Mean over the pairs, of both of two opposite lags: `row` in `0..=reach[0]` (outer), `col` in `-reach[1]..=reach[1]`.
+    /// Mean over the pairs, with opposite lags combined: `row` in `0..=reach[0]` (outer), `col` in `-reach[1]..=reach[1]`.
     fn mean(self) -> Vec<f64> {
         let middle = self.place([0, -self.reach[1]]) as usize;
         let (north, south) = self.weights.split_at(middle);
@@ -241,7 +241,7 @@ impl LagWeights {
     }
 }
 
-/// A cell that stands for some of a window.
+/// A cell that represents a part of a window.
 #[derive(Clone, Copy)]
 struct Point {
     /// Weight in the background.
@@ -261,7 +261,7 @@ struct Near {
     cell: [isize; 2],
     /// Where its points lie in their blocks.
     shift: [f64; 2],
-    /// Its window in fine and in coarse blocks, when it is partial.
+    /// Its window in fine and in coarse blocks, if it is partial.
     partial: Option<[Window; 2]>,
 }
 
@@ -277,7 +277,7 @@ struct Sampler<'a> {
 }
 
 impl Sampler<'_> {
-    /// The first cell of the pairs of a sample; `None` where all its pairs have complete windows.
+    /// The first cell of the pairs of a sample; `None` if all its pairs have complete windows.
     fn near(&self, cell: usize, sample: usize) -> Option<Near> {
         let cell = [cell / self.cells.cols, cell % self.cells.cols].map(|k| k as isize);
         let reach = [0, 1].map(|k| self.reach[k] - self.window.half[k] as isize);
@@ -291,7 +291,7 @@ impl Sampler<'_> {
         Some(Near { cell, shift, partial: self.is_partial(cell).then(windows) })
     }
 
-    /// Adds a pair of `near` and a used cell at one of the lags of a bin; none where no such cell is used.
+    /// Adds a pair of `near` and a used cell at one of the lags of a bin, if there is such a cell.
     fn add_pair(&self, near: &Near, lags: &[[isize; 2]], draw: &Draw, line: &mut LagWeights) {
         let tried = lags.len().min(LAGS_TRIED);
         let lag_at = |k: usize| lags[((k as f64 + draw.unit(0)) * lags.len() as f64 / tried as f64) as usize];
@@ -303,7 +303,7 @@ impl Sampler<'_> {
         let (partner, share) = (partner_at(lag), found as f64 / tried as f64);
         line.pairs += share;
         let from = line.place(lag);
-        // - D_i(j) C(h - j); on average as much as - D_(i+h)(k) C(h + k), whose pairs are those of the opposite lag.
+        // - D_i(j) C(h - j); on average equal to - D_(i+h)(k) C(h + k), whose pairs are those of the opposite lag.
         if let Some([fine, _]) = &near.partial {
             line.add(from, -1, &fine.points, -2.0 * share);
             line.add(from, -1, &fine.complete, 2.0 * share);
@@ -329,8 +329,8 @@ impl Sampler<'_> {
         !self.complete.at(at) && (self.data.within([span(0), span(1)]) as usize) < self.window.area()
     }
 
-    /// The window of the cell `at`: its blocks, `blocks` each way, at cells given by `shift`. Weights are those of the plane through
-    /// the points, so that the model's background reproduces planes as the data's does.
+    /// The window of the cell `at`, with `blocks` blocks in each direction, at cells given by `shift`. Weights are those of the plane
+    /// through the points, so that the model's background reproduces planes as the data's does.
     fn window(&self, at: [isize; 2], blocks: usize, shift: [f64; 2]) -> Window {
         let axes = [Axis::new(self.window.half[0], blocks), Axis::new(self.window.half[1], blocks)];
         let counts = self.data.blocks(at, &axes);
@@ -355,7 +355,7 @@ impl Sampler<'_> {
         Window { points: self.weighted(&own), complete: self.weighted(&complete) }
     }
 
-    /// Points with the weights of the plane through them, from offsets and the number of cells that each stands for.
+    /// Points with the weights of the plane through them, from offsets and the number of cells that each represents.
     fn weighted(&self, points: &[([isize; 2], f64)]) -> Vec<Point> {
         let mut moments = Moments::default();
         points.iter().for_each(|&(offset, count)| moments.add(offset, count));
@@ -367,14 +367,14 @@ impl Sampler<'_> {
         points.iter().map(of).collect()
     }
 
-    /// Index of a cell, `None` beyond the raster.
+    /// Index of a cell; `None` beyond the raster.
     fn index(&self, [row, col]: [isize; 2]) -> Option<usize> {
         let inside = row >= 0 && col >= 0 && row < self.cells.rows as isize && col < self.cells.cols as isize;
         inside.then(|| row as usize * self.cells.cols + col as usize)
     }
 }
 
-/// 1 / g and 1 / g^2 of the plastic number g: a lattice in the square.
+/// 1 / g and 1 / g^2 of the plastic number g: a low-discrepancy lattice in the unit square.
 const LATTICE: [f64; 2] = [0.754_877_666_246_692_7, 0.569_840_290_998_053_2];
 
 /// Rows and columns `from..to`, as offsets from a cell.
@@ -389,7 +389,7 @@ fn point([from, to]: [isize; 2], fraction: f64) -> isize {
     from + (fraction * (to - from) as f64) as isize
 }
 
-/// A window's offsets along one axis, cut into blocks.
+/// A window's offsets along one axis, divided into blocks.
 struct Axis {
     half: isize,
     width: usize,
@@ -407,14 +407,14 @@ impl Axis {
         [self.end(block), self.end(block + 1)]
     }
 
-    /// Offset of the first cell after so many blocks.
+    /// Offset of the first cell after `blocks` blocks.
     fn end(&self, blocks: usize) -> isize {
         (blocks * self.width / self.blocks) as isize - self.half
     }
 }
 
-/// Number of cells with data in any rectangle within some rows, from sums over all cells above and to the left (Crow, 1984).
-/// Sums of more than 2^32 cells wrap round; differences, of a window's cells, do not show it.
+/// Number of cells with data in any rectangle within some rows, from a summed-area table (Crow, 1984). Sums of more than 2^32 cells wrap
+/// around, but differences over a window's cells are still right.
 struct DataCount {
     rows: Range<isize>,
     cols: isize,
@@ -452,7 +452,7 @@ impl DataCount {
         ((row.clamp(self.rows.start, self.rows.end) - self.rows.start) * (self.cols + 1)) as usize
     }
 
-    /// Cells with data in each block of the window about the cell `at`.
+    /// Cells with data in each block of the window around the cell `at`.
     fn blocks(&self, at: [isize; 2], [down, across]: &[Axis; 2]) -> [[u32; FINE_BLOCKS]; FINE_BLOCKS] {
         let mut counts = [[0; FINE_BLOCKS]; FINE_BLOCKS];
         let mut above = [0; FINE_BLOCKS + 1];
@@ -472,8 +472,8 @@ impl DataCount {
         counts
     }
 
-    /// The offset of one of the `data` cells with data of a block about the cell `at`, at fractions of their number and of their
-    /// number in its row.
+    /// The offset of one of the `data` cells with data in a block around the cell `at`: its rank is a fraction of their number, and a
+    /// fraction of the number in its row.
     fn pick(&self, at: [isize; 2], block: Rectangle, data: u32, place: [f64; 2]) -> [isize; 2] {
         let moved = |span: [isize; 2], by: isize| [span[0] + by, span[1] + by];
         let count = |rows: [isize; 2], cols: [isize; 2]| self.within([moved(rows, at[0]), moved(cols, at[1])]);
@@ -487,14 +487,14 @@ impl DataCount {
     }
 }
 
-/// Tiles of a window's size, and whether all their cells have data: most windows are known to be complete by the up to four
+/// Tiles of a window's size, and whether all their cells have data. Most complete windows are recognised by the up to four
 /// tiles that they touch.
 struct CompleteTiles {
-    /// First row of the first tiles.
+    /// Topmost row of the tiles.
     top: isize,
     half: [isize; 2],
     side: [isize; 2],
-    /// Tiles in a row of them.
+    /// Tiles per row.
     across: isize,
     complete: Vec<bool>,
 }
@@ -502,7 +502,7 @@ struct CompleteTiles {
 impl CompleteTiles {
     fn new(data: &DataCount, window: BoxWindow) -> Self {
         let (side, half) = (window.cells().map(|n| n as isize), window.half.map(|n| n as isize));
-        // What is left over at the ends belongs to no tile: windows that reach there are counted.
+        // The remainder at the ends belongs to no tile: windows that extend there are counted cell by cell.
         let (top, down, across) = (data.rows.start, (data.rows.end - data.rows.start) / side[0], data.cols / side[1]);
         let tile = |row: isize, col: isize| {
             let rows = top + row * side[0];
@@ -512,7 +512,7 @@ impl CompleteTiles {
         Self { top, half, side, across, complete }
     }
 
-    /// True only where the window about a cell is complete.
+    /// True only if the window around a cell is complete; it may be complete even if this is false.
     fn at(&self, [row, col]: [isize; 2]) -> bool {
         let (row, [down, across]) = (row - self.top, self.half);
         if row < down || col < across {
@@ -525,7 +525,7 @@ impl CompleteTiles {
     }
 }
 
-/// First of `from..=last` where `holds` turns true, and `last` when it does nowhere before.
+/// First of `from..=last` at which `holds` becomes true, or `last` if it is true nowhere before.
 fn bisect(mut from: isize, mut last: isize, holds: impl Fn(isize) -> bool) -> isize {
     while from < last {
         let middle = from + (last - from) / 2;
@@ -561,7 +561,7 @@ impl Draw {
     }
 }
 
-/// Part of a positive number after the point.
+/// Fractional part of a positive number.
 fn fraction(x: f64) -> f64 {
     x - (x as u64) as f64
 }

@@ -22,7 +22,7 @@ const GRID: [f64; 99] = [
     -0.022, -0.372, N, 1.682, 0.753, 0.754, 1.138, N, -0.639, -0.8, -0.8,
     1.37, -1.46, -0.596, -0.321, 0.225, 0.575, -1.249, -1.73, -0.004, 1.214, 0.757,
 ];
-/// `[drow, dcol, pairs, sum of products]` of the grid less the mean of its data: an independent double loop (numpy).
+/// `[drow, dcol, pairs, sum of products]` of the grid minus the mean of its data, from an independent double loop (numpy).
 #[rustfmt::skip]
 const PAIR_SUMS: [(isize, isize, u64, f64); 45] = [
     (0, -4, 42, 1.0396861090624996), (0, -3, 49, -8.55016841234375), (0, -2, 52, -3.673277226875001),
@@ -41,7 +41,7 @@ const PAIR_SUMS: [(isize, isize, u64, f64); 45] = [
     (4, -1, 33, 1.2249255401562507), (4, 0, 34, -0.07853152718749953), (4, 1, 33, -2.40467048484375),
     (4, 2, 28, 2.052749851875), (4, 3, 26, 1.302430949062499), (4, 4, 24, 0.7129664337499995),
 ];
-/// `(t, [(rho, T)])` with mpmath.
+/// `(t, [(rho, T)])`, computed with mpmath.
 #[rustfmt::skip]
 const TRIMMED: [(f64, [(f64, f64); 13]); 3] = [
     (2.575829303548901, [
@@ -66,7 +66,7 @@ const TRIMMED: [(f64, [(f64, f64); 13]); 3] = [
         (1.0, 0.6230154841346842),
     ]),
 ];
-/// `(b in m, cell in m, window in cells, covariance along an axis at 0, 1, ... cells)` of a unit exponential less its box mean.
+/// `(b in m, cell in m, window in cells, covariance along an axis at 0, 1, ... cells)` of a unit exponential minus its box mean.
 #[rustfmt::skip]
 const BOX_FILTERED: [(f64, f64, usize, [f64; 17]); 4] = [
     (0.28, 0.06, 33, [
@@ -140,7 +140,7 @@ fn val_masked_covariance_of_the_reference_grid() {
     assert_eq!(estimate.at(0, -5), None);
 }
 
-/// Several strips, whose seams must not be counted twice; lags beyond the raster are cut.
+/// Several strips, whose overlaps must not be counted twice; lags beyond the raster are dropped.
 #[test]
 fn val_masked_covariance_equals_the_definition() {
     for (rows, cols, lag, missing) in
@@ -168,7 +168,7 @@ fn val_trimmed_normal() {
     }
 }
 
-/// Two ways to the same number: Mehler's series (long enough for rho to 0.95) and the integral, to 1e-10.
+/// Mehler's series (long enough for rho up to 0.95) and the integral agree to 1e-10.
 #[test]
 fn prop_series_equals_integral() {
     for t in [0.6, 0.8, 1.2, 1.96, 3.0, 6.0] {
@@ -184,7 +184,7 @@ fn prop_series_equals_integral() {
 
 /// Slopes at rho = 0 in closed form: T'(0) = 0.576 and T(1) = 0.759 at 5 %.
 #[test]
-fn val_trimming_bends_the_shape() {
+fn val_trimming_changes_the_shape() {
     let trimmed = TrimmedNormal::new(1.959_963_984_540_054);
     assert!((trimmed.covariance(1e-6) / 1e-6 - 0.576).abs() < 5e-4);
     assert!((trimmed.covariance(1.0) - 0.759).abs() < 5e-4);
@@ -214,13 +214,13 @@ fn val_a_fit_file_needs_a_known_model_and_its_parameters() {
     fit.parameters = [("sigma_m".to_owned(), 0.1), ("range_m".to_owned(), -1.0)].into();
     assert_eq!(message(&fit), "`parameters.range_m` is -1; it must be a finite number above 0");
     fit.parameters.insert("nugget_m2".into(), 0.0);
-    assert!(message(&fit).contains("is no parameter of model `exponential`"));
+    assert!(message(&fit).contains("is not a parameter of model `exponential`"));
     fit.model = "gauss".into();
-    assert!(message(&fit).starts_with("`model` is `gauss`; it is one of exponential, gaussian"));
+    assert!(message(&fit).starts_with("`model` is `gauss`; it must be one of exponential, gaussian"));
 }
 
-/// A raster of 40 x 40 cells with some cells missing, its windows of 9 x 9 cells, and the expected covariance of its
-/// residual in every lag bin by the definition: a sum over all cells of both windows of every pair.
+/// The expected covariance of the residual of a raster of 40 x 40 cells with some cells missing, in windows of 9 x 9 cells, in every lag
+/// bin: by the fast method, and by the definition as a sum over all cells of both windows of every pair.
 fn partial_windows_case(missing: impl Fn(usize, usize) -> bool, range_m: f64) -> (Vec<f64>, Vec<f64>) {
     const SIDE: usize = 40;
     let window = BoxWindow { half: [4; 2] };
@@ -299,7 +299,7 @@ fn plane_weights(at: [isize; 2], cells: Vec<[isize; 2]>) -> Vec<([isize; 2], f64
 }
 
 /// Tolerance 5e-4 of the surface's variance, 1.5e-3 with scattered holes: a window of 9 cells has blocks of one or two
-/// cells, in which the statistics of scattered holes are only roughly met. The corrections are up to 100 times larger.
+/// cells, which represent the statistics of scattered holes only roughly. The corrections are up to 100 times larger.
 #[test]
 fn val_partial_windows_equal_the_definition() {
     let scattered = noise(1600, 0.2);
@@ -323,7 +323,7 @@ fn val_partial_windows_equal_the_definition() {
     }
 }
 
-/// A raster with windows of usual size: the mask, the bins of its residual, and what partial windows add to models.
+/// A raster with windows of a realistic size: the mask, the bins of its residual, and the correction for partial windows.
 struct LargeWindows {
     side: usize,
     window: BoxWindow,
@@ -421,15 +421,15 @@ impl LargeWindows {
         kernel
     }
 
-    /// How far generalised least squares are led from the truth by the error of the model's mean: sigma and b, relative.
-    fn led_astray(&self, model: &Covariance) -> [f64; 2] {
+    /// Relative bias of sigma and b from generalised least squares caused by the error of the model's mean.
+    fn bias(&self, model: &Covariance) -> [f64; 2] {
         let expectation = self.expectation();
         let scaled = |by: f64| {
             let mut other = model.clone();
             other.structures[0].range_m *= by;
             other
         };
-        // So that trimming takes next to nothing.
+        // The threshold is so large that trimming removes almost nothing.
         let mean = |model: &Covariance| expectation.mean(model, THRESHOLD);
         let step = 1e-3;
         let at = mean(model);
@@ -446,22 +446,140 @@ impl LargeWindows {
     }
 }
 
-/// Standard deviations of a unit surface beyond which [`LargeWindows::led_astray`] trims.
+/// Standard deviations of a unit surface beyond which [`LargeWindows::bias`] trims.
 const THRESHOLD: f64 = 8.0;
 
-/// Against the definition with windows of 17 cells, borders and 15 % scattered holes: the error of the mean leads the fit of a rough
-/// surface (exponential) astray by less than 1 % in b, that of a smooth one (Gaussian), whose bins hardly scatter about each other, by
-/// less than 3 %; with errors of the same size that differ from bin to bin it was a quarter.
+/// Against the definition with windows of 17 cells, borders and 15 % scattered holes: the error of the mean biases the fit of a rough
+/// surface (exponential) by less than 1 % in b, and that of a smooth one (Gaussian), whose bins hardly scatter among themselves, by
+/// less than 3 %; with errors of the same size but independent from bin to bin it was a quarter.
 #[test]
-fn val_the_mean_of_large_windows_does_not_mislead_fits() {
+fn val_the_mean_of_large_windows_does_not_bias_fits() {
     let holes = noise(64 * 64, 0.15);
     let border = LargeWindows::new(64, 8, |_| false);
     let scattered = LargeWindows::new(64, 8, |k| holes[k].is_nan());
     for (name, case) in [("border", &border), ("scattered", &scattered)] {
         for (kind, range_m, limits) in [("exponential", 3.0, [0.005, 0.01]), ("gaussian", 4.0, [0.03, 0.02])] {
-            let [sigma, b] = case.led_astray(&Covariance::new(model(kind).unwrap(), 1.0, range_m).unwrap());
+            let [sigma, b] = case.bias(&Covariance::new(model(kind).unwrap(), 1.0, range_m).unwrap());
             println!("{name} {kind}: sigma {:+.2} %, b {:+.2} %", 100.0 * sigma, 100.0 * b);
             assert!(sigma.abs() < limits[0] && b.abs() < limits[1], "{name} {kind}: {sigma} {b}");
         }
+    }
+}
+
+/// Rows count southwards: a lag of one row south and two columns east.
+#[test]
+fn val_lags_in_metres() {
+    assert_eq!(lag::lag_m([1, 2], [0.5, 0.25]), [1.0, -0.25]);
+    assert_eq!(lag::length_m([3, -4], [0.5, 0.5]), 2.5);
+    assert_eq!(lag::length_m([2, 3], [1.0, 2.0]), 5.0);
+}
+
+/// Every model at hand-computed ratios of distance and range, and the increments of a self-affine surface: s^2 d^(2 H) over d.
+#[test]
+fn val_models_by_hand() {
+    let at = |name: &str, ratio: f64, shape: f64| model(name).unwrap().correlation(ratio, shape);
+    let e = libm::exp(-1.0);
+    for (name, expected) in [("exponential", [1.0, e, e * e]), ("gaussian", [1.0, e, e * e * e * e])] {
+        for (ratio, correlation) in [0.0, 1.0, 2.0].into_iter().zip(expected) {
+            assert!((at(name, ratio, 0.0) - correlation).abs() < 1e-15, "{name} {ratio}");
+        }
+    }
+    assert_eq!([0.0, 0.5, 1.0, 1.5].map(|r| at("spherical", r, 0.0)), [1.0, 0.3125, 0.0, 0.0]);
+    // (1 + x) exp(-x) for a smoothness of 3/2.
+    assert!((at("matern", 1.0, 1.5) - 2.0 * e).abs() < 1e-13);
+    let affine = Form::parse("self_affine").unwrap();
+    let affine = affine.covariance(&[("increment_1m_m".to_owned(), 0.1), ("hurst".to_owned(), 0.75)].into()).unwrap();
+    let increment = |d: f64| 2.0 * (affine.at_distance(0.0) - affine.at_distance(d));
+    assert!((increment(1.0) - 0.01).abs() < 1e-15 && (increment(4.0) - 0.08).abs() < 1e-14);
+    assert!(!affine.is_stationary());
+}
+
+/// The stationary counterpart of a self-affine surface has its increments at lags far below the range: the error is of the order of
+/// `(d / 2 b)^(2 - 2 H)`, 2 % here, and falls by 2^(2 - 2 H) where the lag is halved.
+#[test]
+fn conv_the_stationary_counterpart_has_the_same_increments() {
+    let affine = Form::parse("self_affine").unwrap();
+    let affine = affine.covariance(&[("increment_1m_m".to_owned(), 0.1), ("hurst".to_owned(), 0.5)].into()).unwrap();
+    let twin = affine.stationary(10.0);
+    assert!(twin.is_stationary() && twin.range_m() == 10.0);
+    // With H = 1/2 it is an exponential: sigma^2 = s^2 2 b Gamma(3/2) / (2 Gamma(1/2)) = s^2 b / 2.
+    assert!((twin.variance_m2() / (0.01 * 10.0 / 2.0) - 1.0).abs() < 1e-12, "{}", twin.variance_m2());
+    let error = |d: f64| {
+        let increment = |c: &Covariance| c.at_distance(0.0) - c.at_distance(d);
+        1.0 - increment(&twin) / increment(&affine)
+    };
+    // Of an exponential, (1 - exp(-x)) / x = 1 - x / 2 + ...
+    assert!((error(0.4) / 0.02 - 1.0).abs() < 0.02, "{}", error(0.4));
+    assert!((error(0.4) / error(0.2) - 2.0).abs() < 0.02);
+}
+
+/// Rings and sectors of a raster of 3 x 3 ones, by hand. Lags up to 2 cells: lag 0 (9 pairs); east and south (6 each) and both diagonals (4
+/// each) in ring 1; two cells east or south (3 each) in ring 2.
+#[test]
+fn val_bins_by_hand() {
+    let ones = masked_covariance(&[1.0; 9], 3, [2, 2]);
+    let bins = LagBins::of(&ones, [1.0; 2], 2.0, bins::Layout::ISOTROPIC);
+    assert_eq!((bins.pairs.as_slice(), bins.covariance_m2.len()), ([9, 20, 6].as_slice(), 3));
+    assert!(bins.covariance_m2.iter().all(|c| (c - 1.0).abs() < 1e-12));
+    let mean = (12.0 + 8.0 * 2f64.sqrt()) / 20.0;
+    assert!((bins.lag_m[1] - mean).abs() < 1e-12 && bins.lag_m[0] == 0.0 && (bins.lag_m[2] - 2.0).abs() < 1e-12);
+    // The mean of any function is weighted by pairs: of the number of rows in ring 1, (6 + 4 + 4) / 20.
+    let rows = bins.average(|lag| lag[0].abs() as f64);
+    assert!((rows[1] - 0.7).abs() < 1e-12 && (rows[2] - 1.0).abs() < 1e-12, "{rows:?}");
+    // Another estimate in the same bins.
+    let twos = masked_covariance(&[2.0; 9], 3, [2, 2]);
+    assert!(bins.means(&twos).iter().all(|c| (c - 4.0).abs() < 1e-12));
+
+    // Directions, clockwise from north: one row south and two columns east is 116.6 degrees, two south and one east 153.4, two south and one west
+    // 26.6; on cells twice as wide as high the first is 104.0 degrees.
+    let ones = masked_covariance(&[1.0; 100], 10, [4, 4]);
+    let azimuth = |cell_m: [f64; 2], lag: [isize; 2]| {
+        let bins = LagBins::of(&ones, cell_m, 5.0, bins::Layout::DIRECTIONAL);
+        let member = bins.members.iter().find(|m| m.lag == lag).unwrap();
+        bins.azimuth_deg[member.bin]
+    };
+    let square = [1.0; 2];
+    let found = [[0, 1], [1, 0], [1, 2], [2, 1], [2, -1]].map(|lag| azimuth(square, lag).unwrap());
+    assert_eq!(found, [90.0, 0.0, 120.0, 150.0, 30.0]);
+    assert_eq!((azimuth(square, [0, 0]), azimuth([2.0, 1.0], [1, 2])), (None, Some(90.0)));
+}
+
+/// A Gaussian surface `exp(-(h / b)^2)` seen through a Gaussian point spread function of standard deviation s has the covariance
+/// `b^2 / b'^2 exp(-(h / b')^2)`, `b'^2 = b^2 + 4 s^2`. Tolerance 1e-12.
+#[test]
+fn val_blur_widens_a_gaussian() {
+    let (range_m, spread_m) = (0.5, 0.2);
+    let measurement = Measurement { inner_scale_m: spread_m, ..Measurement::default() };
+    let filter = filtered::DetrendFilter::new(BoxWindow { half: [20; 2] }, [0.1; 2], [20; 2], measurement);
+    let model = Covariance::new(model("gaussian").unwrap(), 1.0, range_m).unwrap();
+    let found = filter.measured_covariance(&model);
+    let wide2 = range_m * range_m + 4.0 * spread_m * spread_m;
+    for lag in [[0, 0], [0, 3], [5, 0], [-4, 4], [0, 11]] {
+        let square = 0.01 * (lag[0] * lag[0] + lag[1] * lag[1]) as f64;
+        let expected = range_m * range_m / wide2 * libm::exp(-square / wide2);
+        assert!((found.at(lag) - expected).abs() < 1e-12, "{lag:?}: {} {expected}", found.at(lag));
+    }
+}
+
+/// White noise minus its mean over a window of 5 rows by 7 columns: `w^2 (delta(h) - 2 D(h) + o(h) / 35^2)`, D 1/35 within the window, o the
+/// number of cells common to two windows. Tolerance 1e-15.
+#[test]
+fn val_white_noise_of_a_residual() {
+    let noise = crate::noise::Noise { white_sigma_m: 0.1, ..Default::default() };
+    let measurement = Measurement { noise, ..Measurement::default() };
+    let filter = filtered::DetrendFilter::new(BoxWindow { half: [2, 3] }, [0.1; 2], [8; 2], measurement);
+    let found = filter.residual_noise();
+    for (lag, expected) in [
+        ([0, 0], 1.0 - 1.0 / 35.0),
+        ([0, 1], -2.0 / 35.0 + 30.0 / 1225.0),
+        ([2, 0], -2.0 / 35.0 + 21.0 / 1225.0),
+        // Beyond the window to the south, not to the east.
+        ([3, 0], 14.0 / 1225.0),
+        ([0, 3], -2.0 / 35.0 + 20.0 / 1225.0),
+        ([0, 4], 15.0 / 1225.0),
+        ([5, 0], 0.0),
+        ([4, 6], 1.0 / 1225.0),
+    ] {
+        assert!((found.at(lag) - 0.01 * expected).abs() < 1e-15, "{lag:?}: {:e}", found.at(lag));
     }
 }

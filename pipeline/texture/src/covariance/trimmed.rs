@@ -1,15 +1,14 @@
-//! Covariance of a normal pair of which only values within +-t are kept.
+//! Covariance of a normal pair after trimming to +-t.
 //!
 //! For a unit bivariate normal with correlation rho, `T(rho) = N(rho) / P(rho)`,
-//! `N = E[X Y; |X| < t, |Y| < t]`, `P = Pr(|X| < t, |Y| < t)`: what the mean product of the pairs that survive trimming
-//! estimates. Trimming bends the shape of a covariance and not only its scale: at t = 1.96, T(1) = 0.759, but
-//! T'(0) = 0.576.
+//! `N = E[X Y; |X| < t, |Y| < t]`, `P = Pr(|X| < t, |Y| < t)`: the expected mean product of the pairs that survive trimming.
+//! Trimming changes the shape of a covariance and not only its scale: at t = 1.96, T(1) = 0.759, but T'(0) = 0.576.
 //!
 //! * `|rho| <= 0.95`: Mehler's series (1866), `N = sum of a_n^2 rho^n` over odd n and `P = sum of p_n^2 rho^n` over even
 //!   n, where `a_n` and `p_n` are the coefficients of `x 1(|x| < t)` and `1(|x| < t)` in normalised Hermite polynomials
 //!   `h_n`: `p_0 = Pr(|X| < t)`, `p_n = -2 phi(t) h_(n-1)(t) / sqrt(n)`, `a_1 = p_0 - 2 t phi(t)`,
 //!   `a_n = -2 phi(t) [h_n(t) + sqrt(n / (n-1)) h_(n-2)(t)]`.
-//! * beyond: the derivatives of N and P with respect to rho (Price, 1958) integrated from rho = 1 down along
+//! * Above: the derivatives of N and P with respect to rho (Price, 1958) integrated from rho = 1 down along
 //!   `rho = cos theta`, where every integrand is smooth:
 //!   `P(1) - P(rho) = integral of 2 (E+ - E-)`,
 //!   `N(1) - N(rho) = integral of P sin theta - 4 t phi(t) Pr(|X| < t | Y = t) sin theta + 2 t^2 (E+ + E-)`,
@@ -20,7 +19,7 @@
 use sastrugi_statistics::normal;
 use std::f64::consts::PI;
 
-/// Correlation above which the series is left for the integral.
+/// Correlation above which the integral replaces the series.
 const SERIES_MAX: f64 = 0.95;
 /// Terms of the series: 0.95^630 is 1e-14.
 const TERMS: usize = 630;
@@ -47,7 +46,7 @@ impl TrimmedNormal {
         Self { t, density, mass, second_moment, squares: squares(t, density, mass), nodes: gauss_legendre(NODES) }
     }
 
-    /// T: mean product of the pairs that survive; `rho` in [-1, 1] (values beyond are cut).
+    /// T: mean product of the surviving pairs; `rho` in [-1, 1] (values beyond are clamped).
     pub fn covariance(&self, rho: f64) -> f64 {
         let (product, pairs) = self.moments(rho);
         product / pairs

@@ -1,9 +1,10 @@
-//! How much of the residual a texture from the fit reproduces; the noise of the measurement, which no texture has, is taken off both.
+//! How much of the residual a texture from the fit reproduces, after the measurement noise, which a texture does not have, is
+//! subtracted from both.
 //!
-//! A texture is normal. Detrended as the DEM was and trimmed at the same level, it has on average the covariance `v T(C / v; z)`:
-//! C the model through the detrender, v its variance, z the normal threshold of the level, T what trimming does
-//! ([`crate::covariance::trimmed`]). Compared with the measured bins this says what the texture lacks, in total and in its increments,
-//! `2 (C(0) - C(h))`. A residual with heavy tails has a threshold beyond z, so that a model with the right covariance still makes
+//! A texture is normal. Detrended like the DEM and trimmed at the same level, it has on average the covariance `v T(C / v; z)`:
+//! C the model after the detrending filter, v its variance, z the normal threshold of the level, T the effect of trimming
+//! ([`crate::covariance::trimmed`]). Comparison with the measured bins shows what the texture lacks, in total and in its increments,
+//! `2 (C(0) - C(h))`. A residual with heavy tails has a threshold beyond z, so that even a model with the right covariance produces
 //! textures that are too weak.
 
 use super::case::Case;
@@ -14,7 +15,7 @@ use crate::covariance::trimmed::TrimmedNormal;
 use sastrugi_schemas::fit::{Carried, CarriedOctave, CovarianceMap};
 use sastrugi_statistics::normal;
 
-/// What a texture from a model has; the estimator is one on rings.
+/// What a texture from a model reproduces; `estimator` must be on rings.
 pub fn by_model(estimator: &Estimator, estimate: &Estimate) -> Carried {
     let case = estimator.case;
     let variance_m2 = estimator.expectation.variance_m2(&estimate.covariance);
@@ -25,7 +26,7 @@ pub fn by_model(estimator: &Estimator, estimate: &Estimate) -> Carried {
     carried(case, &binned, variance_m2 - noise.at([0, 0]), &noise)
 }
 
-/// The measured covariance, continued by a model, and what a texture from it has.
+/// The measured covariance, extrapolated by a model, and what a texture from it reproduces.
 pub fn by_map(case: &Case, estimate: &Estimate) -> (CovarianceMap, Carried) {
     let trimmed = TrimmedNormal::new(threshold(case));
     let sums = &case.survey.covariance;
@@ -39,17 +40,17 @@ pub fn by_map(case: &Case, estimate: &Estimate) -> (CovarianceMap, Carried) {
     (map, carried)
 }
 
-/// The noise's covariance in the rings, of which trimming leaves a share: about the same of texture and noise.
+/// The noise's covariance in the rings after trimming, which keeps about the same share `kept` of texture and noise.
 fn trimmed_noise(case: &Case, noise: &LagField, kept: f64) -> Vec<f64> {
     case.bins.average(|lag| kept * noise.at(lag))
 }
 
-/// Where the level of trimming cuts a unit normal.
+/// The trimming threshold of a standard normal variable.
 fn threshold(case: &Case) -> f64 {
     normal::quantile(1.0 - 0.5 * case.settings.trim())
 }
 
-/// Trimmed covariance of a texture in the rings beside the measured one without its noise.
+/// Compares the trimmed covariance of a texture in the rings with the measured one minus its noise.
 fn carried(case: &Case, binned: &[f64], variance_m2: f64, noise: &LagField) -> Carried {
     let noise_m2 = trimmed_noise(case, noise, binned[0] / variance_m2);
     let measured: Vec<f64> = case.bins.covariance_m2.iter().zip(noise_m2).map(|(all, noise)| all - noise).collect();

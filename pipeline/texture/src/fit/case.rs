@@ -1,4 +1,4 @@
-//! A DEM detrended, trimmed and correlated: everything a fit is made of.
+//! A DEM after detrending, trimming and binning of its covariance: the input of a fit.
 
 use super::heights::Heights;
 use super::search::Coordinates;
@@ -13,12 +13,12 @@ use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::ParameterError;
 use std::ops::Range;
 
-/// Correlation of neighbouring cells below which a residual may be white: an exponential of a range of one cell has 0.37.
+/// Correlation of neighbouring cells below which a residual may be white; an exponential with a range of one cell has 0.37.
 const WHITE_CORRELATION: f64 = 0.5;
 /// Fewest bins for two parameters.
 const BINS_MIN: usize = 3;
 
-/// A DEM detrended, trimmed and correlated.
+/// A DEM after detrending, trimming and binning of its covariance.
 pub struct Case<'a> {
     pub heights: &'a dyn Heights,
     pub settings: &'a FitSettings,
@@ -32,11 +32,12 @@ pub struct Case<'a> {
 }
 
 impl<'a> Case<'a> {
-    /// Detrends, trims and correlates.
+    /// Detrends, trims and bins the covariance.
     pub fn new(heights: &'a dyn Heights, settings: &'a FitSettings) -> Result<Self, FitError> {
         let (geometry, profiles) = (heights.geometry(), heights.are_profiles());
         if let Some(form) = settings.forms.iter().find(|f| profiles && f.is_anisotropic()) {
-            let message = format!("is `{}`; a transect knows one direction only", form.name());
+            let message =
+                format!("is `{}`, but a transect has only one direction; use an isotropic model", form.name());
             return Err(ParameterError::new("model", message).into());
         }
         let window = settings.window(&geometry, profiles)?;
@@ -44,17 +45,18 @@ impl<'a> Case<'a> {
         let [width_m, height_m] = geometry.size();
         let half_m = 0.5 * if profiles { width_m } else { width_m.min(height_m) };
         if max_lag_m > half_m {
-            let message =
-                format!("is {max_lag_m} m; pairs at more than half the DEM's side, {half_m} m, are too few to tell");
+            let message = format!(
+                "is {max_lag_m} m; it must be at most half the DEM's side, {half_m} m, beyond which pairs are too few"
+            );
             return Err(ParameterError::new("max_lag_m", message).into());
         }
         let cells = |axis: usize| (max_lag_m / geometry.cell[axis] * (1.0 + 1e-9)) as usize;
         let max_lag = [if profiles { 0 } else { cells(1) }, cells(0)];
         if settings.empirical && profiles {
-            let message = "is `empirical`, which needs covariances in two directions; a transect knows one";
+            let message = "is `empirical`, which needs covariances in two directions, but a transect has only one";
             return Err(ParameterError::new("model", message).into());
         }
-        // Half of the DEM, which is at least three windows wide, as all lags.
+        // These lags stay below half of the DEM, which is at least three windows wide.
         let measured = |axis: usize| match settings.empirical {
             true => max_lag[axis].max((REACH_WINDOWS * window.cells()[axis] as f64) as usize),
             false => max_lag[axis],
@@ -68,15 +70,15 @@ impl<'a> Case<'a> {
         let (noise_m, residual_m) = (noise.at([0, 0]).sqrt(), bins.covariance_m2[0].sqrt());
         if noise_m >= residual_m {
             let message = format!(
-                "and `correlated_noise_sigma_m` leave {noise_m:.3e} m of noise in the residual, whose own standard deviation is \
-                 {residual_m:.3e} m: state less noise"
+                "and `correlated_noise_sigma_m` amount to {noise_m:.3e} m of noise in the residual, whose total standard deviation is \
+                 only {residual_m:.3e} m; reduce them"
             );
             return Err(ParameterError::new("noise_sigma_m", message).into());
         }
         Ok(Self { heights, settings, geometry, window, max_lag, max_lag_m, survey, bins })
     }
 
-    /// True when neighbouring cells of the residual are hardly correlated.
+    /// True if neighbouring cells of the residual are hardly correlated.
     pub fn is_white(&self) -> bool {
         let neighbours = [(0, 1), (1, 0)].into_iter().filter_map(|(r, c)| self.survey.covariance.covariance(r, c));
         neighbours.fold(f64::NEG_INFINITY, f64::max) < WHITE_CORRELATION * self.bins.covariance_m2[0]
@@ -99,13 +101,13 @@ impl<'a> Case<'a> {
         self.survey.residual(self.heights, self.settings, 0..self.geometry.rows, 0..self.geometry.cols)
     }
 
-    /// Width of the window, m (the mean of both ways; along transects).
+    /// Width of the window, m: mean of both directions; for transects, along them.
     pub fn window_m(&self) -> f64 {
         let [x, y] = self.window.size_m(self.geometry.cell);
         if self.heights.are_profiles() { x } else { 0.5 * (x + y) }
     }
 
-    /// Coordinates for a search over the parameters of a form.
+    /// Search coordinates for the parameters of a form.
     pub fn coordinates<'f>(&self, form: &'f Form) -> Coordinates<'f> {
         Coordinates {
             form,

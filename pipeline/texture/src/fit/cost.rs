@@ -1,17 +1,16 @@
-//! How much processor time a fit takes.
+//! Processor time of a fit.
 //!
-//! What is counted, with n cells, a window of w x v cells, `W` = sum of `f^2 w v` over the factors f of the windows that the raster is looked
-//! at with (1, 1/2 and, where three of them fit into it, 2), m forms, B replicates of at most n' cells, and r rings of lags:
+//! For n cells, a window of w x v cells, `W` = sum of `f^2 w v` over the factors f of the windows at which the raster is fitted
+//! (1, 1/2 and, where three of them fit into it, 2), m forms, B replicates of at most n' cells, and r rings of lags:
 //! $$ t = t_0 + t_n n + k\, t_w W \frac{3 + m}{4} + B\,(t_s n' + k'\, t_r r^2 d) $$
-//! The first terms are the search for objects and the moving averages of the whole; `W` stands for the model on the lags of a window, which
-//! every step of a search works out anew, and the search ends after so many steps whatever the data; a replicate is a surface, its
-//! transforms and a search from a good start. k is 1 where all windows are complete. Holes make most of them partial, and only the heights
-//! tell holes: measured DEMs count [`MEASURED`], oblong cells, whose lags have more distinct lengths, another [`OBLONG`]; k' is
-//! [`MEASURED_REPLICATE`] or 1. d is
-//! [`DIRECTIONAL`] where a form has an axis, which takes bins by direction.
+//! The first two terms are the search for objects and the moving averages of the complete raster. The `W` term is the model on the lags of a
+//! window, which every step of a search recomputes; the number of steps hardly depends on the data. A replicate is a surface, its
+//! transforms and a search from a good start. k is 1 where all windows are complete. Holes make most windows partial, but are known only
+//! once the heights are read: k is [`MEASURED`] for measured DEMs, times [`OBLONG`] for oblong cells, whose lags have more distinct
+//! lengths. k' is [`MEASURED_REPLICATE`] or 1. d is [`DIRECTIONAL`] if a form is anisotropic and therefore needs bins by direction.
 //!
-//! The constants are those of surfaces of 90 000 to 1.4 million cells, windows of 20 to 120 cells, complete and with 44 % of holes, on one
-//! core; the predictions were within a factor of 1.6 of the measured times.
+//! The constants were calibrated on surfaces of 90 000 to 1.4 million cells, windows of 20 to 120 cells, complete and with 44 % of holes, on
+//! one core; the predictions were within a factor of 1.6 of the measured times.
 
 use super::FitSettings;
 use super::params::Mode;
@@ -20,41 +19,41 @@ use crate::covariance::Form;
 use crate::synth::Prospect;
 use sastrugi_numeric::Geometry;
 
-/// Of any fit, s.
+/// Fixed cost of a fit, s.
 const BASE_S: f64 = 0.3;
-/// Of a cell, s.
+/// Per cell, s.
 const CELL_S: f64 = 7e-7;
-/// Of a cell of a window, for all steps of the search of one form, s.
+/// Per cell of a window, for all steps of the search for one form, s.
 const WINDOW_CELL_S: f64 = 1.8e-4;
-/// Of a cell of a replicate, s.
+/// Per cell of a replicate, s.
 const REPLICATE_CELL_S: f64 = 1.5e-7;
-/// Of a replicate for each pair of rings, s.
+/// Per replicate and pair of rings, s.
 const REPLICATE_RINGS_S: f64 = 1.3e-4;
-/// What holes and ragged borders of a measured DEM add.
+/// Factor for holes and ragged borders of a measured DEM.
 const MEASURED: f64 = 2.1;
-/// The same of a replicate.
+/// The same for a replicate.
 const MEASURED_REPLICATE: f64 = 1.5;
-/// What cells with two sides add.
+/// Factor for oblong cells.
 const OBLONG: f64 = 1.8;
-/// What bins by direction add to a replicate.
+/// Factor for bins by direction in a replicate.
 const DIRECTIONAL: f64 = 2.0;
-/// Rings of lags at most.
+/// Most rings of lags.
 const RINGS_MAX: f64 = 32.0;
-/// Of a cell in `paper` mode, s.
+/// Per cell in `paper` mode, s.
 const PAPER_CELL_S: f64 = 4e-7;
-/// Windows across a surface whose cells are not known.
+/// Windows assumed across a surface of unknown cell size.
 const WINDOWS_ACROSS: f64 = 10.0;
-/// Windows along the torus of a texture that does not repeat: sixteen ranges of an exponential, each as long as the window. A fit may find a
-/// longer range, up to where its search ends; planned for that, most textures would run alone or not at all.
+/// Windows along the torus of a non-periodic texture: sixteen ranges of an exponential, each assumed as long as the window. A fit may find a
+/// longer range, up to the bound of its search; if that were planned for, most textures would run alone or not at all.
 const TORUS_WINDOWS: f64 = 16.0;
 
 impl FitSettings {
-    /// What is known of the fit, of a surface with such cells, before it is made.
+    /// What is known before the fit of a surface with these cells, for planning.
     pub fn prospect(&self, cell_m: Option<[f64; 2]>) -> Prospect {
         Prospect { torus_m: TORUS_WINDOWS * self.outer_scale_m(), cell_m, is_measured: self.is_empirical() }
     }
 
-    /// Rough time of a fit of `cells` cells on one core, s. Where shape and cells are not known, for a square with ten windows to a side.
+    /// Approximate time of a fit of `cells` cells on one core, s. If shape and cell size are unknown, a square ten windows wide is assumed.
     pub fn seconds(&self, cells: u64, place: Option<&Geometry>, is_measured: bool) -> f64 {
         let n = cells as f64;
         if self.mode() == Mode::Paper {
@@ -71,7 +70,7 @@ impl FitSettings {
     }
 
     fn replicate_seconds(&self, cells: f64, window: [f64; 2], k: f64) -> f64 {
-        // Lags of half a window.
+        // Lags up to half a window.
         let rings = (0.5 * window[0].max(window[1])).clamp(3.0, RINGS_MAX);
         let directions = if self.forms.iter().any(Form::is_anisotropic) { DIRECTIONAL } else { 1.0 };
         REPLICATE_CELL_S * cells.min(CELLS_MAX as f64) + k * REPLICATE_RINGS_S * rings * rings * directions
@@ -85,7 +84,7 @@ impl FitSettings {
             .map(|side| side.clamp(1.0, cells.sqrt().max(1.0)))
     }
 
-    /// Sum of the squares of the factors of the windows that are tried.
+    /// Sum of the squared factors of the windows tried.
     fn windows(&self, place: Option<&Geometry>) -> f64 {
         let across = place.map_or(WINDOWS_ACROSS, |g| g.size()[0].min(g.size()[1]) / self.outer_scale_m());
         if across >= 6.0 { 1.0 + 0.25 + 4.0 } else { 1.0 + 0.25 }
@@ -105,8 +104,8 @@ mod tests {
         FitSettings::try_from(parameters).unwrap().seconds(place.len() as u64, Some(&place), is_measured)
     }
 
-    /// Processor times of one core, s: a gravel bar of which 44 % are holes in cells of 2 cm, a hillside of which a third are in cells of 50 cm,
-    /// a complete radar DEM in oblong cells, and complete synthetic surfaces in cells of 5 cm.
+    /// Processor times on one core, s: a gravel bar with 44 % holes at 2 cm cells, a hillside with a third holes at 50 cm cells,
+    /// a complete radar DEM with oblong cells, and complete synthetic surfaces at 5 cm cells.
     #[test]
     fn val_predictions_are_near_the_measured_times() {
         let of = |outer_scale_m: f64, bootstrap: u32, model: &str| FitParameters {

@@ -1,8 +1,8 @@
-//! What a fit refuses.
+//! Errors of a fit.
 
 use sastrugi_schemas::ParameterError;
 
-/// A DEM or parameters that cannot be fitted.
+/// Why a DEM cannot be fitted, or with which parameters.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FitError {
     /// A parameter is out of its range.
@@ -12,7 +12,9 @@ pub enum FitError {
     #[error("{0}")]
     Unreadable(String),
     /// Fewer than two windows fit side by side.
-    #[error("the DEM is {width_m} m x {height_m} m; a background needs at least two windows, {needed_m} m, each way")]
+    #[error(
+        "the DEM is {width_m} m x {height_m} m; it must be at least two windows, {needed_m} m, wide in both directions"
+    )]
     DemTooSmall {
         /// East-west extent, m.
         width_m: f64,
@@ -21,17 +23,17 @@ pub enum FitError {
         /// Two windows, m.
         needed_m: f64,
     },
-    /// The window is a large part of the DEM.
-    #[error("the outer scale of {outer_scale_m} m is more than a third of the DEM; at most {largest_m} m fits")]
+    /// The window covers too large a part of the DEM.
+    #[error("the outer scale of {outer_scale_m} m is more than a third of the DEM; it must be at most {largest_m} m")]
     OuterScaleTooLarge {
         /// Outer scale, m.
         outer_scale_m: f64,
         /// Largest that fits, m.
         largest_m: f64,
     },
-    /// The window is hardly a window.
+    /// The window has too few cells.
     #[error(
-        "the outer scale of {outer_scale_m} m is less than three cells of {cell_m} m; at least {smallest_m} m is needed"
+        "the outer scale of {outer_scale_m} m is less than three cells of {cell_m} m; it must be at least {smallest_m} m"
     )]
     OuterScaleTooSmall {
         /// Outer scale, m.
@@ -41,31 +43,31 @@ pub enum FitError {
         /// Smallest possible, m.
         smallest_m: f64,
     },
-    /// Nothing was measured.
+    /// No cell has data.
     #[error("none of the DEM's {cells} cells has data")]
     NoData {
         /// Number of cells.
         cells: usize,
     },
-    /// No variation to describe.
-    #[error("the DEM is flat or a plane: no residual above rounding error")]
+    /// No residual above rounding error.
+    #[error("the DEM is flat or a plane: its residual is below rounding error")]
     Constant {
         /// A height of the DEM, m.
         height_m: f64,
     },
-    /// Data is too scattered for the window.
+    /// Data is too sparse for the window.
     #[error(
         "no cell has data in more than {needed_share} of its window (the best has {best_share:.3}); lower min_valid_share"
     )]
     NoWindow {
-        /// Share that was asked for.
+        /// Share required.
         needed_share: f64,
         /// Largest share found.
         best_share: f64,
     },
     /// No correlation between neighbours.
     #[error(
-        "the residual is white: the range of {range_m:.4} m is not above one cell of {cell_m} m, so there is no covariance to fit"
+        "the residual is white noise: its range of {range_m:.4} m does not exceed one cell, {cell_m} m, so there is no covariance to fit"
     )]
     White {
         /// Fitted range, m.
@@ -73,14 +75,16 @@ pub enum FitError {
         /// Larger cell size, m.
         cell_m: f64,
     },
-    /// The model's covariance cannot be computed where the search ended.
-    #[error("no {model} model could be fitted: heights, noise or ranges are too large or too small to compute with")]
+    /// The model's covariance is not finite where the search ended.
+    #[error(
+        "the {model} model could not be fitted: heights, noise or ranges are too large or too small to compute with"
+    )]
     NoFit {
         /// Covariance model.
         model: String,
     },
-    /// Too few distances.
-    #[error("pairs of cells were found at {found} distances only; a fit needs at least {needed}")]
+    /// Too few lags.
+    #[error("only {found} lags have pairs of cells; a fit needs at least {needed}")]
     TooFewLags {
         /// Bins with pairs.
         found: usize,

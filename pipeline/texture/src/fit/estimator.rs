@@ -1,4 +1,4 @@
-//! Least squares of covariance models: ordinary, and generalised with the model as the estimator sees it.
+//! Least-squares fits of covariance models: ordinary, and generalised with the model after detrending and trimming.
 
 use super::case::Case;
 use super::expectation::Expectation;
@@ -9,14 +9,14 @@ use crate::covariance::lag::{lag_m, length_m};
 use crate::covariance::partial::{PAIRS_FINE, PAIRS_ROUGH, PartialWindows};
 use crate::covariance::{Covariance, Form, LagBins};
 
-/// Rounds of weighting by the covariance of the bins.
+/// Most rounds of reweighting by the covariance of the bins.
 const WEIGHTING_ROUNDS: usize = 4;
-/// Shares of the variances of the bins that are added to them, the first that makes their covariance definite.
+/// Shares by which the variances of the bins are raised; the first that makes their covariance positive definite is used.
 const RIDGES: [f64; 5] = [0.0, 1e-6, 1e-5, 1e-4, 1e-3];
-/// A search of more rounds than this moves less, in every coordinate.
+/// Reweighting ends when no coordinate moves by more than this.
 const CONVERGED: f64 = 1e-6;
 
-/// Fitted parameters and what they say about the bins.
+/// Fitted parameters and their likelihood.
 #[derive(Clone)]
 pub struct Estimate {
     pub form: Form,
@@ -24,7 +24,7 @@ pub struct Estimate {
     /// Search coordinates.
     pub at: Vec<f64>,
     pub steps: usize,
-    /// What generalised least squares know; absent after ordinary ones.
+    /// Likelihood of a generalised least-squares fit; absent for an ordinary one.
     pub likelihood: Option<Likelihood>,
 }
 
@@ -37,13 +37,13 @@ pub struct Likelihood {
     pub chi2: f64,
     /// Number of bins.
     pub bins: usize,
-    /// Covariance of the coordinates, row-major; absent when they cannot be told apart.
+    /// Covariance of the coordinates, row-major; absent if they are not identifiable.
     pub scatter: Option<Vec<f64>>,
 }
 
 impl Estimate {
-    /// Akaike's criterion with Hurvich and Tsai's (1989) correction: -2 ln L + 2 k + 2 k (k + 1) / (n - k - 1), less what
-    /// all models share. `None` without a likelihood, or with too many parameters.
+    /// Akaike's criterion with Hurvich and Tsai's (1989) correction: -2 ln L + 2 k + 2 k (k + 1) / (n - k - 1), up to a constant
+    /// common to all models. `None` without a likelihood, or with too many parameters.
     pub fn aicc(&self) -> Option<f64> {
         let likelihood = self.likelihood.as_ref()?;
         let (n, k) = (likelihood.bins as f64, self.at.len() as f64);
@@ -57,7 +57,7 @@ impl Estimate {
         Some(likelihood.chi2 / (likelihood.bins.saturating_sub(self.at.len())).max(1) as f64)
     }
 
-    /// Variance of a sum of weighted coordinates by the curvature of the likelihood.
+    /// Variance of a weighted sum of coordinates, from the curvature of the likelihood.
     pub fn variance_of(&self, weights: &[(usize, f64)]) -> Option<f64> {
         let scatter = self.likelihood.as_ref()?.scatter.as_ref()?;
         let of = |(k, w): &(usize, f64), (l, v): &(usize, f64)| w * v * scatter[k * self.at.len() + l];
@@ -72,7 +72,7 @@ impl Estimate {
 
 /// A fit with one coordinate held.
 pub struct Held {
-    /// Rise of the sum of squares above the estimate's.
+    /// Rise of the sum of squares above that of the estimate.
     pub rise: f64,
     /// Search coordinates.
     pub at: Vec<f64>,
@@ -86,12 +86,12 @@ pub struct Estimator<'a> {
 }
 
 impl<'a> Estimator<'a> {
-    /// The estimator that parameters are taken from.
+    /// The estimator for the reported parameters.
     pub fn new(case: &'a Case<'a>, bins: &'a LagBins) -> Self {
         Self::with_pairs(case, bins, PAIRS_FINE)
     }
 
-    /// An estimator for verdicts and figures.
+    /// A faster, less accurate estimator for verdicts and diagnostics.
     pub fn rough(case: &'a Case<'a>, bins: &'a LagBins) -> Self {
         Self::with_pairs(case, bins, PAIRS_ROUGH)
     }
@@ -110,20 +110,20 @@ impl<'a> Estimator<'a> {
         Self { case, bins, expectation }
     }
 
-    /// The model in each bin as the estimator sees it, m2.
+    /// The model in each bin after detrending and trimming, m2.
     pub fn mean(&self, covariance: &Covariance) -> Vec<f64> {
         self.expectation.mean(covariance, self.case.survey.trim.threshold_m)
     }
 
-    /// Every form fitted, from the uncorrected exponential of the same data.
+    /// Fits every form, starting from the uncorrected exponential fitted to the same data.
     pub fn candidates(&self, naive: &Estimate) -> Vec<Estimate> {
         let (sigma_m, range_m) = (1.2 * naive.covariance.sigma_m(), 1.5 * naive.covariance.range_m());
         self.case.settings.forms.iter().map(|form| self.fit(form, sigma_m, range_m)).collect()
     }
 
-    /// Generalised least squares of a form, from an exponential of the given sigma and b.
+    /// Generalised least-squares fit of a form, starting from an exponential of the given sigma and b.
     pub fn fit(&self, form: &Form, sigma_m: f64, range_m: f64) -> Estimate {
-        // Within the thread pool: thousands of small transforms would each be handed over to it.
+        // Enter the thread pool once: otherwise each of thousands of small transforms would be handed over to it.
         rayon::scope(|_| self.fit_here(form, sigma_m, range_m))
     }
 
@@ -140,7 +140,7 @@ impl<'a> Estimator<'a> {
             }
             let next = self.search(form, &end.at, weights.as_ref());
             steps += next.steps;
-            // Weights of a model that misfits can lead to ever shorter ranges.
+            // Weights of a misfitting model can drive the range towards zero.
             if self.is_white(&coordinates.decode(&next.at)) && !self.is_white(&coordinates.decode(&end.at)) {
                 break;
             }
@@ -154,7 +154,7 @@ impl<'a> Estimator<'a> {
         Estimate { form: form.clone(), covariance: coordinates.decode(&end.at), at: end.at, steps, likelihood }
     }
 
-    /// True of a model whose range is not above one cell while neighbouring cells of the data are correlated.
+    /// True if the model's range is at most one cell although neighbouring cells of the data are correlated.
     fn is_white(&self, covariance: &Covariance) -> bool {
         let [x, y] = self.case.geometry.cell;
         covariance.is_stationary() && covariance.range_m() <= x.max(y) && !self.case.is_white()
@@ -167,8 +167,8 @@ impl<'a> Estimator<'a> {
         Likelihood { weights, chi2: end.value, bins: self.bins.len(), scatter }
     }
 
-    /// Factor of the covariance of the bins for a surface. Of a smooth one that reaches beyond the window it is known approximately and may
-    /// be indefinite: as much is added to its diagonal as makes it definite.
+    /// Cholesky factor of the covariance of the bins for a surface. For a smooth surface whose range exceeds the window that covariance is
+    /// approximate and may be indefinite: its diagonal is then raised until it is definite.
     pub fn weights(&self, covariance: &Covariance) -> Option<Cholesky> {
         let matrix = self.expectation.covariance(covariance, self.case.survey.trim.threshold_m);
         let n = self.bins.len();
@@ -184,7 +184,7 @@ impl<'a> Estimator<'a> {
         minimise(start, &bounds, |p| self.misfit(form, p, weights, &self.bins.covariance_m2))
     }
 
-    /// Model less data in the bins, whitened, or in units of the variance.
+    /// Model minus data in the bins, whitened, or in units of the variance.
     fn misfit(&self, form: &Form, at: &[f64], weights: Option<&Cholesky>, data: &[f64]) -> Vec<f64> {
         self.whitened(&self.mean(&self.case.coordinates(form).decode(at)), weights, data)
     }
@@ -198,7 +198,7 @@ impl<'a> Estimator<'a> {
         }
     }
 
-    /// Fits to other data in the same bins, with the weights of an estimate and from it; for resampling.
+    /// Fits to other data in the same bins, starting from an estimate and with its weights; for resampling.
     pub fn refits<'e>(&'e self, estimate: &'e Estimate) -> Refits<'e> {
         let weights = estimate.likelihood.as_ref().map(|l| &l.weights);
         let slopes = slopes(&estimate.at, |p| self.misfit(&estimate.form, p, weights, &self.bins.covariance_m2));
@@ -210,7 +210,7 @@ impl<'a> Estimator<'a> {
         self.refits(estimate).to(data, threshold_m)
     }
 
-    /// The fit with one coordinate held at `value` and the others fitted again; `None` without a likelihood.
+    /// The fit with one coordinate held at `value` and the others refitted; `None` without a likelihood.
     pub fn held(&self, estimate: &Estimate, coordinate: usize, value: f64) -> Option<Held> {
         let likelihood = estimate.likelihood.as_ref()?;
         let bounds = self.case.coordinates(&estimate.form).bounds();
@@ -226,7 +226,7 @@ impl<'a> Estimator<'a> {
         let mut start = estimate.at.clone();
         start.remove(coordinate);
         if [estimate.coordinate(Role::Range(0)), estimate.coordinate(Role::Sigma(0))] == [Some(coordinate), Some(0)] {
-            // sigma^2 / b is what the data tells best.
+            // Start along constant sigma^2 / b, which the data identifies best.
             start[0] += 0.5 * (held - estimate.at[coordinate]);
         }
         let misfit = |others: &[f64]| {
@@ -237,7 +237,7 @@ impl<'a> Estimator<'a> {
     }
 }
 
-/// Fits to resampled data: a few steps with the slopes at the estimate, and a full search where these do not get there.
+/// Fits to resampled data: a few steps with the slopes at the estimate, and a full search if these do not converge.
 pub struct Refits<'e> {
     estimator: &'e Estimator<'e>,
     estimate: &'e Estimate,
@@ -259,13 +259,13 @@ impl Refits<'_> {
     }
 }
 
-/// The candidate with the least AICc; the first one where none has a likelihood.
+/// The candidate with the lowest AICc; the first one if none has a likelihood.
 pub fn best(estimates: &[Estimate]) -> Option<&Estimate> {
     let criterion = |e: &Estimate| e.aicc().unwrap_or(f64::INFINITY);
     estimates.iter().min_by(|a, b| criterion(a).total_cmp(&criterion(b)))
 }
 
-/// Ordinary least squares of the model itself at the mean lags.
+/// Ordinary least-squares fit of the model itself at the mean lags.
 pub fn ordinary(case: &Case, form: &Form) -> Estimate {
     let coordinates = case.coordinates(form);
     let scale = case.bins.covariance_m2[0];
@@ -294,7 +294,7 @@ pub fn on_surface(case: &Case, covariance: &Covariance) -> Vec<f64> {
     }
 }
 
-/// The end with the smallest sum of squares.
+/// The search result with the smallest sum of squares.
 fn least(ends: impl Iterator<Item = Minimum>) -> Minimum {
     let none = Minimum { at: Vec::new(), value: f64::INFINITY, steps: 0 };
     ends.fold(none, |best, end| if end.value < best.value || best.at.is_empty() { end } else { best })

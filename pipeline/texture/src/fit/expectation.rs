@@ -1,15 +1,15 @@
-//! What the estimator sees of a model: mean and covariance of the binned covariance after detrending and trimming.
+//! Mean and covariance of the binned covariance that a model predicts after detrending and trimming.
 //!
-//! Mean: the model's covariance through the moving average ([`crate::covariance::filtered`]), then, lag by lag, through
-//! trimming ([`crate::covariance::trimmed`]), pairs with partial windows apart from the others, then over the bins as the data was.
+//! Mean: the model's covariance is passed through the moving average ([`crate::covariance::filtered`]), then, lag by lag, through
+//! trimming ([`crate::covariance::trimmed`]), with pairs that have partial windows treated separately, and is then binned like the data.
 //!
 //! Covariance of two estimates at lags h and h' for a normal field (Bartlett, 1946), for N cells used:
 //! `B[C](h, h') = 1 / N * [Q(h - h') + Q(h + h')]`, `Q = sum over u of C(u) C(u + .)`.
-//! Trimming turns the products into other functions of the four heights. Their part of second order (second Wiener
-//! chaos) is how the trimmed covariance answers to small changes of the untrimmed one, `J B[C_f] J'`, J the derivative of
-//! the mean with respect to C_f(h) and C_f(0). The parts of higher order are taken from the trimmed field as if its
-//! products were those of a normal field, less their second order part: `(B[s^2 N] - B[a_1^2 C_f]) / (P P)` (symbols of
-//! [`crate::covariance::trimmed`]). At lag zero and 5 % this gives 0.770 s^4 per independent cell; exact is 0.735.
+//! Trimming turns the products into other functions of the four heights. Their second-order part (second Wiener
+//! chaos) is the response of the trimmed covariance to small changes of the untrimmed one, `J B[C_f] J'`, J the derivative of
+//! the mean with respect to C_f(h) and C_f(0). The higher-order parts are approximated by treating the products of the trimmed
+//! field as those of a normal field, minus their second-order part: `(B[s^2 N] - B[a_1^2 C_f]) / (P P)` (symbols of
+//! [`crate::covariance::trimmed`]). At lag zero and 5 % this gives 0.770 s^4 per independent cell; the exact value is 0.735.
 //!
 //! Each bin is represented by at most [`BIN_LAGS`] of its lags.
 
@@ -19,25 +19,25 @@ use crate::covariance::filtered::{DetrendFilter, LagField, Measurement};
 use crate::covariance::partial::{ByDistance, PartialWindows};
 use crate::covariance::trimmed::TrimmedNormal;
 
-/// Lags that stand for a bin in the covariance of the bins.
+/// Most lags that represent a bin in the covariance of the bins.
 const BIN_LAGS: usize = 16;
-/// Relative step of difference quotients.
+/// Relative step of the finite differences.
 const DIFFERENCE: f64 = 1e-4;
 /// Share of the variance added on the diagonal, so that rounding cannot make the matrix indefinite.
 const RIDGE: f64 = 1e-9;
-/// Standard error of the mean in each bin where windows are partial, over the variance: what is known of a smooth surface, whose bins
-/// hardly scatter about each other, is no more than that.
+/// Standard error of the computed mean in each bin where windows are partial, over the variance. It limits the weight of the bins
+/// of a smooth surface, which hardly scatter among themselves.
 const MEAN_ERROR: f64 = 3e-4;
 
-/// The estimator as a function of the model.
+/// Expected bins and their covariance as a function of the model.
 pub struct Expectation<'a> {
-    /// The detrender where windows are complete.
+    /// The detrending filter for complete windows.
     pub filter: DetrendFilter,
-    /// The same for lags at which residuals are still correlated.
+    /// The same, out to the lags at which residuals are still correlated.
     pub wide: DetrendFilter,
-    /// What partial windows change.
+    /// The correction for partial windows.
     pub partial: PartialWindows,
-    /// The same for models without a direction, of sharp surfaces.
+    /// The same for isotropic models of surfaces that are not blurred.
     pub partial_by_distance: ByDistance,
     /// The bins of the data.
     pub bins: &'a LagBins,
@@ -52,7 +52,7 @@ impl Expectation<'_> {
         let residual = self.filter.residual_covariance(&measured);
         let partial = self.correction(model, &measured);
         let complete = residual.at([0, 0]);
-        // Pairs with partial windows have a variance and a covariance of their own, and trimming takes another share of them.
+        // Pairs with partial windows have their own variance and covariance, and trimming removes a different share of them.
         let shares = self.partial.shares();
         let added = |k: usize, bin: usize| if shares[bin] > 0.0 { partial[k] / shares[bin] } else { 0.0 };
         let maps = [complete, complete + added(0, 0)].map(|variance| trimmed(variance, threshold_m));
@@ -65,7 +65,7 @@ impl Expectation<'_> {
                 let variance = complete + added(0, m.bin);
                 let correlation = (covariance + added(m.bin, m.bin)) / variance;
                 let [low, high] = [0, 1].map(|k| maps[k].moments(correlation));
-                // The two maps are those of the ends between which the variance lies.
+                // The variance lies between those of the two maps: interpolate.
                 let place = shares[0] / share;
                 let between = |low: f64, high: f64| low + (high - low) * place;
                 sums[0] += share * variance * between(low.0, high.0);
@@ -82,7 +82,7 @@ impl Expectation<'_> {
         self.filter.residual_covariance(&measured).at([0, 0]) + self.correction(model, &measured)[0]
     }
 
-    /// What partial windows add in each bin, m2.
+    /// Contribution of partial windows to each bin, m2.
     fn correction(&self, model: &Covariance, measured: &LagField) -> Vec<f64> {
         let Measurement { inner_scale_m, noise } = self.filter.measurement();
         if inner_scale_m > 0.0 || !model.is_isotropic() {
@@ -103,14 +103,14 @@ impl Expectation<'_> {
             [&residual, &products, &linear].map(|field| self.bartlett(&self.wide.autocorrelation(field)));
 
         let bin_covariance = self.bins.average(|lag| residual.at(lag));
-        let answers: Vec<[f64; 2]> =
-            (0..self.bins.len()).map(|k| answer(k, bin_covariance[k], variance, threshold_m)).collect();
+        let responses: Vec<[f64; 2]> =
+            (0..self.bins.len()).map(|k| response(k, bin_covariance[k], variance, threshold_m)).collect();
         let pairs: Vec<f64> = bin_covariance.iter().map(|c| trimmed.moments(c / variance).1).collect();
         let n = self.bins.len();
         let mut matrix = vec![0.0; n * n];
         for i in 0..n {
             for j in 0..n {
-                let ([ci, vi], [cj, vj]) = (answers[i], answers[j]);
+                let ([ci, vi], [cj, vj]) = (responses[i], responses[j]);
                 let second_order =
                     ci * cj * second[i * n + j] + ci * vj * second[i * n] + vi * cj * second[j] + vi * vj * second[0];
                 let higher = (product_orders[i * n + j] - linear_order[i * n + j]) / (pairs[i] * pairs[j]);
@@ -146,7 +146,7 @@ fn trimmed(variance: f64, threshold_m: f64) -> TrimmedNormal {
 }
 
 /// Derivatives of a bin's mean with respect to its own untrimmed covariance `c` and to the variance.
-fn answer(bin: usize, c: f64, variance: f64, threshold_m: f64) -> [f64; 2] {
+fn response(bin: usize, c: f64, variance: f64, threshold_m: f64) -> [f64; 2] {
     let mean = |c: f64, variance: f64| variance * trimmed(variance, threshold_m).covariance(c / variance);
     let step = DIFFERENCE * variance;
     if bin == 0 {

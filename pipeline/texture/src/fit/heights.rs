@@ -1,4 +1,4 @@
-//! Where heights come from: a raster in memory or one that is read in parts.
+//! Sources of heights: a raster in memory, one that is read in parts, or transects.
 
 use super::FitError;
 use sastrugi_numeric::{Geometry, Grid};
@@ -6,17 +6,17 @@ use std::ops::Range;
 
 /// Heights that are read in parts, so that a raster need not fit into memory.
 pub trait Heights: Sync {
-    /// Shape and place; cells in m.
+    /// Shape and position; cells in m.
     fn geometry(&self) -> Geometry;
 
-    /// Puts the heights in m of some rows and columns into `part`, row-major, in the place of what it held; not finite where
-    /// there is no data. A fit asks from one thread, and never from a job of the thread pool.
+    /// Replaces the contents of `part` by the heights of these rows and columns, m, row-major; not finite where there is no
+    /// data. A fit calls this from one thread, and never from within the thread pool.
     ///
     /// # Errors
-    /// What keeps the part from being read, as a sentence.
+    /// Why the part could not be read, as a sentence.
     fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), String>;
 
-    /// True when each row is a transect of its own, and neighbouring rows are no neighbours.
+    /// True if each row is a separate transect, so that adjacent rows are not neighbours on the ground.
     fn are_profiles(&self) -> bool {
         false
     }
@@ -43,7 +43,7 @@ pub struct Profiles {
 }
 
 impl Profiles {
-    /// Transects of heights in m every `spacing_m`; shorter ones are taken to lack data at their end.
+    /// Transects of heights in m, one every `spacing_m`; shorter ones are padded with no data at their end.
     ///
     /// # Errors
     /// No transect with a height.

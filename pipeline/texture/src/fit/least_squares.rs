@@ -2,16 +2,16 @@
 
 /// Largest number of steps.
 const STEPS: usize = 60;
-/// Relative fall of the sum of squares below which a search ends.
+/// Relative decrease of the sum of squares below which a search ends.
 const TOLERANCE: f64 = 1e-12;
-/// The same where the sum is wanted, not the parameters.
+/// The same if only the sum is needed, not the parameters.
 const ROUGH_TOLERANCE: f64 = 1e-6;
-/// A step that moves no parameter further is none.
+/// A search ends when a step moves no parameter by more than this.
 const STILL: f64 = 1e-10;
-/// Step of the difference quotients: parameters are logarithms, so this is relative.
+/// Step of the forward differences; parameters are logarithms, so it is relative.
 const DIFFERENCE: f64 = 1e-6;
 
-/// End of a search.
+/// Result of a search.
 #[derive(Clone, Debug)]
 pub struct Minimum {
     /// Parameters.
@@ -28,7 +28,7 @@ pub fn minimise(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64])
     search(start, bounds, TOLERANCE, residuals)
 }
 
-/// As [`minimise`], to a millionth of the sum.
+/// As [`minimise`], but only until the sum of squares is accurate to a millionth.
 pub fn minimise_coarsely(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
     search(start, bounds, ROUGH_TOLERANCE, residuals)
 }
@@ -99,26 +99,26 @@ fn dot(a: &[f64], b: &[f64]) -> f64 {
 
 /// Most steps of a chord search.
 const CHORD_STEPS: usize = 12;
-/// A chord search with the slopes of elsewhere ends when no parameter moves more, one with its own slopes thereafter.
+/// A chord search ends when no parameter moves by more than this: first with the given slopes, then with slopes taken near the minimum.
 const CHORD_CONVERGED: [f64; 2] = [1e-2, 1e-6];
 
-/// Gauss-Newton steps with slopes that are taken once, for many problems that lie near to each other: one evaluation a
-/// step. Where residuals stay, slopes of elsewhere lead beside the minimum; so slopes are taken once more near it.
+/// Chord method: Gauss-Newton steps with a fixed Jacobian, for many similar problems, at one evaluation per step. If residuals
+/// remain at the minimum, a Jacobian from elsewhere misses it slightly; so the Jacobian is evaluated once more near the minimum.
 pub struct Chord {
     slopes: Vec<Vec<f64>>,
     normal: Cholesky,
 }
 
 impl Chord {
-    /// From the columns of J; `None` when parameters cannot be told apart.
+    /// From the columns of J; `None` if the parameters are not identifiable.
     pub fn new(slopes: Vec<Vec<f64>>) -> Option<Self> {
         let normal: Vec<f64> = slopes.iter().flat_map(|a| slopes.iter().map(move |b| dot(a, b))).collect();
         let normal = Cholesky::new(&normal, slopes.len())?;
         Some(Self { slopes, normal })
     }
 
-    /// Minimises the sum of squared `residuals(p)` from `start`; `None` when that takes many steps, does not fall, or leads to
-    /// a bound.
+    /// Minimises the sum of squared `residuals(p)` from `start`; `None` if that takes too many steps, does not decrease the sum, or
+    /// leads to a bound.
     pub fn minimise(
         &self,
         start: &[f64],
@@ -161,8 +161,8 @@ impl Chord {
     }
 }
 
-/// The damped step, cut to the bounds: a parameter that would leave them goes to its bound, and the others take the step that is
-/// best with it there.
+/// The damped step within the bounds: a parameter that would leave them is set to its bound, and the step of the others is
+/// recomputed with it held there.
 fn damped_step(at: &[f64], bounds: &[(f64, f64)], normal: &[f64], gradient: &[f64], damping: f64) -> Vec<f64> {
     let n = at.len();
     let mut damped = normal.to_vec();
@@ -194,7 +194,7 @@ pub struct Cholesky {
 }
 
 impl Cholesky {
-    /// Factor of a row-major `n` by `n` matrix; `None` when it is not positive definite.
+    /// Factor of a row-major `n` by `n` matrix; `None` if it is not positive definite.
     pub fn new(matrix: &[f64], n: usize) -> Option<Self> {
         let mut lower = vec![0.0; n * n];
         for i in 0..n {
@@ -250,7 +250,7 @@ impl Cholesky {
 mod tests {
     use super::*;
 
-    /// Two parameters that pull together, one of them at its bound: the other ends where it does alone, in a few steps.
+    /// Two coupled parameters, one of them at its bound: the other converges to the same value as on its own, in a few steps.
     #[test]
     fn val_a_bound_does_not_slow_the_search() {
         let data: Vec<f64> = (0..12).map(|k| 1.0 - 0.2 * f64::from(k) + 0.01 * f64::from(k % 3)).collect();
@@ -266,7 +266,36 @@ mod tests {
         assert!(found.steps <= 10, "{found:?}");
     }
 
-    /// A curve that its parameters bend, with data off it: both searches end at the same minimum.
+    /// By hand: [[4, 2], [2, 5]] = L L' with L = [[2, 0], [1, 2]]; determinant 16, inverse [[5, -2], [-2, 4]] / 16. A matrix with a
+    /// negative eigenvalue has no factor.
+    #[test]
+    fn val_cholesky_by_hand() {
+        let factor = Cholesky::new(&[4.0, 2.0, 2.0, 5.0], 2).unwrap();
+        assert_eq!(factor.whiten(&[2.0, 5.0]), [1.0, 2.0]);
+        assert_eq!(factor.solve(&[8.0, 12.0]), [1.0, 2.0]);
+        assert!((factor.log_determinant() - libm::log(16.0)).abs() < 1e-15);
+        let inverse = factor.inverse();
+        assert!(inverse.iter().zip([5.0, -2.0, -2.0, 4.0]).all(|(a, b)| (16.0 * a - b).abs() < 1e-14), "{inverse:?}");
+        assert!(Cholesky::new(&[1.0, 2.0, 2.0, 1.0], 2).is_none());
+    }
+
+    /// Linear residuals: the search ends at the solution of the normal equations, by hand (2, 2) with residuals 1, 1, 1 and -3, and J'J is
+    /// their matrix: forward differences of a line are exact but for rounding.
+    #[test]
+    fn val_linear_problems_in_closed_form() {
+        // Residuals a + b x - y at x = 0, 1, 2 and again 1 with y = 7: normal equations [[4, 4], [4, 6]] p = [16, 20].
+        let points: [(f64, f64); 4] = [(0.0, 1.0), (1.0, 3.0), (2.0, 5.0), (1.0, 7.0)];
+        let residuals = |p: &[f64]| -> Vec<f64> { points.iter().map(|(x, y)| p[0] + p[1] * x - y).collect() };
+        let bounds = [(-50.0, 50.0); 2];
+        for found in [minimise(&[9.0, -9.0], &bounds, residuals), minimise_coarsely(&[9.0, -9.0], &bounds, residuals)] {
+            assert!((found.at[0] - 2.0).abs() < 1e-4 && (found.at[1] - 2.0).abs() < 1e-4, "{found:?}");
+            assert!((found.value - 12.0).abs() < 1e-6, "{found:?}");
+        }
+        let curvature = curvature(&[0.0, 0.0], residuals);
+        assert!(curvature.iter().zip([4.0, 4.0, 4.0, 6.0]).all(|(a, b)| (a - b).abs() < 1e-6), "{curvature:?}");
+    }
+
+    /// A nonlinear curve and data that does not lie on it: both searches end at the same minimum.
     #[test]
     fn val_chords_end_where_the_search_does() {
         let curve = |p: &[f64], x: f64| libm::exp(p[0]) * libm::exp(-x / libm::exp(p[1]));

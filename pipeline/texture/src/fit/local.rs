@@ -1,30 +1,32 @@
 //! Maps of roughness over a site: band RMS, sigma and sigma^2 / b, block by block.
 //!
-//! The DEM is tiled by blocks of at least two windows, from its north-western corner. In each block:
+//! The DEM is tiled from its north-western corner by blocks of at least two windows. In each block:
 //!
 //! * band RMS: `sqrt(mean r^2)` of the residual r before trimming, m. It needs no model.
-//! * amplitude `a^2`: the binned covariance c of the block, trimmed at the fit's level, is compared with the fitted model m as
-//!   the estimator sees it (detrended, trimmed, binned) by generalised least squares with one free factor,
-//!   `a^2 = m' W c / (m' W m)`, W the inverse of the covariance of the bins under the model. A block whose shape is that of the
-//!   site has `c = a^2 m` on average.
+//! * amplitude `a^2`: the binned covariance c of the block, trimmed at the fit's level, is compared with the fitted model m
+//!   (detrended, trimmed and binned as by the estimator) by generalised least squares with one free factor,
+//!   `a^2 = m' W c / (m' W m)`, W the inverse of the covariance of the bins under the model. A block whose covariance has the
+//!   site's shape has `c = a^2 m` on average.
 //! * sigma: `a` times the fit's sigma; sigma^2 / b: `a^2` times the fit's.
 //!
-//! Range and shape are held at the site's fit. A block of a few windows does not tell sigma and b apart: the likelihood is
-//! a valley along constant sigma^2 / b, and both free would map the noise along it. The amplitude is the one parameter that a block
-//! does tell, and where the site's b is itself unknown the map of sigma^2 / b still holds, whereas that of sigma is as good
-//! as the site's sigma. W gives most weight to what differs between short lags, so that the amplitude follows the short-wave
-//! roughness, and band RMS all of it: where their maps differ, the shape changes over the site.
+//! Range and shape are held at the site's fit. A block of a few windows cannot separate sigma from b: the likelihood is
+//! a valley along constant sigma^2 / b, and fitting both would map the noise along it. The amplitude is the one parameter that a
+//! block identifies. If the site's b is itself not identified, the map of sigma^2 / b still holds, whereas the map of sigma is only
+//! as good as the site's sigma. W gives most weight to differences between short lags, so that the amplitude follows the short-wave
+//! roughness, whereas band RMS covers all of it: where their maps differ, the shape changes over the site.
 //!
-//! A block is trimmed at its own threshold, the same share of its cells as of the site's, so that rough blocks do
-//! not lose more than smooth ones. Noise and nugget do not grow with the texture: where there is one, lag zero is left out.
+//! Each block is trimmed at its own threshold, which removes the same share of its cells as the site's does of the site, so that
+//! rough blocks do not lose more than smooth ones. White noise and nugget do not scale with the texture: if there is either, lag
+//! zero is left out.
 //!
-//! Standard error of a^2 by the model: `(m' W m)^-1/2` of a block with that many residuals; half of it, relative, is that of sigma.
+//! Standard error of a^2 under the model: `(m' W m)^-1/2` for a block with that many residuals; the relative standard error of
+//! sigma is half the relative one of a^2.
 //!
 //! Cost: one more pass over the heights, and real transforms of each block. Memory: one row of blocks.
 //!
 //! Limits: blocks with residuals in less than half of their cells, and those whose amplitude is not positive, have
-//! no data. A block that is cut by the eastern or southern edge is judged by its full area. Not for transects, nor for
-//! `paper` fits, which know no estimator.
+//! no data. For a block that is cut by the eastern or southern edge, the share is taken of its full area. Not for transects, nor
+//! for `paper` fits, which have no estimator.
 
 use super::case::Case;
 use super::estimator::Estimator;
@@ -38,7 +40,7 @@ use sastrugi_numeric::{Geometry, Grid, sums};
 use sastrugi_schemas::{ParameterError, shown};
 use std::ops::Range;
 
-/// Width of a block where none is asked for, windows.
+/// Default width of a block, windows.
 const BLOCK_WINDOWS: f64 = 4.0;
 /// Least width of a block, windows.
 const BLOCK_WINDOWS_MIN: f64 = 2.0;
@@ -50,41 +52,41 @@ const USED_SHARE_MIN: f64 = 0.5;
 pub struct LocalMaps {
     /// Root mean square of the residual before trimming, m.
     pub band_rms_m: Grid,
-    /// Standard deviation of the texture, m, the range held; `None` of a model that has none.
+    /// Standard deviation of the texture, m, at the site's range; `None` for a model without a variance.
     pub sigma_m: Option<Grid>,
-    /// sigma^2 / b, m; `None` of a model that is not one term with a range.
+    /// sigma^2 / b, m; `None` unless the model is a single term with a range.
     pub sigma2_over_range_m: Option<Grid>,
-    /// Relative standard error of sigma in a block whose cells all have a residual, under the fitted model.
+    /// Relative standard error of sigma under the fitted model, in a block whose cells all have a residual.
     pub sigma_error: f64,
 }
 
-/// What a block is compared with.
+/// The fitted model that blocks are compared with.
 struct Reference {
-    /// The bins that are compared.
+    /// The bins to compare.
     bins: Range<usize>,
-    /// What correlated noise adds in them, m2.
+    /// Contribution of correlated noise to them, m2.
     noise_m2: Vec<f64>,
-    /// The fitted model in them without that noise, whitened.
+    /// The fitted model in these bins without that noise, whitened.
     model: Vec<f64>,
-    /// Factor of their covariance for all residuals of the DEM.
+    /// Cholesky factor of the bins' covariance for all residuals of the DEM.
     weights: Cholesky,
 }
 
-/// What was found in a block.
+/// Results of a block.
 #[derive(Clone, Copy)]
 struct Found {
     band_rms_m: f64,
-    /// Variance over that of the site's fit.
+    /// Variance over the site's fitted variance.
     amplitude2: f64,
 }
 
-const NOTHING: Found = Found { band_rms_m: f64::NAN, amplitude2: f64::NAN };
+const NO_DATA: Found = Found { band_rms_m: f64::NAN, amplitude2: f64::NAN };
 
 impl FitOutcome {
-    /// Maps over blocks of about `block_m` (four windows where it is `None`) of the heights that were fitted.
+    /// Maps of the fitted heights in blocks of about `block_m` (four windows if `None`).
     ///
     /// # Errors
-    /// Blocks below two windows or beyond the DEM; transects and `paper` fits; heights that cannot be read.
+    /// Blocks narrower than two windows or wider than the DEM; transects and `paper` fits; heights that cannot be read.
     pub fn local_maps(&self, heights: &dyn Heights, block_m: Option<f64>) -> Result<LocalMaps, FitError> {
         let case = self.case(heights)?;
         let covariance = Covariance::of_fit(&self.fit)?;
@@ -103,7 +105,7 @@ impl FitOutcome {
         let sill_over_range_m = sill_over_range(&covariance);
         Ok(LocalMaps {
             band_rms_m: map(&|f| f.band_rms_m),
-            // Where the range is at the bound of its search, sigma is no estimate either.
+            // If the range ended at the bound of its search, sigma is not an estimate either.
             sigma_m: (covariance.is_stationary() && !self.fit.range_at_bound())
                 .then(|| map(&|f| sigma_m * f.amplitude2.sqrt())),
             sigma2_over_range_m: sill_over_range_m.map(|own| map(&|f| own * f.amplitude2)),
@@ -111,14 +113,14 @@ impl FitOutcome {
         })
     }
 
-    /// The fitted case again, without reading anything.
+    /// The fitted case, rebuilt without reading the heights.
     fn case<'a>(&'a self, heights: &'a dyn Heights) -> Result<Case<'a>, FitError> {
         let refused = |message: &str| Err(ParameterError::new("local", message).into());
         if self.settings.mode() == Mode::Paper {
-            return refused("is asked for with mode `paper`; maps need a `corrected` fit");
+            return refused("needs a `corrected` fit, but the mode is `paper`");
         }
         if heights.are_profiles() {
-            return refused("is asked for with transects; maps need a raster");
+            return refused("needs a raster, but the heights are transects");
         }
         let geometry = heights.geometry();
         let max_lag_m = self.settings.max_lag_m(&geometry);
@@ -144,7 +146,7 @@ fn block_cells(case: &Case, block_m: Option<f64>) -> Result<[usize; 2], FitError
     if !(block_m >= least_m * (1.0 - 1e-9) && block_m <= most_m) {
         let [least, most] = [least_m, most_m].map(|m| shown((1e6 * m).round() / 1e6));
         let message = format!(
-            "is {} m; blocks are at least two windows, {least} m, and at most the DEM, {most} m, wide",
+            "is {} m; blocks must be at least two windows ({least} m) and at most the DEM ({most} m) wide",
             shown(block_m)
         );
         return Err(ParameterError::new("local_block", message).into());
@@ -152,14 +154,14 @@ fn block_cells(case: &Case, block_m: Option<f64>) -> Result<[usize; 2], FitError
     Ok([1, 0].map(|axis: usize| ((block_m / case.geometry.cell[axis]).round() as usize).max(1)))
 }
 
-/// The raster of blocks: its north-western corner is the DEM's.
+/// The raster of blocks; it shares the DEM's north-western corner.
 fn block_geometry(dem: &Geometry, [rows, cols]: [usize; 2], block: [usize; 2]) -> Geometry {
     let cell = [block[1] as f64 * dem.cell[0], block[0] as f64 * dem.cell[1]];
     let top = dem.origin[1] + dem.rows as f64 * dem.cell[1];
     Geometry { rows, cols, cell, origin: [dem.origin[0], top - rows as f64 * cell[1]] }
 }
 
-/// The blocks of some rows, from west to east.
+/// Results of one row of blocks, from west to east.
 fn row_of_blocks(
     case: &Case,
     reference: &Reference,
@@ -174,7 +176,7 @@ fn row_of_blocks(
         let part: Vec<f64> = residual.chunks_exact(cols).flat_map(|line| line[from..to].iter().copied()).collect();
         let used = part.iter().filter(|r| !r.is_nan()).count();
         let enough = used as f64 >= USED_SHARE_MIN * (block[0] * block[1]) as f64;
-        if enough { reference.found(case, part, to - from) } else { NOTHING }
+        if enough { reference.found(case, part, to - from) } else { NO_DATA }
     });
     Ok(found.collect())
 }
@@ -188,7 +190,7 @@ impl Reference {
         let bins = usize::from(noisy)..n;
         let model = estimator.mean(covariance);
         let left = estimator.expectation.filter.residual_noise();
-        // Trimming takes about the same share of texture and noise.
+        // Trimming removes about the same share of texture and noise.
         let kept = model[0] / estimator.expectation.variance_m2(covariance);
         let noise_m2: Vec<f64> = estimator.bins.average(|lag| kept * left.at(lag))[bins.clone()].to_vec();
         let texture: Vec<f64> = model[bins.clone()].iter().zip(&noise_m2).map(|(all, noise)| all - noise).collect();
@@ -205,18 +207,18 @@ impl Reference {
         self.model.iter().map(|m| m * m).sum()
     }
 
-    /// Standard error of a^2 in a block of that many residuals.
+    /// Standard error of a^2 in a block of `block` residuals, given `all` residuals of the DEM.
     fn amplitude2_error(&self, all: usize, block: usize) -> f64 {
         (all as f64 / block as f64 / self.information()).sqrt()
     }
 
-    /// What a block's residuals, in rows of `cols`, say.
+    /// Results from a block's residuals, in rows of `cols`.
     fn found(&self, case: &Case, mut residual: Vec<f64>, cols: usize) -> Found {
         let band_rms_m = sums::mean(&squares(&residual)).sqrt();
         trim(&mut residual, case.settings.trim());
         let binned = binned(case, &residual, cols);
         let Some(measured) = binned.filter(|c| c.len() >= self.bins.end) else {
-            return Found { band_rms_m, ..NOTHING };
+            return Found { band_rms_m, ..NO_DATA };
         };
         let texture: Vec<f64> =
             measured[self.bins.clone()].iter().zip(&self.noise_m2).map(|(all, noise)| all - noise).collect();
@@ -231,7 +233,7 @@ fn squares(values: &[f64]) -> Vec<f64> {
     values.iter().filter(|v| !v.is_nan()).map(|v| v * v).collect()
 }
 
-/// Sets the share `level` of the largest residuals to NaN.
+/// Sets the largest residuals, a share `level` of them, to NaN.
 fn trim(residual: &mut [f64], level: f64) {
     let mut sizes: Vec<f64> = residual.iter().filter(|r| !r.is_nan()).map(|r| r.abs()).collect();
     sizes.sort_by(f64::total_cmp);
@@ -239,7 +241,7 @@ fn trim(residual: &mut [f64], level: f64) {
     residual.iter_mut().filter(|r| r.abs() > threshold_m).for_each(|r| *r = f64::NAN);
 }
 
-/// Covariance in the rings, m2; `None` where one has no pairs.
+/// Covariance in the rings, m2; `None` if a ring has no pairs.
 fn binned(case: &Case, residual: &[f64], cols: usize) -> Option<Vec<f64>> {
     let rows = residual.len() / cols.max(1);
     let max_lag = [case.max_lag[0].min(rows - 1), case.max_lag[1].min(cols - 1)];
@@ -282,11 +284,11 @@ mod tests {
         sums::mean(&values)
     }
 
-    /// A site of 48 m whose eastern half is twice as rough, in 6 x 6 blocks of 8 m. The columns of blocks beside the step
+    /// A site of 48 m whose eastern half is twice as rough, in 6 x 6 blocks of 8 m. The columns of blocks next to the step
     /// are left out. Sigma of a block has a standard error below 5 % (asserted), the ratio of the means of 12 blocks each
-    /// one of 5 % sqrt(2 / 12) = 2 %, and twice that for sigma^2 / b: 8 % and 16 % are four such errors.
+    /// has one of 5 % sqrt(2 / 12) = 2 %, and sigma^2 / b twice that: 8 % and 16 % are four such errors.
     #[test]
-    fn val_a_half_that_is_twice_as_rough_is_told() {
+    fn val_a_half_twice_as_rough_shows_in_the_maps() {
         let mut dem = field(480, 1);
         let cols = dem.cols();
         dem.values.iter_mut().enumerate().filter(|(k, _)| k % cols >= cols / 2).for_each(|(_, z)| *z *= 2.0);
@@ -304,8 +306,8 @@ mod tests {
         }
     }
 
-    /// Blocks of a site with one roughness have the site's sigma on average, and scatter as the standard error says: of 36
-    /// blocks a standard deviation is good to 12 %, so that a factor of 1.5 is four such errors.
+    /// Blocks of a homogeneous site have the site's sigma on average, and scatter as the standard error states: a standard
+    /// deviation from 36 blocks is good to 12 %, so that a factor of 1.5 is four such errors.
     #[test]
     fn stat_blocks_of_one_site_scatter_as_stated() {
         let dem = field(480, 2);
@@ -319,7 +321,7 @@ mod tests {
         assert!((scatter / maps.sigma_error).max(maps.sigma_error / scatter) < 1.5, "{scatter} {}", maps.sigma_error);
     }
 
-    /// The maps of a surface twice as high are twice as high: exactly, since factors of two round nothing.
+    /// Doubling the heights doubles the maps, exactly, since factors of two cause no rounding.
     #[test]
     fn prop_maps_scale_with_heights() {
         let mut dem = field(160, 3);
@@ -335,7 +337,7 @@ mod tests {
         pairs(&before.sigma2_over_range_m.unwrap(), &after.sigma2_over_range_m.unwrap(), 4.0);
     }
 
-    /// Blocks lie from the north-western corner on, the last ones beyond the DEM; without data enough there is no value.
+    /// Blocks start at the north-western corner and the last ones extend beyond the DEM; without enough data there is no value.
     #[test]
     fn val_blocks_lie_where_they_should() {
         let mut dem = field(190, 4);

@@ -1,28 +1,28 @@
-//! How much memory a fit takes.
+//! Memory use of a fit.
 
 use super::FitSettings;
 use super::resampling::CELLS_MAX;
 use super::survey::STRIP_CELLS;
 
-/// A strip at work: heights, what is made of them, and, of narrow rasters, the transforms of their pairs.
+/// Bytes per cell of a strip in progress: heights, intermediate rasters and, for narrow rasters, the transforms of their pairs.
 const STRIP_CELL_BYTES: u64 = 100;
-/// A replicate at work: a surface on a torus of four times as many cells, its transforms, its residual.
+/// Bytes per cell of a replicate in progress: a surface on a torus of four times as many cells, its transforms, its residual.
 const REPLICATE_CELL_BYTES: u64 = 300;
-/// Weights of partial windows: for each of up to 49 bins, 8 bytes for one of two opposite lags within lag and two half
-/// windows (1.5 windows); for two estimators.
+/// Weights of partial windows, for two estimators: for each of up to 49 bins, 8 bytes per lag (one of each opposite pair) within
+/// the largest lag plus two half windows (1.5 windows).
 const WEIGHTS_BYTES: u64 = 2 * 49 * 8 * 9 / 2;
-/// Covariances of one model on a torus of three windows each way, and their transforms.
+/// Covariances of one model on a torus three windows wide, and their transforms.
 const MODEL_BYTES: u64 = 9 * 60;
 
 impl FitSettings {
-    /// Most bytes that a fit of `cells` cells takes beside the heights, on so many threads; where the smaller side of a cell
-    /// is not known, for the widest window that a fit allows. An estimate for planning.
+    /// Most bytes that a fit of `cells` cells needs on top of the heights, on `threads` threads. If the smaller side of a cell is
+    /// unknown, the widest window that a fit allows is assumed. An estimate for planning.
     pub fn memory_bytes(&self, cells: u64, cell_m: Option<f64>, threads: u64) -> u64 {
         // No window is wider than a third of the raster.
         let widest = cells / 9;
         let window = cell_m.map_or(widest, |cell| square(self.outer_scale_m() / cell).min(widest));
         let width = (cells as f64).sqrt() as u64;
-        // Four windows of rows, with two more above and below; at twice the window, on a part of the raster.
+        // Rows of four windows, plus two windows above and below; the refits at twice the window use a part of the raster.
         let windows = 8 * width * (window as f64).sqrt() as u64;
         let strip = cells.min(STRIP_CELLS as u64 + windows).saturating_mul(STRIP_CELL_BYTES);
         let examined = cells.min(CELLS_MAX as u64 + 49 * window).saturating_mul(STRIP_CELL_BYTES);

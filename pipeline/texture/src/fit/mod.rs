@@ -1,24 +1,24 @@
 //! Covariance of the texture of a measured DEM.
 //!
-//! 1. Cells that are no texture are found and left out ([`crate::objects`]; not in `paper` mode).
-//! 2. Background over the outer scale ([`sastrugi_roughness::background`]); residual: height less background, on
-//!    cells whose window has data enough.
+//! 1. Objects are found and left out ([`crate::objects`]; not in `paper` mode).
+//! 2. The background is the moving average over the outer scale ([`sastrugi_roughness::background`]); the residual is height
+//!    minus background, on cells whose window has enough data.
 //! 3. Residuals beyond a symmetric threshold are trimmed at the significance level.
-//! 4. Covariance of all pairs of what is left, in rings, and by direction ([`crate::covariance::masked`]).
-//! 5. `corrected`: parameters such that the model, *after the same measurement, detrending and trimming*, agrees with the
-//!    bins by generalised least squares (`expectation.rs`, `estimator.rs`); of several models the one with the least AICc.
+//! 4. The covariance of all remaining pairs is binned in rings, and by direction ([`crate::covariance::masked`]).
+//! 5. `corrected`: the model *after the same measurement, detrending and trimming* is fitted to the bins by generalised least
+//!    squares (`expectation.rs`, `estimator.rs`); of several models the one with the lowest AICc is chosen.
 //!    `paper`: ordinary least squares of the model itself.
-//! 6. Intervals by parametric and block bootstrap (`resampling.rs`), and what the data says against the fit: other
-//!    windows, misfit, direction, site, distribution (`verdicts.rs`).
+//! 6. Intervals by parametric and block bootstrap (`resampling.rs`), and tests of the fit against the data: other windows,
+//!    misfit, anisotropy, stationarity, normality (`verdicts.rs`).
 //!
 //! Source: Vecherin et al. 2022, section 2 and Figure 4a. The paper's order of steps and its plain least squares are kept
 //! as `paper`: on surfaces that are exactly exponential it gives sigma 19 % and b 42 % too small at b = 0.14 windows,
 //! 43 % and 76 % at half a window (`docs/papers/vecherin.md`).
 //!
-//! Cost without intervals: dominated by the moving averages of the object search and four real transforms of the raster;
-//! a replicate costs a surface of four times as many cells (at most a million of them) and another such fit. Memory: the
-//! strips of `survey.rs`, which grow with the raster's width only, two bits per cell, and 300 bytes per cell of up to a
-//! million for each replicate at work. Heights are read in parts, a few times ([`Heights`]).
+//! Cost without intervals: dominated by the moving averages of the object search and four real transforms of the raster.
+//! A replicate costs one surface of four times as many cells (at most a million) and another such fit. Memory: the
+//! strips of `survey.rs`, which grow with the raster's width only, plus two bits per cell, plus 300 bytes for each of up to a
+//! million cells of every replicate in progress. Heights are read in parts, a few times ([`Heights`]).
 
 mod block_places;
 mod carried;
@@ -60,10 +60,10 @@ use std::ops::Range;
 use survey::Survey;
 use verdicts::Windows;
 
-/// A fit and what is needed to show the rasters behind it.
+/// A fit, with what is needed to recompute its rasters.
 #[derive(Clone)]
 pub struct FitOutcome {
-    /// The fit; its `source` is left to the caller.
+    /// The fit; the caller fills in its `source`.
     pub fit: FitFile,
     settings: FitSettings,
     pub(crate) survey: Survey,
@@ -73,8 +73,8 @@ pub struct FitOutcome {
 }
 
 impl FitOutcome {
-    /// The covariance of the residual at every lag, m2: a raster about lag zero, whose coordinates are the lag (x east, y north, m).
-    /// NaN where no pair lies that far apart.
+    /// The covariance of the residual at every lag, m2: a raster centred on lag zero, whose coordinates are the lag (x east,
+    /// y north, m). NaN at lags without pairs.
     pub fn covariance_map(&self) -> Grid {
         let Self { survey, cell_m, .. } = self;
         let [max_row, max_col] = survey.covariance.max_lag.map(|l| l as isize);
@@ -85,8 +85,8 @@ impl FitOutcome {
         Grid::new(geometry, lags.map(|(r, c)| survey.covariance.covariance(r, c).unwrap_or(f64::NAN)).collect())
     }
 
-    /// Background (moving average, m; NaN where the window has no data) and residual (height less background, m, on the
-    /// cells that entered the covariance; NaN elsewhere) of the heights that were fitted.
+    /// Background (moving average, m; NaN where the window has no data) and residual (height minus background, m, on the
+    /// cells that entered the covariance; NaN elsewhere) of the fitted heights.
     ///
     /// # Errors
     /// Heights that cannot be read.
@@ -99,8 +99,21 @@ impl FitOutcome {
     }
 }
 
-/// Fits the covariance of the texture of a DEM or of transects. Heights and cells are in m; the streams are for the
-/// replicates of intervals.
+/// Fits the covariance of the texture of a DEM or of transects. Heights and cells are in m; `streams` drive the bootstrap
+/// replicates. The front page of the crate has an example of a fit; a surface that has no texture is refused:
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+/// use sastrugi_texture::{FitError, FitParameters, FitSettings, fit};
+///
+/// let settings: FitSettings = FitParameters { outer_scale_m: 1.0, ..FitParameters::default() }.try_into().unwrap();
+/// let level = Grid::filled(Geometry::square(60, 60, 0.1), 1234.0);
+/// let refused = fit(&level, &settings, &Streams::for_seed(1, "fit")).err().unwrap();
+/// assert_eq!(refused, FitError::Constant { height_m: 1234.0 });
+/// // Six metres are less than three windows of 2.5 m.
+/// let wide: FitSettings = FitParameters { outer_scale_m: 2.5, ..FitParameters::default() }.try_into().unwrap();
+/// assert!(matches!(fit(&level, &wide, &Streams::for_seed(1, "fit")).err(), Some(FitError::OuterScaleTooLarge { .. })));
+/// ```
 ///
 /// # Errors
 /// See [`FitError`].
@@ -113,7 +126,7 @@ pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> 
         Mode::Corrected => corrected(&case, &naive, streams)?,
     };
     let (rows, cols) = middle(&case);
-    // The shape of the heights is that before trimming.
+    // The height distribution is that of the residual before trimming.
     let residual = case.survey.residual(heights, settings, rows, cols)?;
     let fit = FitFile { height_quantiles_m: quantiles_m(&residual), ..fit };
     Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey, bins: case.bins, cell_m: case.geometry.cell })
@@ -130,7 +143,7 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     let settings = case.settings;
     let by_direction = case.bins_of(Layout::DIRECTIONAL);
     let directional = settings.forms.iter().any(Form::is_anisotropic);
-    // Models with and without an axis are compared on the same bins.
+    // Isotropic and anisotropic models are compared on the same bins.
     let bins = if directional { &by_direction } else { &case.bins };
     let needed = 1 + settings.forms.iter().map(|f| f.parameters().len()).max().unwrap_or(0);
     if bins.len() < needed {
@@ -183,7 +196,8 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     })
 }
 
-/// A texture whose leading range lies below the cell, and whose neighbouring cells are hardly correlated, looks like noise.
+/// Refuses a residual that looks like white noise: the leading range is at most one cell, and neighbouring cells are hardly
+/// correlated.
 fn refuse_white(case: &Case, estimate: &Estimate) -> Result<(), FitError> {
     let cell = case.geometry.cell[0].max(case.geometry.cell[1]);
     let longest = estimate.covariance.range_m();
@@ -193,7 +207,7 @@ fn refuse_white(case: &Case, estimate: &Estimate) -> Result<(), FitError> {
     Ok(())
 }
 
-/// The part of a DEM that is fitted again at other windows: all of it, or its middle.
+/// The part of a DEM that is refitted at other windows: all of it, or its middle.
 fn examined(case: &Case) -> Result<Box<dyn Heights>, FitError> {
     let (rows, cols) = middle(case);
     let geometry = case.geometry.window(rows.start, cols.start, rows.len(), cols.len());
@@ -203,7 +217,7 @@ fn examined(case: &Case) -> Result<Box<dyn Heights>, FitError> {
     Ok(if case.heights.are_profiles() { Box::new(Profiles::of(part)) } else { Box::new(part) })
 }
 
-/// Rows and columns of all of a raster, or of as much about its middle as is looked at twice, wide enough for windows of
+/// Rows and columns of the part that is read a second time: the complete raster, or its middle, wide enough for windows of
 /// twice the size.
 fn middle(case: &Case) -> (Range<usize>, Range<usize>) {
     let Geometry { rows, cols, .. } = case.geometry;

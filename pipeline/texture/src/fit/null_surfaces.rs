@@ -1,4 +1,5 @@
-//! Surfaces of a covariance on a case's own grid and mask, measured and detrended as the case was: the null of every test.
+//! Surfaces with a given covariance on a case's own grid and mask, measured and detrended like the case: the null hypothesis of
+//! every test.
 
 use super::case::Case;
 use super::residual::residual;
@@ -8,10 +9,10 @@ use crate::covariance::Covariance;
 use crate::sizes::Sizes;
 use sastrugi_numeric::Streams;
 
-/// Range of the surface that stands for a self-affine one, windows.
+/// Range of the stationary surface that replaces a self-affine one, windows.
 const OUTER_WINDOWS: f64 = 8.0;
 
-/// Such surfaces, on the whole or a part of a case.
+/// Generator of null surfaces on all or part of a case.
 pub struct NullSurfaces<'a> {
     case: &'a Case<'a>,
     cols: usize,
@@ -20,16 +21,16 @@ pub struct NullSurfaces<'a> {
     simulator: Simulator,
 }
 
-/// One of them.
+/// One null surface.
 pub struct NullSurface {
     /// Residual before trimming, m.
     pub residual: Vec<f64>,
-    /// Where it is cut off.
+    /// Its trimming threshold.
     pub trim: Trim,
 }
 
 impl<'a> NullSurfaces<'a> {
-    /// On as many rows and columns as `trusted` has cells, of which the true ones enter the moving average.
+    /// Null surfaces of the given rows and columns; `trusted` marks the cells that enter the moving average.
     pub fn new(case: &'a Case<'a>, covariance: &Covariance, [rows, cols]: [usize; 2], trusted: Vec<bool>) -> Self {
         let shape = Shape { rows, cols, profiles: case.heights.are_profiles() };
         let outer_m = OUTER_WINDOWS * case.window_m();

@@ -16,11 +16,11 @@ use super::FitError;
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Mode {
-    /// The model is brought through the same detrending and trimming as the data before the two are compared.
+    /// The model goes through the same detrending and trimming as the data before the two are compared.
     #[default]
     Corrected,
-    /// The published procedure: the model is compared with the residual's covariance as it is, and comes out too small
-    /// and too short.
+    /// The published procedure: the model is compared directly with the residual's covariance, so that sigma and b come out
+    /// too small.
     Paper,
 }
 
@@ -40,40 +40,42 @@ impl Mode {
 pub struct FitParameters {
     /// `corrected` (default) or `paper` (Vecherin et al. 2022 as published).
     pub mode: Mode,
-    /// Outer scale: width of the moving average that is taken for the background, m. Default 2 (Vecherin et al. 2022,
+    /// Outer scale: width of the moving average that defines the background, m. Default 2 (Vecherin et al. 2022,
     /// section 2); at least 3 cells, at most a third of the DEM.
     pub outer_scale_m: f64,
     /// Significance level at which residuals are trimmed on both sides, in (0, 0.5). Default 0.05 (Vecherin et al.
     /// 2022, section 2).
     pub trim: f64,
-    /// Covariance model, or several with commas, or `auto` for the usual ones: the best by AICc is taken, all are listed.
-    /// `empirical` beside them stores the measured covariance by lag for textures; the best of the others continues it. A model is `exponential`, `gaussian`, `spherical`, `matern` or `self_affine`, a sum of two (`exponential+gaussian`),
-    /// with `+nugget` after it or `anisotropic:` before it where wanted. Default `exponential` (Vecherin et al. 2022,
-    /// Eq. 9).
+    /// Covariance model, or several separated by commas, or `auto` for the usual ones: the best by AICc is used, all are listed.
+    /// Adding `empirical` stores the measured covariance by lag for textures; the best of the other models extrapolates it. A
+    /// model is `exponential`, `gaussian`, `spherical`, `matern` or `self_affine`, or a sum of two (`exponential+gaussian`),
+    /// optionally followed by `+nugget` or preceded by `anisotropic:`. Default `exponential` (Vecherin et al. 2022, Eq. 9).
     pub model: String,
     /// Largest lag of the covariance, m. Default: half the outer scale, at least 3 cells.
     pub max_lag_m: Option<f64>,
-    /// Cells count when more than this share of their window has data. Default 0.5; 0.9 in `paper` mode.
+    /// A cell is used only if more than this share of its window has data. Default 0.5; 0.9 in `paper` mode.
     pub min_valid_share: Option<f64>,
-    /// Whether objects (trees, rocks, structures) are found and left out before the moving average. Default true. Of a bare
-    /// site with steep steps (gullies, cliffs) it takes up to a tenth away: set it to false there. `paper` mode looks for none.
+    /// Whether objects (trees, rocks, structures) are found and left out before the moving average. Default true. On a bare
+    /// site with steep steps (gullies, cliffs) the search removes up to a tenth of the cells: set it to false there. Not used in
+    /// `paper` mode.
     pub find_objects: bool,
-    /// Replicates of the parametric bootstrap that gives intervals; 0 for none. Default 99. `paper` mode has none.
+    /// Replicates of the parametric bootstrap for the intervals; 0 for no intervals. Default 99. Not used in `paper` mode.
     pub bootstrap: u32,
-    /// Standard deviation of the Gaussian point spread that blurred the DEM (photogrammetry's smoothing), m. Default 0.
+    /// Standard deviation of the Gaussian point spread function that blurred the DEM (smoothing by photogrammetry), m.
+    /// Default 0.
     pub inner_scale_m: f64,
-    /// Standard deviation of the DEM's white noise per cell, m. Default 0. Where it is not known, take it from a smooth part of the DEM
-    /// (`noise_reference` of a study's fit, `--noise-reference`), or fit it as a nugget (`+nugget`).
+    /// Standard deviation of the DEM's white noise per cell, m. Default 0. If unknown, estimate it from a smooth part of the DEM
+    /// (`noise_reference` of a study's fit, `--noise-reference`) or fit it as a nugget (`+nugget`).
     pub noise_sigma_m: f64,
-    /// Standard deviation of noise that neighbouring cells share, as dense image matching leaves it, m: covariance
-    /// sigma^2 exp(-(lag / range)^2) (Hugonnet et al. 2022). Default 0. A noise reference gives it as well.
+    /// Standard deviation of spatially correlated noise, as left by dense image matching, m: covariance
+    /// sigma^2 exp(-(lag / range)^2) (Hugonnet et al. 2022). Default 0. A noise reference estimates it too.
     pub correlated_noise_sigma_m: f64,
-    /// Range of that noise, m: 0.6 of the width of the patches that were matched, where each cell has its own. Below the outer scale; 0
-    /// without correlated noise.
+    /// Range of the correlated noise, m: 0.6 times the width of the matched patches if each cell has its own patch. Must be
+    /// below the outer scale; 0 without correlated noise.
     pub correlated_noise_range_m: f64,
 }
 
-/// What `auto` tries.
+/// Models that `auto` tries.
 const AUTO: [&str; 9] = [
     "exponential",
     "gaussian",
@@ -85,9 +87,9 @@ const AUTO: [&str; 9] = [
     "anisotropic:exponential",
     "anisotropic:matern",
 ];
-/// Model of the paper.
+/// Default model, from the paper.
 const MODEL: &str = "exponential";
-/// Fewest replicates of which 2.5 % is one.
+/// Fewest replicates for a 2.5 % quantile.
 const BOOTSTRAP_MIN: u32 = 39;
 /// Most replicates.
 const BOOTSTRAP_MAX: u32 = 100_000;
@@ -97,7 +99,7 @@ const OUTER_SCALE_M: f64 = 2.0;
 const TRIM: f64 = 0.05;
 /// Fewest cells across the outer scale.
 const WINDOW_CELLS_MIN: f64 = 3.0;
-/// Fewest cells in the largest lag, so that two parameters can be told from noise.
+/// Fewest cells in the largest lag, so that two parameters and noise can be separated.
 const LAG_CELLS_MIN: f64 = 3.0;
 
 impl Default for FitParameters {
@@ -126,7 +128,7 @@ pub struct FitSettings {
     pub(super) forms: Vec<Form>,
     /// Whether the measured covariance is stored.
     pub(super) empirical: bool,
-    /// Whether the forms are the usual ones.
+    /// Whether the forms come from `auto`.
     auto: bool,
     noise: Noise,
     pub(super) min_valid_share: f64,
@@ -143,7 +145,7 @@ impl TryFrom<FitParameters> for FitSettings {
         }
         if parameters.inner_scale_m >= parameters.outer_scale_m {
             let (inner, outer) = (parameters.inner_scale_m, parameters.outer_scale_m);
-            let message = format!("is {inner} m, not below the outer scale of {outer} m");
+            let message = format!("is {inner} m; it must be below the outer scale, {outer} m");
             return Err(ParameterError::new("inner_scale_m", message));
         }
         let share_default = if parameters.mode == Mode::Paper { 0.9 } else { 0.5 };
@@ -155,12 +157,12 @@ impl TryFrom<FitParameters> for FitSettings {
         let noise = parameters.noise()?;
         if noise.correlated_range_m >= parameters.outer_scale_m {
             let (range, outer) = (noise.correlated_range_m, parameters.outer_scale_m);
-            let message = format!("is {range} m, not below the outer scale of {outer} m");
+            let message = format!("is {range} m; it must be below the outer scale, {outer} m");
             return Err(ParameterError::new("correlated_noise_range_m", message));
         }
         if parameters.bootstrap > 0 && !(BOOTSTRAP_MIN..=BOOTSTRAP_MAX).contains(&parameters.bootstrap) {
             let message = format!(
-                "is {}; it is 0 (no intervals) or {BOOTSTRAP_MIN} to {BOOTSTRAP_MAX}: fewer say nothing at 95 %",
+                "is {}; it must be 0 (no intervals) or {BOOTSTRAP_MIN} to {BOOTSTRAP_MAX}: fewer cannot give a 95 % interval",
                 parameters.bootstrap
             );
             return Err(ParameterError::new("bootstrap", message));
@@ -171,11 +173,12 @@ impl TryFrom<FitParameters> for FitSettings {
             return Err(ParameterError::new("model", message));
         }
         if parameters.mode == Mode::Paper && !forms[0].unit().is_stationary() {
-            let message = format!("is `{}`, which has no variance; the published procedure fits one", parameters.model);
+            let message =
+                format!("is `{}`, which has no finite variance; the published procedure fits one", parameters.model);
             return Err(ParameterError::new("model", message));
         }
         if parameters.mode == Mode::Paper && (parameters.inner_scale_m > 0.0 || !noise.is_none()) {
-            let message = "is `paper`, which knows neither an inner scale nor noise; leave them out or fit `corrected`";
+            let message = "is `paper`, which supports neither an inner scale nor noise; remove them or use `corrected`";
             return Err(ParameterError::new("mode", message));
         }
         let auto = parameters.model.split(',').any(|name| name.trim() == "auto");
@@ -189,8 +192,8 @@ impl FitParameters {
     }
 }
 
-/// The forms that a `model` parameter names, and whether it names the measured covariance. Alone that is continued by the
-/// default form.
+/// The forms that a `model` parameter names, and whether it includes `empirical`. On its own, `empirical` is extrapolated by
+/// the default form.
 fn forms(text: &str) -> Result<(Vec<Form>, bool), ParameterError> {
     let (empirical, named): (Vec<&str>, Vec<&str>) =
         text.split(',').map(str::trim).partition(|name| *name == EMPIRICAL);
@@ -236,14 +239,15 @@ impl FitSettings {
         Measurement { inner_scale_m: self.parameters.inner_scale_m, noise: self.noise }
     }
 
-    /// The same fit of a DEM whose noise was found in a reference.
+    /// The same fit with the noise estimated from a reference.
     ///
     /// # Errors
-    /// A fit whose parameters state a noise already, or whose mode knows none; correlated noise that reaches to the outer scale.
+    /// A fit whose parameters already state a noise, or whose mode does not support it; a correlated noise whose range reaches
+    /// the outer scale.
     pub fn with_noise(&self, noise: &Noise) -> Result<Self, ParameterError> {
         if !self.noise.is_none() {
             let message =
-                "or correlated_noise_sigma_m is stated, and a noise reference is given as well; give one of the two";
+                "or correlated_noise_sigma_m is set, and a noise reference is given as well; use only one of the two";
             return Err(ParameterError::new("noise_sigma_m", message));
         }
         let found = FitParameters {
@@ -255,7 +259,7 @@ impl FitSettings {
         found.try_into()
     }
 
-    /// The same fit of transects: what `auto` tries has no direction.
+    /// The same fit for transects: `auto` tries isotropic models only.
     pub(super) fn of_transects(&self) -> Self {
         let is_tried = |form: &&Form| !(self.auto && form.is_anisotropic());
         Self { forms: self.forms.iter().filter(is_tried).cloned().collect(), ..self.clone() }
@@ -271,7 +275,7 @@ impl FitSettings {
         self.parameters.find_objects && self.mode() == Mode::Corrected
     }
 
-    /// What the background of a partial window is: the published procedure knows the mean only.
+    /// How the background of a partial window is computed: the published procedure uses the mean.
     pub(super) fn at_partial(&self) -> AtPartial {
         match self.mode() {
             Mode::Corrected => AtPartial::Plane,
@@ -283,7 +287,7 @@ impl FitSettings {
         self.parameters.trim
     }
 
-    /// The window on a DEM of this shape; transects have one along them only.
+    /// The window on a DEM of this shape; for transects it extends along them only.
     pub(super) fn window(&self, dem: &Geometry, profiles: bool) -> Result<BoxWindow, FitError> {
         let outer_scale_m = self.parameters.outer_scale_m;
         let [width_m, height_m] = dem.size();

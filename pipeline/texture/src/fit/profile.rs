@@ -1,8 +1,8 @@
-//! Profile likelihood of the range: the generalised sum of squares with the range held, everything else fitted again.
+//! Profile likelihood of the range: the generalised sum of squares with the range held fixed and all other parameters refitted.
 //!
-//! A range is inside the 95 % interval while its sum of squares lies within 3.84 of the least (chi-squared, one degree of
-//! freedom: Wilks, 1938), times the misfit per degree of freedom where that is above 1. The interval is open where the sum
-//! never rises that far: then the data does not know an end.
+//! A range is inside the 95 % interval if its sum of squares exceeds the minimum by at most 3.84 (chi-squared, one degree of
+//! freedom: Wilks, 1938), times the misfit per degree of freedom where that is above 1. Where the sum never rises that far,
+//! the data does not bound the range and the interval is open.
 
 use super::estimator::{Estimate, Estimator, Held};
 use crate::covariance::form::Role;
@@ -10,12 +10,12 @@ use sastrugi_schemas::fit::Profile;
 
 /// Rise of twice the log-likelihood that rules a parameter out at 95 %.
 pub const LIKELIHOOD_RISE: f64 = 3.84;
-/// Ranges of the profile, as shares of the estimate.
+/// Ranges of the profile, as multiples of the estimate.
 const SHARES: [f64; 13] = [0.25, 0.35, 0.5, 0.6, 0.7, 0.85, 1.0, 1.2, 1.4, 1.7, 2.0, 3.0, 4.0];
-/// Halvings of a bracket of a factor of two: the end is good to 1 %.
+/// Bisections of a bracket of a factor of two: the end is accurate to 1 %.
 const HALVINGS: usize = 6;
 
-/// How the generalised sum of squares rises away from the fitted range, as far as ranges are searched.
+/// Rise of the generalised sum of squares away from the fitted range, within the bounds of the search.
 pub fn profile(estimator: &Estimator, estimate: &Estimate) -> Option<Profile> {
     let coordinate = estimate.coordinate(Role::Range(0))?;
     let coordinates = estimator.case.coordinates(&estimate.form);
@@ -30,7 +30,7 @@ pub fn profile(estimator: &Estimator, estimate: &Estimate) -> Option<Profile> {
     })
 }
 
-/// The fits at both ends of the interval of the range, each `None` where it is open; `None` without a likelihood.
+/// The fits at both ends of the range's interval, each `None` where it is open; `None` without a likelihood.
 pub fn ends(estimator: &Estimator, estimate: &Estimate) -> Option<[Option<Held>; 2]> {
     let coordinate = estimate.coordinate(Role::Range(0))?;
     let limit = LIKELIHOOD_RISE * estimate.misfit_ratio()?.max(1.0);
@@ -41,7 +41,7 @@ pub fn ends(estimator: &Estimator, estimate: &Estimate) -> Option<[Option<Held>;
     Some([find(low, -std::f64::consts::LN_2), find(high, std::f64::consts::LN_2)])
 }
 
-/// Where the rise from `start` passes `limit`, in steps towards `bound`; the last fit inside.
+/// Steps from `start` towards `bound` until the rise passes `limit`; returns the last fit inside.
 fn end(held: &dyn Fn(f64) -> Option<Held>, start: f64, bound: f64, step: f64, limit: f64) -> Option<Held> {
     let (mut inside, mut outside) = (start, start);
     while outside != bound {

@@ -1,4 +1,4 @@
-//! Height less background.
+//! Residual: height minus background.
 
 use super::FitSettings;
 use rayon::prelude::*;
@@ -6,7 +6,7 @@ use sastrugi_roughness::background::{BoxWindow, RunningBackground, band_rows};
 
 /// A part of a raster of heights without objects.
 pub struct Part<'a> {
-    /// Heights of the raster, m; NaN where there is no data or none that is trusted.
+    /// Heights of the raster, m; NaN where there is no data or the cell is not trusted.
     pub heights: &'a [f64],
     /// Length of the raster's rows.
     pub cols: usize,
@@ -16,21 +16,21 @@ pub struct Part<'a> {
     pub shape: [usize; 2],
 }
 
-/// What residuals and their windows are like.
+/// Extremes of residuals and their windows.
 #[derive(Clone, Copy, Debug, Default)]
 pub struct WindowTally {
-    /// Residuals whose window is not complete.
+    /// Residuals whose window is incomplete.
     pub partial: usize,
     /// Most data in any window.
     pub most: u32,
     /// Largest absolute residual, m.
     pub largest_m: f64,
-    /// Largest absolute background of a residual, m.
+    /// Largest absolute background of any cell with a residual, m.
     pub highest_m: f64,
 }
 
 impl WindowTally {
-    /// Of two parts.
+    /// Combines two parts.
     pub fn with(self, other: Self) -> Self {
         Self {
             partial: self.partial + other.partial,
@@ -50,7 +50,7 @@ pub fn residual(heights: &[f64], cols: usize, settings: &FitSettings, window: Bo
 }
 
 impl Part<'_> {
-    /// Puts the residuals of the part into `residual`, m: NaN where a cell has no data or no background, or its window lacks data.
+    /// Writes the residuals of the part to `residual`, m: NaN where a cell has no data or no background, or its window lacks data.
     pub fn residual(&self, settings: &FitSettings, window: BoxWindow, residual: &mut Vec<f64>) -> WindowTally {
         let [rows, cols] = self.shape;
         residual.resize(rows * cols, 0.0);

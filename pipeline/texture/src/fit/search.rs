@@ -1,8 +1,8 @@
-//! Coordinates in which a covariance's parameters are searched: free of units, smooth, without seams.
+//! Search coordinates for a covariance's parameters: dimensionless, smooth, without discontinuities.
 //!
-//! * sigma, b and shapes: their logarithms; b the geometric mean of both axes, so that ratio and b do not pull together;
+//! * sigma, b and shapes: their logarithms; b is the geometric mean of both axes, so that ratio and b are not coupled;
 //! * nugget: a share of the data's variance;
-//! * anisotropy: `ln(1 / ratio) (cos 2 a, sin 2 a)`, which has no seam at half a turn and is 0 for an isotropic surface.
+//! * anisotropy: `ln(1 / ratio) (cos 2 a, sin 2 a)`, which is continuous over half a turn and 0 for an isotropic surface.
 
 use crate::covariance::form::{Role, half_turn};
 use crate::covariance::{Covariance, Form};
@@ -14,10 +14,10 @@ pub const RANGE_MAX_WINDOWS: f64 = 20.0;
 const NUGGET_MAX: f64 = 2.0;
 /// Largest `ln(1 / ratio)`.
 const ELONGATION_MAX: f64 = 3.0;
-/// Where the search for an axis starts: an isotropic start has no direction to leave in.
+/// Elongation at the start of an anisotropic search: from an exactly isotropic start the azimuth has no gradient.
 const ELONGATION_START: f64 = 0.05;
 
-/// The coordinates of a form on some data.
+/// The search coordinates of a form for given data.
 pub struct Coordinates<'a> {
     /// The form.
     pub form: &'a Form,
@@ -41,7 +41,7 @@ impl Coordinates<'_> {
         let bound = |role| match role {
             Role::Sigma(k) => match self.form.terms()[k].scale_names().1 {
                 Some(_) => (sigma - 5.0, sigma + 7.0),
-                // Increments over 1 m, whatever 1 m is to this window.
+                // Increments over 1 m, however far 1 m is from this window.
                 None => (sigma - 30.0, sigma + 30.0),
             },
             Role::Range(_) => range,
@@ -99,7 +99,7 @@ impl Coordinates<'_> {
         covariance
     }
 
-    /// Where searches start, given what an exponential looks like to the same data.
+    /// Starting points, given sigma and b of an exponential fitted to the same data.
     pub fn starts(&self, sigma_m: f64, range_m: f64) -> Vec<Vec<f64>> {
         let single = |range_m: f64| {
             let mut start = self.form.unit();
@@ -107,7 +107,7 @@ impl Coordinates<'_> {
             for (k, term) in start.structures.iter_mut().enumerate() {
                 term.sigma_m = sigma_m / count.sqrt();
                 if term.model.scale_names().1.is_some() {
-                    // The terms of a sum start a factor of five apart about the range.
+                    // The terms of a sum start with ranges a factor of five apart, around the given range.
                     term.range_m = range_m * [1.0, 5.0][k.min(1)] / [1.0, 2.2][(count as usize - 1).min(1)];
                 } else {
                     term.sigma_m = sigma_m * libm::exp(-term.shape * libm::log(range_m)) * std::f64::consts::SQRT_2;
@@ -127,7 +127,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn prop_coordinates_go_there_and_back() {
+    fn prop_coordinates_round_trip() {
         for name in ["exponential", "matern+nugget", "self_affine", "anisotropic:exponential+gaussian"] {
             let form = Form::parse(name).unwrap();
             let coordinates = Coordinates { form: &form, variance_m2: 2.0, cell_m: 0.1, window_m: 2.0 };

@@ -1,8 +1,8 @@
-//! Measured surfaces with a given covariance, for Monte Carlo work: normal fields cut from a torus at least twice as wide, so
-//! that neither the torus nor fixed amplitudes make them more alike than surfaces are.
+//! Simulated measurements of surfaces with a given covariance, for Monte Carlo work: normal fields with random amplitudes, cut
+//! from a torus at least twice as wide, so that neither periodicity nor fixed amplitudes reduce their scatter.
 //!
-//! A self-affine surface is replaced by a Matern one of a range of `outer_m`; a covariance that reaches across the torus is made
-//! from its spectral density ([`crate::covariance::density`]).
+//! A self-affine surface is replaced by a Matern one with a range of `outer_m`; a covariance that reaches across the torus is
+//! synthesised from its spectral density ([`crate::covariance::density`]).
 
 use crate::covariance::Covariance;
 use crate::covariance::density::{self, TORUS_RANGES};
@@ -11,12 +11,12 @@ use crate::synth::fft_ma::{Phase, random_spectrum};
 use sastrugi_numeric::Streams;
 use sastrugi_numeric::fft::{RealFft2, smooth_length};
 
-/// Cells of a surface, or transects of `cols` cells, `rows` of them.
+/// Size of a surface in cells, or `rows` transects of `cols` cells.
 #[derive(Clone, Copy, Debug)]
 pub struct Shape {
     pub rows: usize,
     pub cols: usize,
-    /// True for transects, which do not know each other.
+    /// True for transects, which are independent of each other.
     pub profiles: bool,
 }
 
@@ -30,7 +30,7 @@ pub struct Simulator {
 }
 
 impl Simulator {
-    /// Surfaces of a covariance as they are measured.
+    /// Simulator of surfaces of a covariance, as they would be measured.
     pub fn new(
         covariance: &Covariance,
         measurement: Measurement,
@@ -46,10 +46,10 @@ impl Simulator {
             false => [shape.rows, shape.cols].map(|n| smooth_length(2 * n)),
         };
         let fft = RealFft2::new(torus[0], torus[1]);
-        let twin = covariance.stationary(outer_m);
+        let stationary = covariance.stationary(outer_m);
         let mut spectrum = match shape.profiles {
-            true => fft.forward(&torus_covariance(torus, cell_m, &twin)),
-            false => density::spectrum(&twin, torus, cell_m),
+            true => fft.forward(&torus_covariance(torus, cell_m, &stationary)),
+            false => density::spectrum(&stationary, torus, cell_m),
         };
         if measurement.inner_scale_m > 0.0 {
             blur(&mut spectrum, cell_m, measurement.inner_scale_m);

@@ -1,10 +1,10 @@
-//! What a fit knows of a DEM: which cells count, where residuals are cut off, and the covariance of what is left.
+//! Passes over a DEM: which cells are used, where residuals are trimmed, and the covariance of the rest.
 //!
-//! Rows are read in strips, three times: to find objects (each strip judged by its own robust scale, with two windows
-//! around it), to find the threshold, and to add up pairs of residuals. So memory is bounded by the strip and two bits per
-//! cell: two million cells, or eight windows (four of them around it) or four of the largest lags times the width where
-//! that is more, at about 40 bytes each. It grows with the raster's width, not with its length. Heights and residuals of a
-//! strip lie where those of the one before did. Residuals of any part are made again when they are asked for.
+//! Rows are read in strips, three times: to find objects (with each strip's own robust scale, including two windows
+//! around it), to find the threshold, and to accumulate pairs of residuals. Memory is thus bounded by one strip plus two bits per
+//! cell. A strip has two million cells, or eight windows (four of them around it) or four of the largest lags times the width
+//! if that is more, at about 40 bytes each: memory grows with the raster's width, not with its length. The buffers of a strip
+//! are reused for the next. Residuals are not stored but recomputed on demand.
 
 use super::block_places::block_places;
 use super::heights::Heights;
@@ -25,7 +25,7 @@ use std::ops::Range;
 /// Cells of a strip.
 pub const STRIP_CELLS: usize = 1 << 21;
 
-/// A DEM detrended, trimmed and correlated.
+/// A DEM after detrending, trimming and correlation.
 #[derive(Clone, Debug)]
 pub struct Survey {
     geometry: Geometry,
@@ -40,15 +40,15 @@ pub struct Survey {
     pub trusted_count: usize,
     /// Residuals before trimming.
     pub detrended: usize,
-    /// How many of them have a window that is not complete.
+    /// Residuals whose window is incomplete.
     partial: usize,
-    /// Where residuals are cut off.
+    /// Trimming threshold.
     pub trim: Trim,
     /// Residuals after trimming.
     pub kept: usize,
     /// Pair sums of the trimmed residual.
     pub covariance: MaskedCovariance,
-    /// Squares of the trimmed residual in each of [`block_places`].
+    /// Sums of squares of the trimmed residual in each of [`block_places`].
     pub blocks: Vec<Squares>,
 }
 
@@ -62,7 +62,7 @@ pub struct Squares {
 }
 
 impl Squares {
-    /// Adds the residuals of a part of a row; NaN is none.
+    /// Adds the residuals of a part of a row, skipping NaN.
     fn add(&mut self, residual: &[f64]) {
         let (mut count, mut sums) = (0, [0.0; 4]);
         for four in residual.chunks(4) {
@@ -77,18 +77,18 @@ impl Squares {
     }
 }
 
-/// Where residuals are cut off.
+/// Trimming threshold and statistics of the residuals before trimming.
 #[derive(Clone, Copy, Debug)]
 pub struct Trim {
-    /// Middle of what is kept, m; 0 but in `paper` mode.
+    /// Centre of the interval kept, m; 0 except in `paper` mode.
     centre_m: f64,
-    /// Largest distance from the middle, m.
+    /// Largest distance from the centre, m.
     pub threshold_m: f64,
     /// Median absolute residual before trimming, m.
     pub median_size_m: f64,
     /// Root mean square residual before trimming, m.
     pub rms_m: f64,
-    /// Mean of what is kept, taken off in `paper` mode.
+    /// Mean of the residuals kept, subtracted in `paper` mode.
     offset_m: f64,
 }
 
@@ -100,7 +100,7 @@ impl Trim {
         Self { centre_m: 0.0, threshold_m, median_size_m, rms_m, offset_m: 0.0 }
     }
 
-    /// Sets what is cut off to NaN.
+    /// Sets trimmed residuals to NaN.
     pub fn apply(&self, residual: &mut [f64]) {
         for r in residual {
             *r = if (*r - self.centre_m).abs() <= self.threshold_m { *r - self.offset_m } else { f64::NAN };
@@ -108,7 +108,7 @@ impl Trim {
     }
 }
 
-/// The readings of a DEM.
+/// Reads a DEM in strips.
 struct Reading<'a> {
     heights: &'a dyn Heights,
     settings: &'a FitSettings,
@@ -118,17 +118,17 @@ struct Reading<'a> {
     step: usize,
 }
 
-/// A part at work, whose memory serves the next.
+/// Buffers for one part of the DEM, reused for the next.
 #[derive(Default)]
 struct Strip {
-    /// Heights of the part and of the windows about its cells, m; NaN where they are not trusted.
+    /// Heights of the part and of the windows around its cells, m; NaN where not trusted.
     heights: Vec<f64>,
     /// Residuals of the part, m.
     residual: Vec<f64>,
 }
 
 impl Survey {
-    /// Reads a DEM.
+    /// Surveys a DEM: objects, threshold and covariance.
     pub fn new(
         heights: &dyn Heights,
         settings: &FitSettings,
@@ -137,7 +137,7 @@ impl Survey {
     ) -> Result<Self, FitError> {
         let geometry = heights.geometry();
         let most = (STRIP_CELLS / geometry.cols).max(4 * window.cells()[0].max(max_lag[0]));
-        // Transects do not know each other.
+        // Transects are independent of each other.
         let step = if heights.are_profiles() { 1 } else { even_step(geometry.rows, most, max_lag[0]) };
         let reading = Reading { heights, settings, geometry, window, step };
         let (trusted, measured, lowest_m) = reading.trusted()?;
@@ -166,7 +166,7 @@ impl Survey {
         })
     }
 
-    /// The cells as the detrender saw them.
+    /// The cells as the detrending filter used them.
     pub fn cells(&self) -> DetrendedCells<'_> {
         DetrendedCells {
             rows: self.geometry.rows,
@@ -191,7 +191,7 @@ impl Survey {
         Ok(part.residual)
     }
 
-    /// The background of all of a DEM, m; NaN where there is none.
+    /// The background of the complete DEM, m; NaN where the window has no data.
     pub fn background(&self, heights: &dyn Heights, settings: &FitSettings) -> Result<Vec<f64>, FitError> {
         let Geometry { rows, cols, .. } = self.geometry;
         let mut trusted = Vec::new();
@@ -225,12 +225,12 @@ impl Reading<'_> {
         (0..rows).step_by(step).map(move |top| top..(top + step).min(rows))
     }
 
-    /// Rows or columns with as many more on both sides as there are.
+    /// Rows or columns extended by `by` on both sides, within 0 to `end`.
     fn widened(&self, span: &Range<usize>, by: usize, end: usize) -> Range<usize> {
         span.start.saturating_sub(by)..(span.end + by).min(end)
     }
 
-    /// Puts the heights of a part into `part`, NaN where there is no data.
+    /// Reads the heights of a part into `part`, NaN where there is no data.
     fn read(&self, rows: Range<usize>, cols: Range<usize>, part: &mut Vec<f64>) -> Result<(), FitError> {
         self.heights.read(rows, cols, part).map_err(FitError::Unreadable)?;
         part.iter_mut().for_each(|z| *z = if z.is_finite() { *z } else { f64::NAN });
@@ -265,7 +265,7 @@ impl Reading<'_> {
         Ok((trusted, measured, lowest_m))
     }
 
-    /// Puts the heights of a part into `heights`, NaN where they are not trusted.
+    /// Reads the heights of a part into `heights`, NaN where they are not trusted.
     fn read_trusted(
         &self,
         trusted: &Bitmap,
@@ -281,7 +281,7 @@ impl Reading<'_> {
         Ok(())
     }
 
-    /// Makes the residuals of a part, before trimming.
+    /// Computes the residuals of a part, before trimming.
     fn residual(
         &self,
         trusted: &Bitmap,
@@ -299,7 +299,7 @@ impl Reading<'_> {
         Ok(part.residual(self.settings, self.window, residual))
     }
 
-    /// Cells with a residual, how many of them have a window that is not complete, and where residuals are cut off.
+    /// Cells with a residual, how many of them have an incomplete window, and the trimming threshold.
     fn threshold(&self, trusted: &Bitmap, lowest_m: f64) -> Result<(Bitmap, usize, Trim), FitError> {
         let cols = self.geometry.cols;
         let mut used = Bitmap::with_capacity(self.geometry.len());
@@ -318,7 +318,7 @@ impl Reading<'_> {
             let best_share = f64::from(windows.most) / self.window.area() as f64;
             return Err(FitError::NoWindow { needed_share: self.settings.min_valid_share, best_share });
         }
-        // Rounding of the running sums is far below 1e-11 of the heights.
+        // Rounding errors of the running sums are far below 1e-11 of the heights.
         if windows.largest_m <= 1e-11 * windows.highest_m {
             return Err(FitError::Constant { height_m: lowest_m });
         }
@@ -327,7 +327,7 @@ impl Reading<'_> {
         Ok((used, windows.partial, trim))
     }
 
-    /// The normal threshold about the mean, `z(1 - level / 2)` standard deviations, and the mean of what it keeps.
+    /// The normal threshold around the mean, `z(1 - level / 2)` standard deviations, and the mean of the residuals that it keeps.
     fn paper_trim(&self, trusted: &Bitmap, trim: Trim, all: &Moments) -> Result<Trim, FitError> {
         let threshold_m = normal::quantile(1.0 - 0.5 * self.settings.trim()) * all.variance().sqrt();
         let trim = Trim { centre_m: all.mean(), threshold_m, ..trim };
@@ -340,7 +340,7 @@ impl Reading<'_> {
         Ok(Trim { offset_m: kept.mean(), ..trim })
     }
 
-    /// Pair sums of the trimmed residual, and the number of cells in it; each of its rows is shown to `see` once.
+    /// Pair sums of the trimmed residual and its number of cells; calls `see` once with each of its rows.
     fn pairs(
         &self,
         trusted: &Bitmap,
@@ -365,7 +365,7 @@ impl Reading<'_> {
     }
 }
 
-/// Count, sum and sum of squares of values that come in parts.
+/// Count, sum and sum of squares, accumulated part by part.
 #[derive(Default)]
 struct Moments {
     count: f64,
@@ -384,8 +384,43 @@ impl Moments {
         self.sums[0] / self.count.max(1.0)
     }
 
-    /// Residuals have a mean far below their standard deviation: nothing is lost by the difference.
+    /// Variance. The mean of residuals is far below their standard deviation, so the subtraction loses no accuracy.
     fn variance(&self) -> f64 {
         (self.sums[1] - self.sums[0] * self.mean()) / (self.count - 1.0).max(1.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand; NaN does not count, and parts add up.
+    #[test]
+    fn val_sums_of_parts() {
+        let mut squares = Squares::default();
+        squares.add(&[1.0, f64::NAN, -2.0, 3.0, 0.5]);
+        squares.add(&[f64::NAN, 2.0]);
+        assert_eq!((squares.count, squares.sum_m2), (5, 18.25));
+        let mut moments = Moments::default();
+        moments.add(&[1.0, f64::NAN, 2.0]);
+        moments.add(&[4.0]);
+        // Squares of deviations from 7/3 add up to 14/3; divided by n - 1.
+        assert!((moments.mean() - 7.0 / 3.0).abs() < 1e-15 && (moments.variance() - 7.0 / 3.0).abs() < 1e-14);
+        assert_eq!((Moments::default().mean(), Moments::default().variance()), (0.0, 0.0));
+    }
+
+    /// Cells up to the threshold are kept, with it; a centre and an offset shift what is kept and its values.
+    #[test]
+    fn val_trimming_by_hand() {
+        let mut trim = Trim { centre_m: 0.0, threshold_m: 2.0, median_size_m: 1.0, rms_m: 1.0, offset_m: 0.0 };
+        let residual = [-2.0, 2.0, 2.5, -2.5, f64::NAN, 0.0];
+        let kept = |trim: &Trim| {
+            let mut all = residual;
+            trim.apply(&mut all);
+            all.map(|r| if r.is_nan() { None } else { Some(r) })
+        };
+        assert_eq!(kept(&trim), [Some(-2.0), Some(2.0), None, None, None, Some(0.0)]);
+        (trim.centre_m, trim.offset_m) = (0.5, 0.25);
+        assert_eq!(kept(&trim), [None, Some(1.75), Some(2.25), None, None, Some(-0.25)]);
     }
 }

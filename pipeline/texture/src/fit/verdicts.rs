@@ -1,4 +1,4 @@
-//! What the data says about the fit: is there one scale, one model, one direction, one site?
+//! Tests of a fit against the data: scale separation, misfit, isotropy, stationarity, normality.
 
 use super::FitError;
 use super::case::Case;
@@ -13,13 +13,13 @@ use sastrugi_schemas::fit::Candidate;
 use sastrugi_schemas::fit::OtherWindow;
 use sastrugi_statistics::normal;
 
-/// Replicates without which no p-value of 1 % comes about.
+/// Fewest replicates that allow a p-value of 1 %.
 const REPLICATES_MIN: usize = 99;
-/// Standard errors that two windows may differ by. Both see the same surface, so that their difference scatters less than
-/// this test takes it to.
+/// Standard errors by which two windows may differ. Both use the same surface, so that their difference scatters less than
+/// this test assumes.
 const WINDOWS_Z: f64 = 2.58;
 
-/// The form of surfaces without a scale.
+/// The form for surfaces without a characteristic scale.
 const SELF_AFFINE: &str = "self_affine";
 
 /// The fit at another outer scale.
@@ -27,19 +27,19 @@ pub struct AtWindow {
     pub outer_scale_m: f64,
     pub estimate: Estimate,
     /// Whether the search for b ended within its bounds.
-    is_range_told: bool,
-    /// Root mean square of what is below that scale, on the cells that all windows use, m.
+    is_range_identified: bool,
+    /// Band RMS below that scale, on the cells that all windows use, m.
     pub rms_m: f64,
 }
 
-/// Fits of one form at several outer scales of one area: the fit's own, and half and twice of it where the DEM allows them.
+/// Fits of one form to one area at several outer scales: the fit's own, and half and twice that where the DEM allows it.
 pub struct Windows {
     own: AtWindow,
     pub others: Vec<AtWindow>,
 }
 
 impl Windows {
-    /// The fits of a part of the DEM, or of all of it: then `case` and `estimate` are the own fit.
+    /// Fits a part of the DEM at each outer scale. If the part is the complete DEM, `estimate` serves as the fit at the own scale.
     ///
     /// # Errors
     /// Heights that cannot be read.
@@ -47,7 +47,7 @@ impl Windows {
         let scale_m = case.settings.outer_scale_m();
         let is_whole = part.geometry().len() == case.geometry.len();
         let settings = [1.0, 0.5, 2.0].map(|factor| case.settings.at_outer_scale(factor * scale_m));
-        // Places of a site differ: windows are compared on the same ones.
+        // Roughness varies over a site, so windows are compared on the same cells.
         let mut cases: Vec<Option<Case>> = settings.iter().map(|s| Case::new(part, s).ok()).collect();
         let residuals =
             cases.iter().map(|case| case.as_ref().map(Case::residual).transpose()).collect::<Result<Vec<_>, _>>()?;
@@ -70,7 +70,7 @@ impl Windows {
     }
 }
 
-/// Root mean square of each residual on the cells that all have, m; NaN for one that there is not.
+/// Root mean square of each residual on the cells common to all, m; NaN for a missing residual.
 fn common_rms_m(residuals: &[Option<Vec<f64>>]) -> Vec<f64> {
     let all: Vec<&Vec<f64>> = residuals.iter().flatten().collect();
     let cells = all.first().map_or(0, |first| first.len());
@@ -91,20 +91,20 @@ fn at_window(case: &Case, estimate: &Estimate, rms_m: f64) -> AtWindow {
 
 impl AtWindow {
     fn of(case: &Case, estimate: Estimate, rms_m: f64) -> Self {
-        let is_range_told = is_range_told(case, &estimate);
-        Self { outer_scale_m: case.settings.outer_scale_m(), estimate, is_range_told, rms_m }
+        let is_range_identified = is_range_identified(case, &estimate);
+        Self { outer_scale_m: case.settings.outer_scale_m(), estimate, is_range_identified, rms_m }
     }
 }
 
-/// Figures that are true at their scale where the surface has none of its own.
+/// Numbers that hold at a stated scale, for a surface without a characteristic scale.
 pub struct ScaleExplicit {
-    /// Outer scales, m, ascending, and the root mean square height of what is below each, m.
+    /// Outer scales, m, ascending, and the band RMS below each, m.
     pub bands: Vec<[f64; 2]>,
     /// The self-affine surface with the same covariance: structure function and Hurst exponent.
     pub self_affine: Option<Estimate>,
 }
 
-/// What is to be said of a surface whose fits at several windows disagree; `estimates` are the fits of this window.
+/// Describes a surface whose fits at several windows disagree; `estimates` are the fits at this window.
 pub fn scale_explicit(estimator: &Estimator, estimates: &[Estimate], windows: &Windows) -> ScaleExplicit {
     let all = windows.others.iter().chain([&windows.own]);
     let mut bands: Vec<[f64; 2]> = all.map(|w| [w.outer_scale_m, w.rms_m]).collect();
@@ -118,15 +118,15 @@ pub fn scale_explicit(estimator: &Estimator, estimates: &[Estimate], windows: &W
     ScaleExplicit { bands, self_affine: known.or_else(fitted) }
 }
 
-/// How far apart fits at neighbouring windows are, in standard errors: the largest over sigma and b (or the shape), and over
-/// sigma^2 / b, which the data tells where it does not tell the two (they are left out where a search for b ended at its
-/// upper bound). The errors are those of a model that is right: of a wrong one parameters move with the window, and that is
-/// what is to be told.
+/// Largest disagreement between fits at neighbouring windows, in standard errors: over sigma, b (or the shape) and sigma^2 / b.
+/// sigma^2 / b is identified even where sigma and b are not (those two are skipped if a search for b ended at its upper bound).
+/// The standard errors assume that the model is right: the parameters of a wrong model move with the window, which is what
+/// this test detects.
 pub fn window_disagreement(windows: &Windows) -> Option<f64> {
     let Windows { own, others } = windows;
     let pairs = others.iter().flat_map(|other| {
-        let b_told = own.is_range_told && other.is_range_told;
-        compared(&own.estimate, b_told).into_iter().map(|weights| (&other.estimate, weights))
+        let b_identified = own.is_range_identified && other.is_range_identified;
+        compared(&own.estimate, b_identified).into_iter().map(|weights| (&other.estimate, weights))
     });
     let z = |(other, weights): (&Estimate, Vec<(usize, f64)>)| {
         let apart: f64 = weights.iter().map(|(k, w)| w * (own.estimate.at[*k] - other.at[*k])).sum();
@@ -136,11 +136,11 @@ pub fn window_disagreement(windows: &Windows) -> Option<f64> {
     pairs.filter_map(z).fold(None, |largest, v| Some(largest.map_or(v, |l: f64| l.max(v))))
 }
 
-/// Sums of weighted coordinates (logarithms of the parameters) that are compared.
-fn compared(estimate: &Estimate, b_told: bool) -> Vec<Vec<(usize, f64)>> {
+/// The weighted sums of coordinates (logarithms of the parameters) to compare.
+fn compared(estimate: &Estimate, b_identified: bool) -> Vec<Vec<(usize, f64)>> {
     let [sigma, range, shape] = [Role::Sigma(0), Role::Range(0), Role::Shape(0)].map(|role| estimate.coordinate(role));
-    let told = range.is_none() || b_told;
-    let alone = [sigma.filter(|_| told), range.filter(|_| told), shape];
+    let identified = range.is_none() || b_identified;
+    let alone = [sigma.filter(|_| identified), range.filter(|_| identified), shape];
     let mut all: Vec<Vec<(usize, f64)>> = alone.into_iter().flatten().map(|k| vec![(k, 1.0)]).collect();
     if estimate.covariance.structures.len() == 1 {
         all.extend(sigma.zip(range).map(|(sigma, range)| vec![(sigma, 2.0), (range, -1.0)]));
@@ -149,26 +149,26 @@ fn compared(estimate: &Estimate, b_told: bool) -> Vec<Vec<(usize, f64)>> {
 }
 
 /// False when the search for b ended at its upper bound.
-pub fn is_range_told(case: &Case, estimate: &Estimate) -> bool {
+pub fn is_range_identified(case: &Case, estimate: &Estimate) -> bool {
     let Some(k) = estimate.coordinate(Role::Range(0)) else { return true };
     let (_, end) = case.coordinates(&estimate.form).bounds()[k];
     estimate.at[k] <= end - 1e-3
 }
 
-/// True when windows disagree beyond what scatter explains.
+/// True if windows disagree by more than scatter explains.
 pub fn no_scale_separation(disagreement: Option<f64>) -> bool {
     disagreement.is_some_and(|z| z > WINDOWS_Z)
 }
 
-/// Is one direction longer than another? The rise of the likelihood from an isotropic fit to one with an axis, on bins by
-/// direction, over what misfit there is; chi-squared with two degrees of freedom for an isotropic surface.
+/// Test of isotropy: the rise of the likelihood from an isotropic to an anisotropic fit, on bins by direction, over the misfit
+/// per degree of freedom; chi-squared with two degrees of freedom for an isotropic surface.
 pub struct Isotropy {
     pub p: f64,
     pub ratio: f64,
     pub azimuth_deg: f64,
 }
 
-/// The verdict of an estimator on bins by direction.
+/// Tests isotropy with an estimator on bins by direction.
 pub fn isotropy(estimator: &Estimator, estimate: &Estimate) -> Option<Isotropy> {
     let (case, bins) = (estimator.case, estimator.bins);
     let (sigma_m, range_m) = (estimate.covariance.sigma_m(), estimate.covariance.range_m());
@@ -184,8 +184,8 @@ pub fn isotropy(estimator: &Estimator, estimate: &Estimate) -> Option<Isotropy> 
     Some(Isotropy { p: libm::exp(-0.5 * rise), ratio: covariance.ratio, azimuth_deg: covariance.azimuth_deg })
 }
 
-/// Do the blocks of the site have one variance? Largest over smallest block sigma, and the p-value of their scatter about
-/// the mean against what surfaces of the fitted model scatter (chi-squared).
+/// Test of stationarity: largest over smallest block sigma, and the p-value of the scatter of the block variances about their
+/// mean, against the scatter expected under the fitted model (chi-squared).
 pub struct Stationarity {
     pub p: f64,
     pub sigma_max_over_min: f64,
@@ -214,7 +214,7 @@ pub fn chi_squared_upper(chi2: f64, freedom: f64) -> f64 {
     1.0 - normal::cdf((libm::cbrt(chi2 / freedom) - (1.0 - spread)) / spread.sqrt())
 }
 
-/// p-value of the misfit: against the replicates where there are, else chi-squared.
+/// p-value of the misfit: against the replicates if there are enough, otherwise against chi-squared.
 pub fn misfit_p(estimate: &Estimate, replicates: Option<&Replicates>) -> Option<f64> {
     let ratio = estimate.misfit_ratio()?;
     let freedom = (estimate.likelihood.as_ref()?.bins.saturating_sub(estimate.at.len())) as f64;
@@ -224,8 +224,8 @@ pub fn misfit_p(estimate: &Estimate, replicates: Option<&Replicates>) -> Option<
     })
 }
 
-/// p-value of the residual's shape: its median size over the trimming threshold, against normal surfaces. `None` where they
-/// are too few to tell.
+/// p-value of the residual's distribution: its median absolute value over the trimming threshold, against that of normal
+/// surfaces. `None` with too few replicates.
 pub fn normality_p(case: &Case, replicates: &Replicates) -> Option<f64> {
     let enough = replicates.median_over_threshold.len() >= REPLICATES_MIN;
     enough.then(|| {
@@ -233,7 +233,7 @@ pub fn normality_p(case: &Case, replicates: &Replicates) -> Option<f64> {
     })
 }
 
-/// Every model tried, the best first, and as an estimator on rings sees it.
+/// Every model tried, the best first, with its expected covariance in the rings.
 pub fn candidates(estimates: &[Estimate], rings: &Estimator) -> Vec<Candidate> {
     let least = estimates.iter().filter_map(Estimate::aicc).fold(f64::INFINITY, f64::min);
     let mut all: Vec<Candidate> = estimates
@@ -252,7 +252,7 @@ pub fn candidates(estimates: &[Estimate], rings: &Estimator) -> Vec<Candidate> {
     all
 }
 
-/// A fit at another window as a diagnostic.
+/// A fit at another window, as a diagnostic.
 pub fn other_window(at: &AtWindow) -> OtherWindow {
     let parameters = at.estimate.covariance.parameters(&at.estimate.form);
     OtherWindow {

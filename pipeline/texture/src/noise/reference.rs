@@ -1,41 +1,41 @@
-//! Noise of a DEM, from a part of it that is smooth in reality (a road, a roof, still water under ice).
+//! Estimates the noise of a DEM from a part of it that is smooth in reality (a road, a roof, still water under ice).
 //!
 //! Second differences `z(-k) - 2 z(0) + z(k)` along rows and along columns remove height and slope. Their robust standard deviation
-//! (1.4826 times the median size: Hampel, 1974) is little affected by the edge of a kerb. Over k cells of side d noise with a white
-//! variance `w` and a correlated one `c` of range `r` has
+//! (1.4826 times the median absolute value: Hampel, 1974) is little affected by the edge of a kerb. Over k cells of side d, noise with
+//! white variance `w` and correlated variance `c` of range `r` has
 //!
 //! `V(k) = 6 w + c (6 - 8 exp(-(k d / r)^2) + 2 exp(-(2 k d / r)^2))`,
 //!
-//! so that V over separations from one cell to a quarter of the reference tells the two apart: weighted least squares, `w` and `c` not
-//! negative, `r` by search. Correlated noise is reported where it improves the fit of V by more than [`GAIN_MIN`]; of white noise
-//! alone fewer than 1 reference in 200 does. Relief of the reference that looks like such noise counts as noise. Where V still grows
-//! at the widest separation, or the formula misses it by a factor of [`MISS_MAX`], only white noise is reported, from the shortest
+//! so that V over separations from one cell to a quarter of the reference separates the two: weighted least squares, `w` and `c` not
+//! negative, `r` by search. Correlated noise is reported if it improves the fit of V by more than [`GAIN_MIN`]; with white noise
+//! alone this happens in fewer than 1 reference in 200. Relief of the reference that looks like such noise counts as noise. If V still
+//! grows at the widest separation, or the formula misses it by a factor of [`MISS_MAX`], only white noise is reported, from the shortest
 //! separation.
 
 use super::Noise;
 use crate::sizes::{NORMAL_CONSISTENCY, Sizes};
 use sastrugi_numeric::Grid;
 
-/// Fewest differences: their robust deviation is then good to about a sixth.
+/// Fewest differences; their robust standard deviation is then accurate to about a sixth.
 const DIFFERENCES_MIN: u64 = 100;
 /// Separations, cells.
 const SEPARATIONS: [usize; 10] = [1, 2, 3, 4, 6, 8, 12, 16, 24, 32];
-/// Separations are at most this share of the reference's runs of cells.
+/// Largest separation, as a share of the reference's rows or columns.
 const SEPARATION_SHARE: f64 = 0.25;
 /// Relative variance of V times the number of differences, for white noise: 2 for a variance, 2.7 for the median, 1.94 because
 /// neighbouring differences share cells.
 const VARIANCE_OF_ONE: f64 = 10.5;
-/// Gain in chi-squared from which on noise counts as correlated: p = 0.001 for two parameters. The largest of 510 simulated
+/// Gain in chi-squared from which noise counts as correlated: p = 0.001 for two parameters. The largest gain in 510 simulated
 /// references with white noise alone was 7.3.
 const GAIN_MIN: f64 = 13.8;
-/// Largest ratio of a variance and the fitted one. The largest of 240 simulated references, correlated over up to
+/// Largest ratio of observed to fitted variance, or the reverse. The largest in 240 simulated references, correlated over up to
 /// a quarter of their width, was 1.77.
 const MISS_MAX: f64 = 2.0;
-/// Second differences below this share of the largest height, m (of heights below 1 m: below this), are rounding.
+/// Second differences below this share of the largest height count as rounding (below this, in m, if no height exceeds 1 m).
 const ROUNDING: f64 = 1e-11;
 /// Ranges tried, in steps of 5 %.
 const RANGE_STEP: f64 = 1.05;
-/// Shortest range tried, cells: noise that is correlated over less is white.
+/// Shortest range tried, cells; noise with a shorter range is practically white.
 const RANGE_MIN_CELLS: f64 = 0.7;
 
 /// Noise found in a reference.
@@ -45,35 +45,50 @@ pub struct ReferenceNoise {
     pub noise: Noise,
     /// Second differences between neighbouring cells.
     pub differences: u64,
-    /// Longest separation looked at, m, where differences up to it are not those of white noise, nor of correlated noise of a range
-    /// that shows: relief, or noise correlated further than the reference is wide.
+    /// Longest separation used, m, if the differences up to it match neither white noise nor correlated noise of a resolvable range:
+    /// relief, or noise with a range beyond the width of the reference.
     pub unresolved_to_m: Option<f64>,
 }
 
-/// Why a reference gives no noise.
+/// Why no noise can be estimated from a reference.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
 pub enum NoiseError {
     /// Too small, or full of holes.
     #[error(
-        "the noise reference holds {found} runs of three neighbouring cells with data within the DEM (and its window); at least \
+        "the noise reference has {found} runs of three neighbouring cells with data within the DEM (and its window); at least \
          {DIFFERENCES_MIN} are needed: use a larger reference"
     )]
     TooSmall {
-        /// Runs that are there.
+        /// Runs found.
         found: u64,
     },
     /// More than half of it is exactly plane.
-    #[error("the noise reference is exactly plane: its heights were filled or rounded, so they hold no noise")]
+    #[error(
+        "the noise reference is exactly plane: its heights were interpolated or rounded, so they show no noise; use another one"
+    )]
     Plane,
 }
 
 /// Noise of the cells with data in `reference` (m; NaN outside it).
 ///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+/// use sastrugi_texture::noise::of_reference;
+///
+/// // A sloping road, measured with noise of 1 cm: slope and height do not count.
+/// let mut stream = Streams::for_seed(1, "example").stream("noise");
+/// let g = Geometry::square(60, 60, 0.5);
+/// let road = Grid::new(g, (0..g.len()).map(|k| 300.0 + 0.08 * g.x(k % 60) + 0.01 * stream.normal()).collect());
+/// let found = of_reference(&road).unwrap();
+/// assert_eq!(found.differences, 2 * 60 * 58);
+/// assert!((found.noise.white_sigma_m / 0.01 - 1.0).abs() < 0.2);
+/// ```
+///
 /// # Errors
 /// A reference that is too small, or exactly plane.
 pub fn of_reference(reference: &Grid) -> Result<ReferenceNoise, NoiseError> {
     let largest_m = reference.range().map_or(0.0, |(low, high)| low.abs().max(high.abs()));
-    let [along, across] = [0, 1].map(|axis| bends(reference, axis, 1));
+    let [along, across] = [0, 1].map(|axis| second_differences(reference, axis, 1));
     let differences = along.count() + across.count();
     if differences < DIFFERENCES_MIN {
         return Err(NoiseError::TooSmall { found: differences });
@@ -92,7 +107,7 @@ pub fn of_reference(reference: &Grid) -> Result<ReferenceNoise, NoiseError> {
     let Some(correlated) = correlated.filter(|s| white.chi2 - s.chi2 >= GAIN_MIN) else {
         return Ok(found(white.noise(), None));
     };
-    // V has levelled off by two ranges.
+    // V has levelled off after two ranges.
     if 2.0 * correlated.range_m <= longest_m && observed.iter().all(|o| correlated.describes(o)) {
         return Ok(found(correlated.noise(), None));
     }
@@ -106,7 +121,7 @@ struct Observed {
     cells: usize,
     separation_m: f64,
     variance_m2: f64,
-    /// Over its squared standard error, where noise is white.
+    /// Squared inverse of its relative standard error, for white noise.
     weight: f64,
 }
 
@@ -116,7 +131,7 @@ fn observed(reference: &Grid) -> Vec<Observed> {
     let mut all = Vec::new();
     for separation in SEPARATIONS {
         for axis in [0, 1] {
-            let sizes = bends(reference, axis, separation);
+            let sizes = second_differences(reference, axis, separation);
             let fits = separation == 1 || separation as f64 <= SEPARATION_SHARE * sides[axis] as f64;
             if fits && sizes.count() >= DIFFERENCES_MIN {
                 let deviation_m = NORMAL_CONSISTENCY * sizes.exceeded_by(0.5);
@@ -133,19 +148,19 @@ fn observed(reference: &Grid) -> Vec<Observed> {
 }
 
 /// Sizes of the second differences over `separation` cells along rows (axis 0) or columns (axis 1).
-fn bends(grid: &Grid, axis: usize, separation: usize) -> Sizes {
+fn second_differences(grid: &Grid, axis: usize, separation: usize) -> Sizes {
     let (rows, cols) = (grid.rows(), grid.cols());
     let [down, across] = if axis == 0 { [0, separation] } else { [separation, 0] };
     let mut sizes = Sizes::new();
     for r in down..rows.saturating_sub(down) {
         let [above, own, below] = [r - down, r, r + down].map(|r| grid.row(r));
-        let bend = |c: usize| above[c - across] - 2.0 * own[c] + below[c + across];
-        sizes.add(&(across..cols.saturating_sub(across)).map(bend).collect::<Vec<_>>());
+        let difference = |c: usize| above[c - across] - 2.0 * own[c] + below[c + across];
+        sizes.add(&(across..cols.saturating_sub(across)).map(difference).collect::<Vec<_>>());
     }
     sizes
 }
 
-/// Variances of white and correlated noise, m2, and how well they describe what was observed.
+/// Variances of white and correlated noise, m2, and their misfit.
 #[derive(Clone, Copy)]
 struct Solution {
     chi2: f64,
@@ -155,9 +170,10 @@ struct Solution {
 }
 
 impl Solution {
-    /// True where the fitted variance is near the observed one.
+    /// True if the fitted variance is near the observed one.
     fn describes(&self, o: &Observed) -> bool {
-        let fitted_m2 = 6.0 * self.white_m2 + self.correlated_m2 * correlated_bend(o.separation_m / self.range_m);
+        let fitted_m2 =
+            6.0 * self.white_m2 + self.correlated_m2 * correlated_second_difference(o.separation_m / self.range_m);
         (1.0 / MISS_MAX..=MISS_MAX).contains(&(o.variance_m2 / fitted_m2))
     }
 
@@ -170,10 +186,10 @@ impl Solution {
     }
 }
 
-/// The best variances that are not negative: of white noise alone, or beside correlated noise of a range. Errors are relative.
+/// The best non-negative variances: of white noise alone, or of white plus correlated noise of a given range. Errors are relative.
 fn least_squares(observed: &[Observed], range_m: Option<f64>) -> Solution {
     let seen = |o: &Observed| {
-        let correlated = range_m.map_or(0.0, |r| correlated_bend(o.separation_m / r));
+        let correlated = range_m.map_or(0.0, |r| correlated_second_difference(o.separation_m / r));
         [6.0 / o.variance_m2, correlated / o.variance_m2]
     };
     let (mut matrix, mut vector) = ([[0.0; 2]; 2], [0.0; 2]);
@@ -202,8 +218,8 @@ fn least_squares(observed: &[Observed], range_m: Option<f64>) -> Solution {
         .unwrap_or(Solution { chi2: f64::INFINITY, white_m2: 0.0, correlated_m2: 0.0, range_m: 0.0 })
 }
 
-/// Variance of a second difference of unit noise with a Gaussian correlation over so many ranges.
-fn correlated_bend(ranges: f64) -> f64 {
+/// Variance of a second difference of unit noise with a Gaussian correlation, over a separation in ranges.
+fn correlated_second_difference(ranges: f64) -> f64 {
     let at = |x: f64| libm::exp(-x * x);
     6.0 - 8.0 * at(ranges) + 2.0 * at(2.0 * ranges)
 }
@@ -218,9 +234,9 @@ mod tests {
 
     const CELL_M: f64 = 0.1;
 
-    /// A slope of 2 % with a noise on it; `shape` rows and columns.
+    /// A slope of 2 % with noise, of the given rows and columns.
     fn road(noise: Noise, [rows, cols]: [usize; 2], seed: u64) -> Grid {
-        // A simulator adds the noise of a measurement to a surface: here one of nothing.
+        // The simulator adds measurement noise to a surface, here a flat one.
         let model: &'static dyn crate::covariance::Model = &models::exponential::Exponential;
         let flat = Covariance {
             structures: vec![Structure { model, sigma_m: 1e-9, range_m: CELL_M, shape: 0.0 }],
@@ -241,7 +257,7 @@ mod tests {
     }
 
     /// White noise of 7 mm on a slope with a step (a kerb). Null: 2 * 200 * 198 differences, of which neighbours share cells;
-    /// the robust deviation of so many is good to about 0.6 %; limit 4 %, the kerb's share of the cells included.
+    /// their robust deviation is accurate to about 0.6 %; limit 4 %, including the effect of the kerb's cells.
     #[test]
     fn stat_noise_on_a_slope_is_found() {
         let mut grid = road(white(0.007), [200, 200], 3);
@@ -251,7 +267,7 @@ mod tests {
         assert!((found.noise.white_sigma_m / 0.007 - 1.0).abs() < 0.04, "{found:?}");
     }
 
-    /// White references are not taken for correlated ones. Null: at most 1 in 200 by chance; more than 4 of 200 have a
+    /// White noise is not reported as correlated. Null: at most 1 in 200 by chance; more than 4 of 200 have a
     /// probability of 0.004.
     #[test]
     fn stat_white_noise_is_white() {
@@ -260,10 +276,10 @@ mod tests {
         assert!(correlated.count() <= 4);
     }
 
-    /// Noise of matching beside white noise. In 20 references of 40 x 100 cells simulated independently sigma scattered by 5 % and
+    /// Matching noise plus white noise. In 20 references of 40 x 100 cells simulated independently sigma scattered by 5 % and
     /// the range by 8 % at 3 cells; 16 references: limits of four standard errors.
     #[test]
-    fn stat_correlated_noise_is_told_from_white_noise() {
+    fn stat_correlated_noise_is_separated_from_white_noise() {
         let truth = Noise { white_sigma_m: 0.01, correlated_sigma_m: 0.01, correlated_range_m: 0.3 };
         let found: Vec<Noise> =
             (0..16).map(|seed| of_reference(&road(truth, [40, 100], seed)).unwrap().noise).collect();
@@ -276,9 +292,9 @@ mod tests {
         assert!((range / 0.3 - 1.0).abs() < 0.08, "{range}");
     }
 
-    /// Relief that keeps growing, in one direction or in both, is not taken for noise.
+    /// Large-scale relief, in one direction or in both, does not count as correlated noise.
     #[test]
-    fn val_a_reference_that_bends_gives_white_noise_only() {
+    fn val_a_curved_reference_gives_white_noise_only() {
         bent([1.0, 0.0]);
         bent([0.0, 1.0]);
         bent([1.0, 1.0]);

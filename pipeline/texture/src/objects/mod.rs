@@ -1,21 +1,20 @@
-//! Cells that are no texture: trees, rocks, water, structures.
+//! Finds objects: cells that are not texture, such as trees, rocks, water and structures.
 //!
-//! They must be found before the moving average, which would smear them over a window, and against a background that
-//! they do not move. So detection and background alternate: the residual to the moving average of the cells still
+//! Objects must be found before the moving average, which would smear them over a window, and against a background that
+//! they do not affect. Detection and background therefore alternate: the residual from the moving average of the cells still
 //! trusted is compared with a robust scale (1.4826 times the median absolute residual, the standard deviation of
-//! normal data: Hampel, 1974); cells beyond [`SEED_SCALES`] are objects, and so are the cells joined to them through
-//! cells beyond [`GROWTH_SCALES`] (the skirt of a tree), with a margin of one cell. Every round judges all cells
-//! afresh, so that a cell pulled down by a tree nearby is taken back once the tree is out.
+//! normal data: Hampel, 1974). Cells beyond [`SEED_SCALES`] are objects, and so are the cells connected to them through
+//! cells beyond [`GROWTH_SCALES`] (the skirt of a tree), with a margin of one cell. Every round classifies all cells
+//! again, so that a cell whose residual a nearby tree had lowered becomes trusted again once the tree is removed.
 //!
-//! An object stands out from its own surroundings. The scale is that of the whole raster or, where it is larger, of the
-//! place: the median over nine blocks of a window each (`Scales`). Against the raster's scale alone the steep fifth of a bare
-//! site would be taken for objects, because the texture of slopes is larger than that of flats. An object of up to about two
-//! windows that stands alone fills less than half of the blocks and does not hide itself; a thicket does, and is better
-//! masked by hand.
+//! An object stands out from its own surroundings. The scale is that of the complete raster or, if larger, the local one:
+//! the median over nine blocks of one window each (`Scales`). Against the raster's scale alone the steep fifth of a bare
+//! site would count as objects, because the texture of slopes is larger than that of flats. An isolated object of up to about two
+//! windows fills less than half of the blocks and does not mask itself; a thicket does, and is better masked by hand.
 //!
-//! On normal data 6e-7 of the cells pass the first bound, so a surface without objects is left as it is.
+//! On normal data 6e-7 of the cells exceed the first bound, so a surface without objects is left unchanged.
 //!
-//! Cost: a moving average and a count per round, and medians about what stands out; rounds end when nothing changes, at most
+//! Cost: a moving average and a count per round, and medians around the cells that stand out; rounds end when nothing changes, at most
 //! `ROUNDS`.
 
 use crate::sizes::{NORMAL_CONSISTENCY, Sizes};
@@ -25,14 +24,14 @@ use std::ops::Range;
 
 /// Robust standard deviations beyond which a cell is an object by itself.
 pub const SEED_SCALES: f64 = 5.0;
-/// Robust standard deviations beyond which a neighbour of an object is one too.
+/// Robust standard deviations beyond which a neighbour of an object belongs to it.
 pub const GROWTH_SCALES: f64 = 2.5;
-/// Blocks of a window whose median says what the surroundings of a cell are like.
+/// Number of blocks, one window each, whose median gives the local scale of a cell.
 const BLOCKS: usize = 9;
 /// Most rounds of detection.
 const ROUNDS: usize = 12;
 
-/// True for the objects of the row-major `values` (rows of `cols`, NaN where no data) about the moving average over
+/// Marks the objects in row-major `values` (rows of `cols`, NaN where no data), relative to the moving average over
 /// `window`.
 pub fn find(values: &[f64], cols: usize, window: BoxWindow) -> Vec<bool> {
     let mut object = vec![false; values.len()];
@@ -46,29 +45,29 @@ pub fn find(values: &[f64], cols: usize, window: BoxWindow) -> Vec<bool> {
     object
 }
 
-/// Objects about the background of the cells not marked in `object`.
+/// Objects relative to the background of the cells not marked in `object`.
 fn judge(values: &[f64], object: &[bool], cols: usize, window: BoxWindow) -> Vec<bool> {
     let deviation = deviations(values, object, cols, window);
     let scales = Scales::of(&deviation, cols, window);
-    // Where nothing is left to judge by, a cell stays what it was.
+    // Where no trusted cell is left to compare with, an object stays one.
     let stays = |k: usize| object[k] && deviation[k].is_nan();
     let seeds = (0..deviation.len()).map(|k| scales.exceeded(k, SEED_SCALES) || stays(k)).collect();
     let grown = grow(seeds, cols, |k| scales.exceeded(k, GROWTH_SCALES));
     with_margin(&grown, values, cols)
 }
 
-/// Robust standard deviation of the deviations about each place: the median over [`BLOCKS`] blocks of their own, and no less
-/// than that of the whole raster. What cells beyond the latter do not ask for is not computed.
+/// Local robust standard deviation of the deviations: the median over [`BLOCKS`] blocks of each block's own, but at least that of
+/// the complete raster. Computed lazily, only for cells that exceed the latter.
 struct Scales<'a> {
     deviation: &'a [f64],
     cols: usize,
-    /// Rows and columns of a block; the last ones take the rest.
+    /// Rows and columns of a block; the last blocks take the remainder.
     side: [usize; 2],
     /// Blocks down and across the raster.
     blocks: [usize; 2],
-    /// Blocks down and across of which the median is taken.
+    /// Blocks down and across that enter the median.
     near: [usize; 2],
-    /// Robust standard deviation of the whole raster.
+    /// Robust standard deviation of the complete raster.
     raster: f64,
     /// Median deviation of each block, and scale of each.
     medians: Vec<OnceCell<f64>>,
@@ -80,7 +79,7 @@ impl<'a> Scales<'a> {
         let side = window.cells();
         let shape = [deviation.len() / cols, cols];
         let blocks = [0, 1].map(|k| (shape[k] / side[k]).max(1));
-        // A narrow raster has as many blocks along it.
+        // A narrow raster uses the same number of blocks along its length.
         let near_across = (BLOCKS / blocks[0].min(3)).min(blocks[1]);
         let near = [(BLOCKS / near_across).min(blocks[0]), near_across];
         let raster = NORMAL_CONSISTENCY * Sizes::of(deviation).exceeded_by(0.5);
@@ -88,7 +87,7 @@ impl<'a> Scales<'a> {
         Self { deviation, cols, side, blocks, near, raster, medians, scales }
     }
 
-    /// True for a cell that deviates by more than so many scales.
+    /// True if a cell deviates by more than `times` its scale.
     fn exceeded(&self, cell: usize, times: f64) -> bool {
         let deviation = self.deviation[cell];
         deviation > times * self.raster && deviation > times * self.scale(cell)
@@ -118,13 +117,13 @@ impl<'a> Scales<'a> {
     }
 }
 
-/// `near` blocks about block `at` of `end`, all within.
+/// Range of `near` blocks around block `at`, shifted to lie within `0..end`.
 fn around(at: usize, near: usize, end: usize) -> Range<usize> {
     let first = at.saturating_sub(near / 2).min(end - near);
     first..first + near
 }
 
-/// Median of what is a number (the upper one of an even count); NaN without any.
+/// Median of the values that are not NaN (the upper one of an even count); NaN without any.
 fn median(mut values: Vec<f64>) -> f64 {
     values.retain(|v| !v.is_nan());
     let middle = values.len() / 2;

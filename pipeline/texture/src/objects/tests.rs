@@ -15,10 +15,10 @@ fn val_a_surface_without_objects_is_left_alone() {
     assert_eq!(object.iter().filter(|&&o| o).count(), 0);
 }
 
-/// A cone 20 standard deviations high is taken out down to its skirt, and the hollow that it pulls into the moving
-/// average around it is not.
+/// A cone 20 standard deviations high is found down to its skirt, but not the cells around it, which lie below the moving
+/// average that it raises.
 #[test]
-fn val_a_tree_is_found_whole() {
+fn val_a_tree_is_found_completely() {
     let mut values = noise();
     let distance = |k: usize| (((k / COLS) as f64 - 100.0), ((k % COLS) as f64 - 90.0));
     let radius = |k: usize| {
@@ -41,10 +41,10 @@ fn val_no_data_and_constant_rasters() {
     assert_eq!(find(&[4.0; 9], 3, window), vec![false; 9]);
 }
 
-/// Slopes whose texture is ten times that of the flats about them (a third of the raster) hold no objects; a cone that stands
+/// Slopes (a third of the raster) whose texture is ten times that of the flats around them have no objects; a cone that stands
 /// out from its own surroundings is found on flats and slopes alike.
 #[test]
-fn val_rough_places_are_no_objects() {
+fn val_rough_places_are_not_objects() {
     let rough = |k: usize| if k % COLS < COLS / 3 { 10.0 } else { 1.0 };
     let mut values: Vec<f64> = noise().iter().enumerate().map(|(k, v)| rough(k) * v).collect();
     let window = BoxWindow { half: [8, 8] };
@@ -71,7 +71,7 @@ fn val_transects() {
     assert!(object.iter().filter(|&&o| o).count() < 12);
 }
 
-/// Scales asked for cell by cell are those of the definition: medians of all blocks, then of nine about each.
+/// Lazily computed scales match the definition: medians of all blocks, then of nine around each.
 #[test]
 fn val_scales_equal_the_definition() {
     let rough = |k: usize| if k % COLS < COLS / 3 { 10.0 } else { 1.0 };

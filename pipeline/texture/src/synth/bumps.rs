@@ -1,24 +1,24 @@
-//! Sums of Gaussian bumps at random places of a torus: what [`super::gaussians`] and [`super::quasi_wavelets`] share.
+//! Sums of Gaussian bumps at random places on a torus, shared by [`super::gaussians`] and [`super::quasi_wavelets`].
 //!
 //! `z(r) = sum over i of A h_i exp(-|r - e_i|^2 / a^2)`, `h_i = +-1`, the centres `e_i` uniform on the torus (Vecherin et al.
-//! 2022, Eq. 1). Across the long axis distances are stretched, so that a bump is an ellipse with half axes a along and
-//! `a_across`. With n bumps per area the field has mean 0 and the covariance
+//! 2022, Eq. 1). Across the long axis distances are stretched, so that a bump is an ellipse with half axes `a` along and
+//! `a_across` across it. With n bumps per area the field has mean 0 and the covariance
 //!
 //! `C(h) = n A^2 (pi / 2) a a_across * sum over the torus' periods p of exp(-|h + p|^2 / (2 a^2))`
 //!
-//! whatever the kind of place (Campbell 1909): A follows from the variance that is wanted, and C is exact on average. The
-//! field is nearly normal: excess kurtosis `1 / (pi n a a_across)`.
+//! (Campbell 1909). A follows from the target variance, and C is exact on average. The field is nearly normal: excess kurtosis
+//! `1 / (pi n a a_across)`.
 //!
-//! Cost: every bump adds to the cells within 4.5 half axes. Rows are summed in bands, each over all bumps in their order,
-//! so that bits do not depend on threads. Memory: 32 bytes per bump of one class.
+//! Cost: every bump adds to the cells within 4.5 half axes. Rows are summed in bands, each over all bumps in order,
+//! so that the result does not depend on the number of threads. Memory: 32 bytes per bump of one class.
 
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Streams};
 use std::f64::consts::PI;
 
-/// A bump ends where it has fallen to 2e-9.
+/// Radius of a bump in half axes, where it has fallen to 2e-9.
 const CUT: f64 = 4.5;
-/// Periods that are this many half axes away add nothing to the covariance.
+/// Periods further away than this many half axes do not contribute to the covariance.
 const COVARIANCE_CUT: f64 = 8.0;
 /// Rows that are summed together.
 const BAND: usize = 32;
@@ -36,7 +36,7 @@ pub struct Class {
     pub variance_m2: f64,
 }
 
-/// A torus with the direction of the long axis of all bumps on it.
+/// A torus, with the direction of the long axis of all bumps on it.
 #[derive(Clone, Copy)]
 pub struct Torus {
     geometry: Geometry,
@@ -62,14 +62,14 @@ impl Torus {
         Self { geometry, sin, cos }
     }
 
-    /// Squared distance of `[x, y]` in half axes of a class.
+    /// Squared length of `[x, y]` in half axes of a class.
     fn square(&self, class: &Class, [x, y]: [f64; 2]) -> f64 {
         let (along, across) = (x * self.sin + y * self.cos, x * self.cos - y * self.sin);
         let (s, t) = (along / class.along_m, across / class.across_m);
         s * s + t * t
     }
 
-    /// Half width and half height of a bump's bounding box, in half axes, m.
+    /// Half width and half height of the bounding box of a bump's ellipse, m.
     fn extent_m(&self, class: &Class) -> [f64; 2] {
         let long =
             |a: f64, b: f64| (a * a * class.along_m * class.along_m + b * b * class.across_m * class.across_m).sqrt();
@@ -81,7 +81,7 @@ impl Torus {
         class.along_m == class.across_m || self.sin * self.cos == 0.0
     }
 
-    /// Correlation of the sum of a class' bumps at a lag east and north.
+    /// Correlation of the sum of a class's bumps at a lag east and north.
     pub fn correlation(&self, class: &Class, lag_m: [f64; 2]) -> f64 {
         self.periodic(class, lag_m) / self.periodic(class, [0.0; 2])
     }
@@ -110,7 +110,7 @@ impl Torus {
 
     /// Operations to sum the bumps of a class.
     pub fn operations(&self, class: &Class) -> f64 {
-        /// A multiplication and an addition; an exponential.
+        /// Operations of a multiplication and an addition, and of an exponential.
         const PRODUCT: f64 = 2.0;
         const EXPONENTIAL: f64 = 30.0;
         let [x, y] = self.extent_m(class);
@@ -142,7 +142,7 @@ impl Torus {
         });
     }
 
-    /// Adds one bump to the rows from `first` on.
+    /// Adds one bump to the rows starting at `first`.
     fn add_to_band(&self, class: &Class, bump: &Bump, first: usize, lines: &mut [f64]) {
         let Geometry { rows, cols, cell: [dx, dy], .. } = self.geometry;
         let extent = self.extent_m(class);

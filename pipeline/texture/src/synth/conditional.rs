@@ -1,21 +1,21 @@
-//! Conditional simulation: the holes of a measured surface filled with texture that fits what is around them.
+//! Conditional simulation: fills the holes of a measured surface with texture that matches their surroundings.
 //!
-//! `z = z_u + K[z_m - z_u]`, z_m the measured heights, z_u an unconditional normal field with the fitted covariance, K their
-//! kriging from cells around the hole. What is made has the covariance on average, also between filled and measured cells,
-//! and measured cells keep their heights to the bit.
+//! `z = z_u + K[z_m - z_u]`, z_m the measured heights, z_u an unconditional normal field with the fitted covariance, K the
+//! kriging estimate from cells around the hole. The result has the covariance on average, also between filled and measured cells,
+//! and measured cells keep their heights exactly.
 //!
-//! K is kriging with a plane as drift, because the fitted covariance is that of the texture and the background beneath
-//! it is not known: weights w with `sum of w_j C(h_ij) + drift = C(h_i0)`, `sum of w_j f(x_j) = f(x_0)` for `f = 1, x, y`. A
-//! hole that is open to one side has the mean alone as drift: planes run away there. Cells with data in fewer than
-//! nine directions lie outside of what was measured rather than in a hole of it, and stay without data. The cells that are used lie in
-//! 16 directions from the one that is filled, the first three with data in each: those farther away are screened.
+//! K is kriging with a planar drift, because the fitted covariance describes the texture and the background beneath
+//! it is unknown: weights w with `sum of w_j C(h_ij) + drift = C(h_i0)`, `sum of w_j f(x_j) = f(x_0)` for `f = 1, x, y`. For a
+//! hole that is open to one side the drift is only the mean, since a plane would extrapolate too far. Cells with data in fewer than
+//! nine directions lie outside the measured area rather than in a hole in it, and stay no data. Kriging uses cells in
+//! 16 directions from the cell to fill, the first three with data in each; cells farther away are screened by these.
 //!
 //! Source: Journel and Huijbregts 1978, Mining Geostatistics, section VII.A; Chiles and Delfiner 2012, Geostatistics, sections
-//! 3.4 and 7.3. A self-affine covariance is made as its stationary twin over the DEM's longer side, or over as much of it as a
-//! torus of 2^24 cells has room for.
+//! 3.4 and 7.3. A self-affine covariance is replaced by its stationary counterpart with a range of the DEM's longer side, or as long as
+//! a torus of 2^24 cells allows.
 //!
-//! Cost, for each filled cell: one system of at most 51 equations, and steps along the rays. Memory: a torus that is the DEM
-//! and the reach of the covariance wide, 18 bytes a cell.
+//! Cost, for each filled cell: one system of at most 51 equations, and steps along the rays. Memory: a torus as wide as the DEM
+//! plus the reach of the covariance, 18 bytes per cell.
 
 use super::fft_ma::{self, FftMaParameters, Phase};
 use super::tile::{Cell, TileParameters};
@@ -26,7 +26,7 @@ use sastrugi_numeric::fft::smooth_length;
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::ParameterError;
 
-/// Directions in which measured cells are looked for, cells south and east.
+/// Directions in which measured cells are searched, cells south and east.
 const RAYS: [[isize; 2]; 16] = [
     [0, 1],
     [1, 2],
@@ -47,15 +47,15 @@ const RAYS: [[isize; 2]; 16] = [
 ];
 /// Measured cells used in each direction.
 const PER_RAY: usize = 3;
-/// Directions that must hold data for a plane as drift.
+/// Directions that must have data for a planar drift.
 const SURROUNDED: usize = 13;
-/// Directions that must hold data for a cell to be filled.
+/// Directions that must have data for a cell to be filled.
 const ENCLOSED: usize = 9;
-/// Most cells of the torus of a self-affine covariance's twin.
-const TWIN_CELLS: f64 = (1u32 << 24) as f64;
-/// Fewest cells of its range.
+/// Most cells of the torus for the stationary counterpart of a self-affine covariance.
+const STATIONARY_CELLS: f64 = (1u32 << 24) as f64;
+/// Shortest range of that counterpart, cells.
 const OUTER_CELLS_MIN: f64 = 32.0;
-/// Share of the variance that two cells are taken to differ by at least, so that smooth covariances can be solved.
+/// Share of the variance added on the diagonal, so that the equations of smooth covariances are solvable.
 const JITTER: f64 = 1e-9;
 
 /// A filled surface.
@@ -65,20 +65,20 @@ pub struct Filled {
     pub grid: Grid,
     /// Cells that were filled.
     pub cells: usize,
-    /// Cells that stay without data: there is none around them.
+    /// Cells that stay no data because there is none around them.
     pub left: usize,
-    /// Range of the stationary surface that stood in for a self-affine one, m.
+    /// Range of the stationary covariance that replaced a self-affine one, m.
     pub twin_range_m: Option<f64>,
 }
 
 impl std::fmt::Display for Filled {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} cells without data were filled", self.cells)?;
+        write!(f, "{} no-data cells were filled", self.cells)?;
         if self.left > 0 {
-            write!(f, "; {} stay without: there is no data around them", self.left)?;
+            write!(f, "; {} were left because they are not enclosed by data", self.left)?;
         }
         if let Some(range_m) = self.twin_range_m {
-            write!(f, "; the self-affine fit was made as a Matern one of range {range_m} m")?;
+            write!(f, "; the self-affine covariance was replaced by a Matern one of range {range_m} m")?;
         }
         Ok(())
     }
@@ -87,10 +87,10 @@ impl std::fmt::Display for Filled {
 /// Why a surface cannot be filled.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum FillError {
-    /// Nothing to go by.
-    #[error("the DEM holds no data")]
+    /// No cell has data.
+    #[error("the DEM has no data")]
     NoData,
-    /// The unconditional field cannot be made.
+    /// The unconditional field cannot be synthesised.
     #[error("{0}")]
     Field(String),
 }
@@ -101,17 +101,35 @@ impl From<ParameterError> for FillError {
     }
 }
 
-/// The surface with the cells of its holes (NaN, data around) filled.
+/// Fills the holes of a surface: cells that are NaN and enclosed by data.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+/// use sastrugi_texture::covariance::{Covariance, model};
+/// use sastrugi_texture::synth::conditional::fill;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let mut dem = Grid::filled(Geometry::square(20, 20, 0.1), 100.0);
+/// [189, 190, 209, 210].into_iter().for_each(|k| dem.values[k] = f64::NAN);
+/// let covariance = Covariance::new(model("exponential")?, 0.02, 0.3)?;
+/// let filled = fill(&dem, &covariance, &Streams::for_seed(1, "example"))?;
+/// assert_eq!((filled.cells, filled.left, filled.grid.finite_count()), (4, 0, 400));
+/// // Measured cells keep their heights; the filled ones are rough, and not far from their surroundings.
+/// assert_eq!(filled.grid.values[0], 100.0);
+/// assert!(filled.grid.values[189] != 100.0 && (filled.grid.values[189] - 100.0).abs() < 0.2);
+/// # Ok(())
+/// # }
+/// ```
 ///
 /// # Errors
-/// A surface without data; one too large for an unconditional field.
+/// A surface without data, or one too large for an unconditional field.
 pub fn fill(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Filled, FillError> {
     if dem.finite_count() == 0 {
         return Err(FillError::NoData);
     }
-    let twin = stationary(dem, covariance);
-    let twin_range_m = (!covariance.is_stationary()).then(|| twin.range_m());
-    let covariance = twin;
+    let surrogate = stationary(dem, covariance);
+    let twin_range_m = (!covariance.is_stationary()).then(|| surrogate.range_m());
+    let covariance = surrogate;
     let unconditional = unconditional(dem, &covariance, streams)?;
     let holes: Vec<usize> = (0..dem.values.len()).filter(|k| !dem.values[*k].is_finite()).collect();
     let fill_one = |k: &usize| estimate(dem, &unconditional, &covariance, [k / dem.cols(), k % dem.cols()]);
@@ -122,26 +140,26 @@ pub fn fill(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Fi
     Ok(Filled { grid, cells: holes.len() - left, left, twin_range_m })
 }
 
-/// The covariance, or its twin with the longest range whose torus is not too large.
+/// The covariance, or its stationary counterpart with the longest range whose torus is not too large.
 fn stationary(dem: &Grid, covariance: &Covariance) -> Covariance {
     let [width_m, height_m] = dem.geometry.size();
     let [dx, dy] = dem.geometry.cell;
-    // A DEM of its own size again each way is always room.
-    let room = TWIN_CELLS.max(4.0 * dem.values.len() as f64);
-    let has_room = |twin: &Covariance| {
-        let [across, down] = torus_px(dem, twin);
+    // Twice the DEM's width and height is always allowed.
+    let room = STATIONARY_CELLS.max(4.0 * dem.values.len() as f64);
+    let has_room = |surrogate: &Covariance| {
+        let [across, down] = torus_px(dem, surrogate);
         f64::from(across) * f64::from(down) <= room
     };
     let mut outer_m = width_m.max(height_m);
-    let mut twin = covariance.stationary(outer_m);
-    while !has_room(&twin) && outer_m > OUTER_CELLS_MIN * dx.max(dy) {
+    let mut surrogate = covariance.stationary(outer_m);
+    while !has_room(&surrogate) && outer_m > OUTER_CELLS_MIN * dx.max(dy) {
         outer_m *= 0.5;
-        twin = covariance.stationary(outer_m);
+        surrogate = covariance.stationary(outer_m);
     }
-    twin
+    surrogate
 }
 
-/// A normal field with the covariance on the cells of the DEM, from a torus so wide that its edges do not know each other.
+/// A normal field with the covariance on the cells of the DEM, from a torus so wide that the DEM's opposite edges are uncorrelated.
 fn unconditional(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Grid, FillError> {
     let g = dem.geometry;
     let parameters = TileParameters {
@@ -155,7 +173,7 @@ fn unconditional(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Resu
     Ok(Grid { geometry: g, ..made.grid.window(0, 0, g.rows, g.cols) })
 }
 
-/// Columns and rows of a torus whose edges do not know each other across the DEM.
+/// Columns and rows of a torus on which opposite edges of the DEM are uncorrelated.
 fn torus_px(dem: &Grid, covariance: &Covariance) -> [u32; 2] {
     let (g, torus_m) = (dem.geometry, reach::torus_m(covariance));
     [(g.cols, 0), (g.rows, 1)].map(|(n, axis)| {
@@ -164,7 +182,7 @@ fn torus_px(dem: &Grid, covariance: &Covariance) -> [u32; 2] {
     })
 }
 
-/// Measured cells around a hole's cell, and in how many directions there are any.
+/// Measured cells around a cell of a hole, and the number of directions that have any.
 fn neighbours(dem: &Grid, [row, col]: [usize; 2]) -> (Vec<[usize; 2]>, usize) {
     let mut cells: Vec<[usize; 2]> = Vec::with_capacity(RAYS.len() * PER_RAY);
     let mut hit = 0;
@@ -182,7 +200,7 @@ fn neighbours(dem: &Grid, [row, col]: [usize; 2]) -> (Vec<[usize; 2]>, usize) {
     (cells, hit)
 }
 
-/// Height of one cell of a hole; NaN outside of what was measured.
+/// Height of one cell of a hole; NaN outside the measured area.
 fn estimate(dem: &Grid, unconditional: &Grid, covariance: &Covariance, at: [usize; 2]) -> f64 {
     let (cells, hit) = neighbours(dem, at);
     let [dx, dy] = dem.geometry.cell;
@@ -193,7 +211,7 @@ fn estimate(dem: &Grid, unconditional: &Grid, covariance: &Covariance, at: [usiz
     let n = cells.len();
     let drift = if hit >= SURROUNDED && n >= 8 { 3 } else { 1 };
     let lag = |a: [usize; 2], b: [usize; 2]| [(b[1] as f64 - a[1] as f64) * dx, (a[0] as f64 - b[0] as f64) * dy];
-    // Places in units of the farthest neighbour, so that the drift's numbers are like the covariances'.
+    // Positions in units of the farthest neighbour's, so that the drift's coefficients have the size of the covariances.
     let far = cells.iter().map(|c| lag(at, *c)).fold(0.0, |m: f64, [x, y]| m.max(x.abs()).max(y.abs()));
     let variance_m2 = covariance.at_distance(0.0);
     let size = n + drift;
@@ -212,14 +230,14 @@ fn estimate(dem: &Grid, unconditional: &Grid, covariance: &Covariance, at: [usiz
         }
         matrix[i * width + size] = covariance.at(lag(at, *a)) / variance_m2;
     }
-    // The drift's functions at the cell itself: 1, 0, 0.
+    // The drift functions at the cell itself: 1, 0, 0.
     matrix[n * width + size] = 1.0;
     let weights = solve(&mut matrix, size);
     let difference = |[r, c]: &[usize; 2]| dem.at(*r, *c) - unconditional.at(*r, *c);
     here + cells.iter().zip(&weights).map(|(cell, w)| w * difference(cell)).sum::<f64>()
 }
 
-/// Solves a system with its right side as the last column, by elimination with row pivoting.
+/// Solves a system whose right-hand side is the last column, by elimination with row pivoting.
 fn solve(matrix: &mut [f64], size: usize) -> Vec<f64> {
     let width = size + 1;
     for k in 0..size {
@@ -271,9 +289,9 @@ mod tests {
         holed
     }
 
-    /// Measured cells keep their bits, every hole is filled, a tilt of the whole passes through: the plane is the drift.
+    /// Measured cells keep their exact heights, every hole is filled, and a tilt of the complete surface is preserved by the drift.
     #[test]
-    fn val_measured_cells_stay_and_planes_pass() {
+    fn val_measured_cells_and_planes_are_preserved() {
         let truth = surface(1);
         let fill = |dem: &Grid| fill(dem, &exponential(), &Streams::for_seed(2, "texture")).unwrap();
         let filled = fill(&with_hole(&truth));
@@ -289,22 +307,64 @@ mod tests {
         assert!(off < 1e-6, "{off}");
     }
 
-    /// A self-affine surface of a size whose own twin would need a torus of 30 sides.
+    /// Kriging by hand, without an unconditional field. A hole of one cell in the middle of level ground gets its height, and of a plane the
+    /// plane's; where the ground is 1 on the west and 0 on the east the drift and the symmetry of both sides give 1/2.
+    #[test]
+    fn val_single_cells_by_symmetry() {
+        let g = Geometry { rows: 9, cols: 9, cell: [0.1, 0.2], origin: [0.0; 2] };
+        let blank = Grid::filled(g, 0.0);
+        let of = |height: &dyn Fn(usize, usize) -> f64| {
+            let mut dem = Grid::new(g, (0..81).map(|k| height(k / 9, k % 9)).collect());
+            dem.values[40] = f64::NAN;
+            estimate(&dem, &blank, &exponential(), [4, 4])
+        };
+        assert!((of(&|_, _| 7.0) - 7.0).abs() < 1e-9);
+        assert!((of(&|r, c| 1.0 + 0.5 * r as f64 - 2.0 * c as f64) - (1.0 + 2.0 - 8.0)).abs() < 1e-7);
+        let step = |side: usize| if side < 4 { 1.0 } else { 0.0 };
+        let middle = |side: usize| if side == 4 { 0.5 } else { step(side) };
+        assert!((of(&|_, c| middle(c)) - 0.5).abs() < 1e-9 && (of(&|r, _| middle(r)) - 0.5).abs() < 1e-9);
+        // What the unconditional field has at the hole, beyond what it has around it, is added.
+        let mut bump = blank.clone();
+        bump.values[40] = 0.25;
+        let level = {
+            let mut dem = Grid::filled(g, 3.0);
+            dem.values[40] = f64::NAN;
+            dem
+        };
+        assert!((estimate(&level, &bump, &exponential(), [4, 4]) - 3.25).abs() < 1e-9);
+        // In a corner data is in fewer than nine directions.
+        let mut corner = Grid::filled(g, 3.0);
+        corner.values[0] = f64::NAN;
+        assert!(estimate(&corner, &blank, &exponential(), [0, 0]).is_nan());
+    }
+
+    /// Elimination by hand, with a zero on the diagonal, so that rows must be swapped: 2 y = 4, x + y = 5.
+    #[test]
+    fn val_solve_by_hand() {
+        assert_eq!(solve(&mut [0.0, 2.0, 4.0, 1.0, 1.0, 5.0], 2), [3.0, 2.0]);
+    }
+
+    /// A self-affine surface whose stationary counterpart at full range would need a torus 30 times as wide.
     #[test]
     fn val_self_affine_surfaces_are_filled() {
         let parameters = [("increment_1m_m".to_owned(), 0.1), ("hurst".to_owned(), 0.6)].into();
         let covariance = crate::covariance::Form::parse("self_affine").unwrap().covariance(&parameters).unwrap();
         let geometry = Geometry::square(300, 300, 0.1);
-        let twin = stationary(&Grid::filled(geometry, 0.0), &covariance);
-        assert!(twin.is_stationary() && twin.range_m() < 30.0 && twin.range_m() >= 1.6, "{}", twin.range_m());
-        let mut holed = unconditional(&Grid::filled(geometry, 0.0), &twin, &Streams::for_seed(1, "truth")).unwrap();
+        let surrogate = stationary(&Grid::filled(geometry, 0.0), &covariance);
+        assert!(
+            surrogate.is_stationary() && surrogate.range_m() < 30.0 && surrogate.range_m() >= 1.6,
+            "{}",
+            surrogate.range_m()
+        );
+        let mut holed =
+            unconditional(&Grid::filled(geometry, 0.0), &surrogate, &Streams::for_seed(1, "truth")).unwrap();
         (100..110).flat_map(|r| (90..104).map(move |c| r * 300 + c)).for_each(|k| holed.values[k] = f64::NAN);
         assert_eq!(fill(&holed, &covariance, &Streams::for_seed(2, "texture")).unwrap().cells, 140);
     }
 
     /// Steps of one cell, inside the hole and across its edge, have the covariance's mean square `2 (C(0) - C(1))`. Null:
-    /// they do; 40 surfaces, some 28 independent steps of each: standard error of a mean square `sqrt(2 / 1100)` = 4 %;
-    /// threshold 25 % (6 standard errors, below 1e-8). Kriging alone, which smooths, falls far below.
+    /// they do; 40 surfaces with some 28 independent steps each: standard error of a mean square `sqrt(2 / 1100)` = 4 %;
+    /// threshold 25 % (6 standard errors, below 1e-8). Kriging alone smooths and would fall far below.
     #[test]
     fn stat_filled_cells_are_as_rough_as_measured_ones() {
         let covariance = exponential();
@@ -328,7 +388,7 @@ mod tests {
     #[test]
     fn val_open_holes_and_empty_surfaces() {
         let mut dem = surface(3);
-        // A bay that is open to the west has data in nine directions near its east end; what lies south does not count.
+        // A bay that is open to the west has data in nine directions near its east end; the southern rows are not enclosed.
         (10..14).flat_map(|r| (0..20).map(move |c| r * 40 + c)).for_each(|k| dem.values[k] = f64::NAN);
         (30..40).flat_map(|r| (0..40).map(move |c| r * 40 + c)).for_each(|k| dem.values[k] = f64::NAN);
         let streams = Streams::for_seed(1, "texture");

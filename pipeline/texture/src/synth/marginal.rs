@@ -1,29 +1,29 @@
-//! A given height distribution for a normal field.
+//! Transforms a normal field to a given height distribution.
 //!
-//! `y = Q(Phi(z / s))`, z normal with standard deviation s, Phi the normal distribution function, Q the quantile function:
-//! straight lines between heights at equally spaced probabilities. The heights then follow Q, but their covariance is bent:
+//! `y = Q(Phi(z / s))`, z normal with standard deviation s, Phi the normal distribution function, Q the quantile function,
+//! linear between heights at equally spaced probabilities. The heights then follow Q, but their covariance changes:
 //! in normalised Hermite polynomials `h_k`, with `c_k = E[Q(Phi(X)) h_k(X)]`, it is
 //!
 //! `C_y(rho) = sum over k >= 1 of c_k^2 rho^k`, rho the correlation of z
 //!
-//! (Mehler 1866). `C_y(1)` is the variance of Q, and `c_1^2 <= C_y(1)`: far cells lose correlation whatever Q is.
+//! (Mehler 1866). `C_y(1)` is the variance of Q, and `c_1^2 <= C_y(1)`: the correlation of distant cells decreases for any Q.
 //!
-//! Cost: one distribution function per cell; 200 coefficients from 8000 points once.
+//! Cost: one distribution function per cell; once, 200 coefficients from 8000 points.
 
 use sastrugi_numeric::sums;
 use sastrugi_schemas::ParameterError;
 use sastrugi_statistics::normal;
 
-/// Coefficients beside that of the mean; what they leave of the variance belongs to correlations near 1.
+/// Number of coefficients without that of the mean; the variance they miss matters only for correlations near 1.
 const TERMS: usize = 200;
 /// Points of the quadrature over +-`BOUND` standard deviations.
 const POINTS: usize = 8000;
 const BOUND: f64 = 8.0;
 
-/// Quantiles that are kept of a measured surface.
+/// Number of quantiles stored for a measured surface.
 const QUANTILES: usize = 101;
 
-/// Heights at 101 equally spaced probabilities from 0 to 1, m; none where there are no heights (NaN).
+/// Heights at 101 equally spaced probabilities from 0 to 1, m, without NaN; empty if there are no heights.
 pub fn quantiles_m(heights_m: &[f64]) -> Vec<f64> {
     let mut heights = sums::finite(heights_m);
     heights.sort_by(f64::total_cmp);
@@ -45,23 +45,23 @@ impl Marginal {
     /// The distribution with these heights at equally spaced probabilities from 0 to 1.
     ///
     /// # Errors
-    /// Fewer than two heights; heights that are not finite, not ascending, or all the same.
+    /// Fewer than two heights; heights that are not finite, not ascending, or all equal.
     pub fn new(quantiles_m: &[f64]) -> Result<Self, ParameterError> {
         let refuse = |message: &str| Err(ParameterError::new("marginal_m", message));
         if quantiles_m.len() < 2 || quantiles_m.iter().any(|q| !q.is_finite()) {
-            return refuse("holds fewer than two heights or one that is not finite");
+            return refuse("must have at least two heights, all of them finite");
         }
         if quantiles_m.windows(2).any(|pair| pair[0] > pair[1]) {
-            return refuse("is not in ascending order");
+            return refuse("must be in ascending order");
         }
         if quantiles_m[0] == quantiles_m[quantiles_m.len() - 1] {
-            return refuse("holds one height only; the texture would be flat");
+            return refuse("has only one distinct height; the texture would be flat");
         }
         let (mean_m, squares, variance_m2) = coefficients(quantiles_m);
         Ok(Self { quantiles_m: quantiles_m.to_vec(), mean_m, squares, variance_m2 })
     }
 
-    /// The distribution of that shape with mean 0 and another variance.
+    /// The distribution of the same shape with mean 0 and the given variance.
     ///
     /// # Errors
     /// As [`Self::new`].
@@ -71,12 +71,12 @@ impl Marginal {
         Self::new(&quantiles_m.iter().map(|q| (q - own.mean_m) * scale).collect::<Vec<_>>())
     }
 
-    /// The height that stands for `score` standard deviations.
+    /// The height that corresponds to `score` standard deviations of the normal field.
     pub fn height_m(&self, score: f64) -> f64 {
         sums::quantile_sorted(&self.quantiles_m, normal::cdf(score))
     }
 
-    /// Covariance of the heights where the normal field's correlation is `rho`, m2.
+    /// Covariance of the heights for a correlation `rho` of the normal field, m2.
     pub fn covariance_m2(&self, rho: f64) -> f64 {
         if rho >= 1.0 {
             return self.variance_m2;
@@ -125,9 +125,9 @@ mod tests {
         assert!((m.height_m(0.0)).abs() < 1e-15 && (m.height_m(9.0) - 1.0).abs() < 1e-12);
     }
 
-    /// A fine table of the normal distribution itself changes next to nothing.
+    /// A fine table of the normal distribution itself changes almost nothing.
     #[test]
-    fn val_a_normal_table_bends_nothing() {
+    fn val_a_normal_table_changes_nothing() {
         let n = 20_001;
         let inner = |k: i32| normal::quantile((f64::from(k) + 0.5) / f64::from(n));
         let m = Marginal::new(&(0..n).map(inner).collect::<Vec<_>>()).unwrap();

@@ -1,12 +1,12 @@
 //! Synthetic texture: random fields with a given covariance. One folder per method.
 //!
-//! A method ([`Method`], its [`Kernel`] once the fit is bound) makes one tile of a normal field (bumps: nearly normal). What methods have in common is done
-//! around it, once ([`Texture`]): size and cells, anisotropy, a height distribution, repetition, and the comparison of the
-//! covariance that the method gives on average with the one that was asked for.
+//! A method ([`Method`], and its [`Kernel`] once the fit is bound) synthesises one tile of a normal field (bumps: nearly normal).
+//! Everything common to all methods is implemented once, in [`Texture`]: size and cells, anisotropy, height distribution, tiling, and the
+//! comparison of the method's mean covariance with the target.
 //!
 //! Drawing all cells from one multivariate normal distribution by Latin hypercube sampling (`lhsnorm` in Vecherin et al.
-//! 2022, section 3.2) is not offered: it needs the matrix that [`cholesky`] needs, and stratifying each cell's values over
-//! an ensemble does nothing for the one surface that is wanted.
+//! 2022, section 3.2) is not offered: it needs the same matrix as [`cholesky`], and stratifying each cell's values over
+//! an ensemble does nothing for a single surface.
 
 pub mod bumps;
 pub mod cholesky;
@@ -38,38 +38,38 @@ pub trait Method: Send + Sync {
     /// The checked parameters with every default written out.
     fn parameters(&self) -> Value;
 
-    /// What a texture takes, as far as that is known without the covariance.
+    /// Cost of a texture, as far as it is known without the covariance.
     fn cost(&self) -> Cost;
 
-    /// The same with the most memory that any result of a fit asks for.
+    /// The same, with the most memory that any result of a fit may need.
     fn cost_of(&self, prospect: &Prospect) -> Cost;
 
-    /// Refuses what [`Self::bind`] would refuse of a fit with a covariance that was measured on cells of that size, east-west and
+    /// Refuses what [`Self::bind`] would refuse for a fit with a covariance measured on cells of size `measured_m`, east-west and
     /// north-south, m.
     ///
     /// # Errors
-    /// A method that makes covariances of models only; cells that are no whole multiples of the measured ones.
+    /// A method that supports model covariances only; cells that are not whole multiples of the measured ones.
     fn check_measured(&self, measured_m: [f64; 2]) -> Result<(), ParameterError>;
 
     /// The texture that matches a fit.
     ///
     /// # Errors
-    /// A fit without a covariance, or one that the method cannot make on this tile.
+    /// A fit without a covariance, or with one that the method cannot reproduce on this tile.
     fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError>;
 }
 
-/// What is known of a fit before it is made.
+/// What is known about a fit in advance, for planning.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Prospect {
-    /// Side of a torus that holds its covariance, whatever that will be, m.
+    /// Side of a torus that is wide enough for any covariance the fit may find, m.
     pub torus_m: f64,
-    /// Cells of what is fitted, east-west and north-south, m.
+    /// Cells of the fitted surface, east-west and north-south, m.
     pub cell_m: Option<[f64; 2]>,
     /// Whether the measured covariance is stored.
     pub is_measured: bool,
 }
 
-/// What a texture takes.
+/// Cost of a texture.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cost {
     /// Working memory, result included, bytes.
@@ -86,17 +86,17 @@ pub trait Synthesis: Send + Sync {
     /// The checked parameters with every default written out.
     fn parameters(&self) -> Value;
 
-    /// What [`Self::generate`] takes.
+    /// Cost of [`Self::generate`].
     fn cost(&self) -> Cost;
 
-    /// Sentences a user should read: rounded sizes, coarse cells, a torus too small for the range.
+    /// Notes for the user: rounded sizes, coarse cells, a torus too small for the range.
     fn notes(&self) -> Vec<String>;
 
-    /// The covariance that an ensemble of these textures has beside the one that was asked for, at lags along rows, columns
-    /// and diagonals: up to half a periodic tile, up to the whole of another one.
+    /// Mean covariance of an ensemble of these textures and its target, at lags along rows, columns and diagonals: up to half the
+    /// width of a periodic tile, or the full width of any other.
     fn covariance(&self) -> Vec<LagCovariance>;
 
-    /// Range across the long axis over range along it that was asked for.
+    /// Target ratio of the range across the long axis to the range along it.
     fn ratio(&self) -> f64;
 
     /// Whether the texture repeats without seams.
@@ -114,9 +114,9 @@ pub trait Synthesis: Send + Sync {
 pub struct LagCovariance {
     /// Lag, east and north, m.
     pub lag_m: [f64; 2],
-    /// What was asked for, m2.
+    /// Target, m2.
     pub wanted_m2: f64,
-    /// What the method gives on average, m2.
+    /// Mean of the method, m2.
     pub achieved_m2: f64,
 }
 
@@ -131,26 +131,25 @@ impl LagCovariance {
 pub struct TextureOutcome {
     /// Heights, m.
     pub grid: Grid,
-    /// Largest absolute difference between the covariance that was made and the one that was asked for, over all lags
-    /// of the torus (methods that are not exact, and given height distributions: over the lags of
-    /// [`Synthesis::covariance`]), m2.
+    /// Largest absolute difference between the achieved and the target covariance over all lags of the torus (for inexact methods and
+    /// given height distributions: over the lags of [`Synthesis::covariance`]), m2.
     pub covariance_error_max_m2: f64,
     /// Share of the spectrum that was negative and set to 0.
     pub clip_share: f64,
 }
 
-/// A length for a message: without the last digits of a computed one, m.
+/// A length for a message, m, rounded to hide computed digits.
 fn to_micrometres(length_m: f64) -> f64 {
     (1e6 * length_m).round() / 1e6
 }
 
-/// A texture that cannot be made.
+/// Why a texture cannot be synthesised.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum SynthesisError {
-    /// The covariance does not fit on the torus.
+    /// The covariance is not positive definite on the torus.
     #[error(
         "the covariance is not positive definite on a tile of {width} m x {height} m: {clip_share:.1e} of its spectrum \
-         is negative, more than {limit:.0e}; make the tile at least {needed} m each way or set periodic = false",
+         is negative, more than {limit:.0e}; make the tile at least {needed} m wide and high, or set periodic = false",
         width = to_micrometres(*.width_m),
         height = to_micrometres(*.height_m),
         needed = to_micrometres(*.needed_m)
@@ -162,42 +161,43 @@ pub enum SynthesisError {
         height_m: f64,
         /// Negative share of the spectrum.
         clip_share: f64,
-        /// Largest share that is set to 0 in silence.
+        /// Largest share that is accepted and set to 0.
         limit: f64,
-        /// A size that is enough, m.
+        /// A sufficient size, m.
         needed_m: f64,
     },
 }
 
-/// Parameters of a method beside those of its tile.
+/// Parameters of a method, without those of its tile.
 pub trait MethodParameters: DeserializeOwned + Serialize + JsonSchema + Clone + Send + Sync + 'static {
     /// Its name.
     const NAME: &'static str;
-    /// What makes a tile.
+    /// The generator of tiles.
     type Kernel: Kernel + 'static;
 
     /// Whether the tile repeats without seams.
     fn is_periodic(&self) -> bool;
 
-    /// Refuses what is wrong whatever the covariance.
+    /// Refuses parameters that are invalid whatever the covariance.
     ///
     /// # Errors
     /// Parameters out of range.
     fn check(&self, tile: &Tile) -> Result<(), ParameterError>;
 
-    /// Refuses a covariance that was measured on cells of that size, where it cannot be made.
+    /// Refuses a covariance measured on cells of size `measured_m` if the method cannot reproduce it.
     ///
     /// # Errors
-    /// A method that makes covariances of models only; cells that do not go with the measured ones.
+    /// A method that supports model covariances only; cells that are not whole multiples of the measured ones.
     fn check_measured(&self, _tile: &Tile, _measured_m: [f64; 2]) -> Result<(), ParameterError> {
-        let message = format!("is `{}`; an empirical covariance is made by `fft_ma` only", Self::NAME);
+        let message =
+            format!("is `{}`; textures with an empirical covariance can be made by `fft_ma` only", Self::NAME);
         Err(ParameterError::new("method", message))
     }
 
-    /// What a tile takes, as far as that is known without the covariance.
+    /// Cost of a tile, as far as it is known without the covariance.
     fn cost(&self, tile: &Tile) -> Cost;
 
-    /// The same with the most memory that any result of a fit asks for.
+    /// The same, with the most memory that any result of a fit may need.
     fn cost_of(&self, tile: &Tile, _prospect: &Prospect) -> Cost {
         self.cost(tile)
     }
@@ -205,22 +205,22 @@ pub trait MethodParameters: DeserializeOwned + Serialize + JsonSchema + Clone + 
     /// The method for one tile of `wanted`, which is the covariance of `fitted` with the anisotropy of the tile.
     ///
     /// # Errors
-    /// A covariance that the method cannot make on this tile.
+    /// A covariance that the method cannot reproduce on this tile.
     fn kernel(&self, tile: &Tile, wanted: &Covariance, fitted: &Wanted) -> Result<Self::Kernel, ParameterError>;
 }
 
-/// One way to make a tile.
+/// A generator of tiles.
 pub trait Kernel: Send + Sync {
-    /// What a tile takes.
+    /// Cost of a tile.
     fn cost(&self) -> Cost;
 
-    /// Sentences a user should read.
+    /// Notes for the user.
     fn notes(&self) -> Vec<String>;
 
-    /// The covariance on average, m2, at lags `[east, north]` up to half a periodic tile.
+    /// The mean covariance, m2, at lags `[east, north]` up to half a periodic tile.
     fn achieved(&self) -> Box<dyn Fn([f64; 2]) -> f64 + '_>;
 
-    /// False where the covariance asked for is that of [`Self::achieved`], not a model of the surface.
+    /// False if the target is the covariance of [`Self::achieved`], not a model of the surface.
     fn aims_at_a_model(&self) -> bool {
         true
     }
@@ -236,37 +236,37 @@ pub trait Kernel: Send + Sync {
 pub struct Made {
     /// Heights, row-major, m.
     pub heights_m: Vec<f64>,
-    /// Largest error of the covariance over all lags, where the method knows it; else that of [`Synthesis::covariance`].
+    /// Largest error of the covariance over all lags, if the method knows it; otherwise that of [`Synthesis::covariance`] is used.
     pub covariance_error_max_m2: Option<f64>,
     /// Share of the spectrum that was negative and set to 0.
     pub clip_share: f64,
 }
 
-/// A length without the digits that rounding left: to a micrometre.
+/// A length rounded to a micrometre, to remove rounding errors.
 fn tidy(length_m: f64) -> f64 {
     (length_m * 1e6).round() / 1e6
 }
 
-/// Model of fits that hold a measured covariance.
+/// Model name of fits with a measured covariance.
 pub const EMPIRICAL: &str = "empirical";
 
-/// What a texture should match.
+/// The target of a texture.
 #[derive(Clone)]
 pub struct Wanted {
     /// Covariance.
     pub covariance: Covariance,
-    /// Measured heights at equally spaced probabilities from 0 to 1, m; empty when not known.
+    /// Measured heights at equally spaced probabilities from 0 to 1, m; empty if unknown.
     pub quantiles_m: Vec<f64>,
-    /// Window of the background that the fit took off, east-west and north-south, m.
+    /// Window of the background that the fit subtracted, east-west and north-south, m.
     pub window_m: Option<[f64; 2]>,
     /// Cells of the fit, east-west and north-south, m.
     pub cell_m: Option<[f64; 2]>,
-    /// Measured covariance, in the place of the model's.
+    /// Measured covariance, which replaces the model's.
     pub map: Option<Box<CovarianceMap>>,
 }
 
 impl Wanted {
-    /// What a fit file says.
+    /// The target from a fit file.
     ///
     /// # Errors
     /// An unknown model; a parameter that is missing, unknown or out of range.
@@ -284,13 +284,13 @@ impl Wanted {
     }
 }
 
-/// What a reader of a texture must know of the fit that it is made from.
+/// Caveats of a fit that apply to textures from it.
 pub fn fit_notes(fit: &FitFile) -> Vec<String> {
     let range_m = fit.parameters.get("range_m").copied().filter(|_| fit.range_at_bound());
     let bound = range_m.map(|range_m| {
         format!(
-            "the fit did not identify the range: its search ended at {range_m:.4} m; the texture has the fit's increments at lags below its \
-             window, and waves longer than that by assumption"
+            "the fit did not identify the range: its search ended at {range_m:.4} m; the texture has the fit's increments at lags below the \
+             fit's window, but its longer waves are an assumption"
         )
     });
     bound.into_iter().collect()
@@ -343,14 +343,14 @@ impl<P: MethodParameters> Method for Checked<P> {
     fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
         let wanted = Wanted::of_fit(fit)?;
         if wanted.map.is_some() {
-            // That its cells are missing is found where they are needed.
+            // Missing cells are reported where they are needed.
             self.check_measured(wanted.cell_m.unwrap_or(self.tile.geometry.cell))?;
         }
         Ok(Box::new(Texture::new(&self.tile, &self.own, wanted)?))
     }
 }
 
-/// A method with what all of them have in common.
+/// A method, with everything that is common to all methods.
 pub struct Texture<K> {
     tile: Tile,
     parameters: Value,
@@ -360,7 +360,7 @@ pub struct Texture<K> {
     notes: Vec<String>,
 }
 
-/// Error of the covariance, as a share of the variance, that is worth a note.
+/// Error of the covariance, as a share of the variance, above which it is noted.
 const ERROR_NOTE: f64 = 1e-4;
 /// Most lags along each direction of a comparison.
 const LAGS_MAX: usize = 2048;
@@ -369,7 +369,7 @@ impl<K: Kernel> Texture<K> {
     /// The texture of checked parameters that matches `fitted`.
     ///
     /// # Errors
-    /// A covariance or heights that the method cannot make on this tile.
+    /// A covariance or heights that the method cannot reproduce on this tile.
     pub fn new<P: MethodParameters<Kernel = K>>(tile: &Tile, own: &P, fitted: Wanted) -> Result<Self, ParameterError> {
         let mut notes = Vec::new();
         let wanted = tile.covariance(fitted.covariance.clone(), &mut notes);
@@ -380,7 +380,7 @@ impl<K: Kernel> Texture<K> {
         Ok(Self { tile: tile.clone(), parameters: tile.parameters_with(own), marginal, wanted, kernel, notes })
     }
 
-    /// The tile with the wanted heights.
+    /// The texture with the target's height distribution, tiled.
     fn shaped(&self, heights_m: Vec<f64>) -> Grid {
         let tile = Grid::new(self.tile.geometry, heights_m);
         let shaped = match &self.marginal {
@@ -434,7 +434,7 @@ impl<K: Kernel> Synthesis for Texture<K> {
     }
 
     fn cost(&self) -> Cost {
-        /// A distribution function.
+        /// Operations per cell for a distribution function.
         const MARGINAL: f64 = 60.0;
         let marginal = self.marginal.as_ref().map_or(0.0, |_| MARGINAL * self.tile.geometry.len() as f64);
         let Cost { memory_bytes, operations } = self.tile.repeated_cost(self.kernel.cost());
@@ -445,7 +445,7 @@ impl<K: Kernel> Synthesis for Texture<K> {
         let marginal = self.marginal.as_ref().map(|m| {
             let (given_m2, fitted_m2) = (m.variance_m2, self.wanted.at_distance(0.0));
             format!(
-                "the height distribution bends the covariance; its variance is {given_m2:.3e} m2, the fit's {fitted_m2:.3e} m2"
+                "the height distribution changes the covariance; its variance is {given_m2:.3e} m2, the fit's {fitted_m2:.3e} m2"
             )
         });
         self.notes.iter().cloned().chain(marginal).chain(self.error_note()).collect()
@@ -454,11 +454,11 @@ impl<K: Kernel> Synthesis for Texture<K> {
     fn covariance(&self) -> Vec<LagCovariance> {
         let achieved = self.kernel.achieved();
         let variance_m2 = achieved([0.0; 2]);
-        let bent = |c: f64| self.marginal.as_ref().map_or(c, |m| m.covariance_m2(c / variance_m2));
+        let transformed = |c: f64| self.marginal.as_ref().map_or(c, |m| m.covariance_m2(c / variance_m2));
         let model = self.kernel.aims_at_a_model();
         let wanted = |lag_m: [f64; 2]| if model { self.wanted.at(lag_m) } else { achieved(lag_m) };
         self.lags()
-            .map(|lag_m| LagCovariance { lag_m, wanted_m2: wanted(lag_m), achieved_m2: bent(achieved(lag_m)) })
+            .map(|lag_m| LagCovariance { lag_m, wanted_m2: wanted(lag_m), achieved_m2: transformed(achieved(lag_m)) })
             .collect()
     }
 

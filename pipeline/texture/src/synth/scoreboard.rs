@@ -1,14 +1,14 @@
-//! All methods side by side on one fit: what each promises, and what a few realisations show.
+//! Compares all methods on one fit: predicted properties, and those measured on a few realisations.
 //!
-//! * covariance: largest and root mean square difference, over the lags of [`Synthesis::covariance`], between what a method
-//!   gives on average and what was asked for, as shares of the variance;
-//! * variance of each realisation about zero, its mean and spread over all of them, as shares of the variance;
+//! * covariance: largest and root mean square difference between a method's mean covariance and the target, over the lags of
+//!   [`Synthesis::covariance`], as shares of the variance;
+//! * variance of each realisation about zero: its mean and spread over all realisations, as shares of the target variance;
 //! * anisotropy: range across over range along, from the lags at which the mean covariance of the realisations has fallen to
-//!   0.3 of its value at lag 0, in 18 directions; an ellipse is laid through them by least squares;
+//!   0.3 of its value at lag 0, in 18 directions, by a least-squares ellipse;
 //! * seam: mean square step from the last row or column to the first, over that between neighbours inside: 1 without a seam;
-//! * operations and bytes as predicted: measured times differ by machine and are in the benches.
+//! * operations and bytes as predicted: measured times differ between machines and are in the benches.
 //!
-//! Source: Vecherin et al. 2022, section 4, whose conclusions this makes a table of. Cost: the realisations, and two
+//! Source: Vecherin et al. 2022, section 4, whose conclusions this puts into numbers. Cost: the realisations, and two
 //! transforms of each.
 
 use super::fft_ma::torus_covariance;
@@ -17,31 +17,31 @@ use crate::covariance::masked_covariance;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use std::f64::consts::PI;
 
-/// Share of the covariance at lag 0 whose contour is the ellipse of anisotropy.
+/// Share of the covariance at lag 0 at which the contour for the anisotropy is taken.
 const CONTOUR: f64 = 0.3;
 /// Directions in half a turn.
 const DIRECTIONS: usize = 18;
-/// Lags of a curve that follow each other; further ones are spaced by a tenth.
+/// Number of consecutive lags of a curve; larger ones are spaced by a tenth.
 const DENSE_LAGS: usize = 40;
 
-/// What a method does on one fit.
+/// Results of a method on one fit.
 #[derive(Clone, Debug)]
 pub struct Score {
     /// Largest error of the mean covariance, share of the variance.
     pub error_max: f64,
     /// Root mean square error of the mean covariance, share of the variance.
     pub error_rms: f64,
-    /// Mean of the realisations' variances over the variance asked for.
+    /// Mean of the realisations' variances over the target variance.
     pub variance_mean: f64,
-    /// Standard deviation of the realisations' variances over the variance asked for.
+    /// Standard deviation of the realisations' variances over the target variance.
     pub variance_spread: f64,
-    /// Range across over range along that was asked for.
+    /// Target ratio of range across to range along.
     pub ratio_wanted: f64,
-    /// The same as the realisations have it; NaN when the contour leaves half a tile.
+    /// The ratio measured on the realisations; NaN if the contour extends beyond half a tile.
     pub ratio_found: f64,
     /// Mean square step across the edges over that inside.
     pub seam_jump_ratio: f64,
-    /// What one realisation is predicted to take.
+    /// Predicted cost of one realisation.
     pub cost: Cost,
     /// Covariance along rows.
     pub curve: Vec<CurvePoint>,
@@ -52,9 +52,9 @@ pub struct Score {
 pub struct CurvePoint {
     /// Lag, m.
     pub lag_m: f64,
-    /// Asked for.
+    /// Target.
     pub wanted_m2: f64,
-    /// What the method gives on average.
+    /// Mean of the method.
     pub achieved_m2: f64,
     /// Mean over the realisations.
     pub measured_m2: f64,
@@ -121,7 +121,7 @@ impl Tally {
     }
 }
 
-/// Lags along rows that a curve shows, with their cells.
+/// Lags along rows for a curve, with their numbers of cells.
 fn thinned(lags: &[LagCovariance]) -> Vec<(usize, LagCovariance)> {
     let mut kept: Vec<(usize, LagCovariance)> = Vec::new();
     for (cells, lag) in lags.iter().enumerate().take_while(|(k, l)| *k == 0 || l.lag_m[0] > 0.0 && l.lag_m[1] == 0.0) {
@@ -132,7 +132,7 @@ fn thinned(lags: &[LagCovariance]) -> Vec<(usize, LagCovariance)> {
     kept
 }
 
-/// Mean product of cells that far apart in a row; round the edge, where the field is periodic.
+/// Mean product of cells `lag` apart in a row; across the edge, if the field is periodic.
 fn along_rows(grid: &Grid, lag: usize, periodic: bool) -> f64 {
     let pairs = if periodic { grid.cols() } else { grid.cols() - lag };
     let of_row = |r: usize| {
@@ -158,7 +158,7 @@ fn steps(grid: &Grid) -> [f64; 2] {
     [mean(cols - 1..cols, rows - 1..rows), mean(0..cols - 1, 0..rows - 1)]
 }
 
-/// Standard deviation with n - 1; 0 of one value.
+/// Standard deviation with n - 1; 0 for a single value.
 fn spread(values: &[f64]) -> f64 {
     let n = values.len() as f64;
     if n < 2.0 { 0.0 } else { (sums::variance(values) * n / (n - 1.0)).sqrt() }
@@ -171,7 +171,7 @@ struct Map {
 }
 
 impl Map {
-    /// Adds a realisation: round the edges, where it is periodic.
+    /// Adds a realisation; across the edges, if it is periodic.
     fn add(&mut self, grid: &Grid, periodic: bool) {
         let [south, east] = self.half;
         let cols = grid.cols();
@@ -194,8 +194,8 @@ impl Map {
         inside.then(|| self.values[(south * (2 * max_east + 1) + east + max_east) as usize])
     }
 
-    /// Logarithm of the covariance over that at lag 0, bilinear between four lags: the logarithm of an exponential is
-    /// straighter than itself. Covariances near 0 and below count as a thousandth.
+    /// Logarithm of the covariance over that at lag 0, interpolated bilinearly between four lags; the logarithm of an exponential is
+    /// closer to linear. Correlations below a thousandth count as a thousandth.
     fn log_at(&self, south: f64, east: f64) -> Option<f64> {
         let (r, c) = (south.floor(), east.floor());
         let (v, u) = (south - r, east - c);
@@ -206,7 +206,7 @@ impl Map {
         Some((1.0 - v) * north + v * ((1.0 - u) * corner(1, 0)? + u * corner(1, 1)?))
     }
 
-    /// Short over long axis of the contour; `None` when it leaves the map.
+    /// Short over long axis of the contour; `None` if it leaves the map.
     fn ratio(&self, [dx, dy]: [f64; 2]) -> Option<f64> {
         let level = libm::log(CONTOUR);
         let step = 0.25 * dx.min(dy);
@@ -224,7 +224,7 @@ impl Map {
     }
 }
 
-/// Short over long axis of the ellipse about the origin that is nearest to the points in least squares.
+/// Short over long axis of the least-squares ellipse about the origin through the points.
 fn axes_ratio(points: &[[f64; 2]]) -> f64 {
     let (mut normal, mut right) = ([[0.0; 3]; 3], [0.0; 3]);
     for [x, y] in points {
@@ -239,7 +239,7 @@ fn axes_ratio(points: &[[f64; 2]]) -> f64 {
     ((middle - half) / (middle + half)).sqrt()
 }
 
-/// Three equations by Cramer's rule.
+/// Solves three equations by Cramer's rule.
 fn solve(m: [[f64; 3]; 3], right: [f64; 3]) -> [f64; 3] {
     let det = |m: &[[f64; 3]; 3]| {
         let minor = |a: usize, b: usize| m[1][a] * m[2][b] - m[1][b] * m[2][a];
@@ -266,8 +266,36 @@ mod tests {
         score(synthesis.as_ref(), &Streams::for_seed(1, "texture"), 6).unwrap()
     }
 
+    /// By hand on two rows of three cells, 1 2 4 above 1 0 3. Steps across the edges: 3 and 2 in the rows, 0, 2 and 1 in the columns. Inside: 1
+    /// and 2, 1 and 3 in the rows, the same in the columns.
+    #[test]
+    fn val_steps_and_products_by_hand() {
+        let grid = Grid::new(Geometry::square(2, 3, 1.0), vec![1.0, 2.0, 4.0, 1.0, 0.0, 3.0]);
+        let [seam, inside] = steps(&grid);
+        assert!((seam - (9.0 + 4.0 + 0.0 + 4.0 + 1.0) / 5.0).abs() < 1e-14, "{seam}");
+        assert!((inside - (1.0 + 4.0 + 1.0 + 9.0 + 0.0 + 4.0 + 1.0) / 7.0).abs() < 1e-14, "{inside}");
+        // Products of neighbours in a row: 2, 8 and across the edge 4; 0, 0 and 3.
+        assert!((along_rows(&grid, 1, false) - (2.0 + 8.0) / 4.0).abs() < 1e-14);
+        assert!((along_rows(&grid, 1, true) - (2.0 + 8.0 + 4.0 + 3.0) / 6.0).abs() < 1e-14);
+        assert_eq!((spread(&[1.0, 3.0]), spread(&[7.0])), (2f64.sqrt(), 0.0));
+    }
+
+    /// Points on an ellipse with axes 3 and 1 at any angle give their ratio.
+    #[test]
+    fn val_ratio_of_an_ellipse() {
+        for turn in [0.0, 0.4, 1.2, 2.9] {
+            let (sin, cos) = libm::sincos(turn);
+            let point = |k: usize| {
+                let (y, x) = libm::sincos(PI * k as f64 / 18.0);
+                [3.0 * x * cos - y * sin, 3.0 * x * sin + y * cos]
+            };
+            let found = axes_ratio(&(0..18).map(point).collect::<Vec<_>>());
+            assert!((found - 1.0 / 3.0).abs() < 1e-9, "{turn}: {found}");
+        }
+    }
+
     /// FFT-MA with unit phases: no error, no spread of the variance, no seam (200 x 6 steps of two edges: standard error
-    /// about 5 %, limit 30 %), and the ratio of ranges within 2 % of the one asked for.
+    /// about 5 %, limit 30 %), and the ratio of ranges within 2 % of the target.
     #[test]
     fn val_fft_ma_is_exact() {
         let s = scored("fft_ma", json!({ "size_m": [20.0, 20.0], "ratio": 0.5, "azimuth_deg": 30.0 }));
@@ -278,7 +306,8 @@ mod tests {
         assert!(s.curve.iter().all(|p| (p.measured_m2 - p.wanted_m2).abs() < 1e-12 * 0.0025));
     }
 
-    /// Cholesky: exact on average, a seam where its edges meet: steps of `2 C(0)` instead of `2 (C(0) - C(1))`, 5.5 times.
+    /// Cholesky: exact on average, but with a seam where its edges meet: mean square steps of `2 C(0)` instead of `2 (C(0) - C(1))`,
+    /// 5.5 times as large.
     #[test]
     fn stat_cholesky_has_a_seam() {
         let s = scored("cholesky", json!({ "size_m": [3.0, 2.0] }));
@@ -286,9 +315,9 @@ mod tests {
         assert!(s.seam_jump_ratio > 2.0, "{}", s.seam_jump_ratio);
     }
 
-    /// The paper's verdict: Gaussians miss the exponential covariance, quasi-wavelets meet it, FFT-MA costs least.
+    /// The paper's ranking: Gaussians miss the exponential covariance, quasi-wavelets reproduce it, FFT-MA costs least.
     #[test]
-    fn val_the_papers_order() {
+    fn val_the_ranking_of_the_paper() {
         let size = || json!({ "size_m": [12.0, 12.0] });
         let [fft, gaussians, quasi] = ["fft_ma", "gaussians", "quasi_wavelets"].map(|m| scored(m, size()));
         assert!(gaussians.error_max > 0.05 && quasi.error_max < 0.02, "{} {}", gaussians.error_max, quasi.error_max);

@@ -1,6 +1,6 @@
-//! Hypotheses that the study declares: each with its estimate, its test, and what came of the claim.
+//! Hypotheses declared in the study: each with its estimate, its test and its verdict.
 
-use super::values::{self, Figure, Values};
+use super::values::{self, Metric, Values};
 use super::verdicts::{self, Level, Measure, Verdict};
 use crate::content::{Block, Numbers, TableBlock, number, text};
 use crate::data::{Data, Group};
@@ -17,25 +17,25 @@ struct Tested<'a> {
     claim: &'a HypothesisItem,
     words: String,
     of: String,
-    /// What the estimate is.
+    /// What the estimate measures.
     what: &'static str,
     estimate: Option<Interval>,
-    /// Which way it goes, by its sign.
+    /// Direction of the effect, by its sign.
     way: f64,
     p: f64,
-    /// Over the family.
+    /// Holm-adjusted p within the family.
     adjusted: f64,
-    /// The least p that any data of this many terrains could have.
+    /// Smallest p that any data from this many terrains could give.
     least_p: f64,
-    /// The same over the family.
+    /// The same, adjusted within the family.
     least_adjusted: f64,
-    /// Of equivalence: p against a difference of at most the margin.
+    /// For equivalence: p against a difference of at most the margin.
     beyond_p: f64,
     /// Claims in the family.
     family: usize,
 }
 
-/// The table of the hypotheses; nothing when the study declares none.
+/// Verdicts on the hypotheses; empty when the study declares none.
 pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Block> {
     if data.study.hypotheses.is_empty() {
         return Vec::new();
@@ -49,7 +49,7 @@ pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: 
     ]
 }
 
-/// How many of the claims hold, in a sentence.
+/// The number of supported, unsupported and undecided claims, in a sentence.
 pub fn sentence<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> String {
     in_words(&tested(data, groups, pairing))
 }
@@ -70,10 +70,10 @@ fn test<'a>(
     groups: &'a [Group<'a, MissionRow>],
     pairing: &Pairing<'a>,
 ) -> Tested<'a> {
-    let figure = values::figure(claim.statistic, groups, pairing);
+    let metric = values::metric(claim.statistic, groups, pairing);
     let untested = Tested {
         claim,
-        words: claim_in_words(claim, &figure),
+        words: claim_in_words(claim, &metric),
         of: String::new(),
         what: "",
         estimate: None,
@@ -87,12 +87,12 @@ fn test<'a>(
     };
     let of_run = |g: &&Values| claim.traverse.is_none() || g.run == claim.traverse.as_deref();
     let named =
-        |name: &String| figure.groups.iter().filter(of_run).find(|g| g.label == name.as_str() && !g.means.is_empty());
+        |name: &String| metric.groups.iter().filter(of_run).find(|g| g.label == name.as_str() && !g.means.is_empty());
     let Some(members) = claim.groups.iter().map(named).collect::<Option<Vec<&Values>>>() else { return untested };
     let level = Level { alpha: claim.alpha, tests: family };
     let Verdict { of, test, size, .. } = match members[..] {
-        [from, to] => verdicts::pair(data, &figure, [from, to], level),
-        _ => verdicts::over_groups(data, &figure, &members, level),
+        [from, to] => verdicts::pair(data, &metric, [from, to], level),
+        _ => verdicts::over_groups(data, &metric, &members, level),
     };
     let p = test.map_or(f64::NAN, |t| t.p);
     let least_p = test.map_or(f64::NAN, |t| t.least_p);
@@ -122,7 +122,7 @@ fn adjust(tested: &mut [Tested]) {
     for family in families {
         let members: Vec<usize> = (0..tested.len()).filter(|&k| tested[k].claim.family == family).collect();
         let over = |p: fn(&Tested) -> f64| holm(&members.iter().map(|&k| p(&tested[k])).collect::<Vec<_>>());
-        // Holm's adjusted p rises with every p of the family, so that of the least ones is the least.
+        // Holm's adjusted p rises with every p of the family, so the smallest p values give the smallest adjusted p.
         let (adjusted, least) = (over(|t| t.p), over(|t| t.least_p));
         for ((k, adjusted), least) in members.into_iter().zip(adjusted).zip(least) {
             (tested[k].adjusted, tested[k].least_adjusted) = (adjusted, least);
@@ -130,7 +130,7 @@ fn adjust(tested: &mut [Tested]) {
     }
 }
 
-fn claim_in_words(claim: &HypothesisItem, figure: &Figure) -> String {
+fn claim_in_words(claim: &HypothesisItem, metric: &Metric) -> String {
     let way = match claim.direction {
         Some(Direction::Rises) => "rises",
         Some(Direction::Falls) => "falls",
@@ -138,19 +138,19 @@ fn claim_in_words(claim: &HypothesisItem, figure: &Figure) -> String {
         None => "differs",
     };
     let words = match (claim.test, claim.margin) {
-        (HypothesisTest::Trend, _) => format!("{} {way} over {}", figure.name, claim.groups.join(", ")),
+        (HypothesisTest::Trend, _) => format!("{} {way} over {}", metric.name, claim.groups.join(", ")),
         (_, Some(margin)) => {
-            let unit = if figure.unit == "%" { "points" } else { figure.unit };
+            let unit = if metric.unit == "%" { "points" } else { metric.unit };
             let ends = claim.groups.join(" and ");
-            let words = format!("{}: {ends} differ by less than {} {unit}", figure.name, set::plain(margin, 4));
+            let words = format!("{}: {ends} differ by less than {} {unit}", metric.name, set::plain(margin, 4));
             words.trim_end().to_owned()
         }
-        _ => format!("{} {way} from {}", figure.name, claim.groups.join(" to ")),
+        _ => format!("{} {way} from {}", metric.name, claim.groups.join(" to ")),
     };
     claim.traverse.as_ref().map_or_else(|| words.clone(), |run| format!("{words} ({run})"))
 }
 
-/// What came of a claim.
+/// Verdict on a claim.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Outcome {
     Supported,
@@ -169,10 +169,10 @@ impl Outcome {
             Self::Supported => "supported",
             Self::Equivalent => "equivalent within the margin",
             Self::NotSupported => "not supported",
-            Self::Opposite => "not supported: it goes the other way",
-            Self::Apart => "not supported: they differ by more than the margin",
+            Self::Opposite => "not supported: the effect has the opposite direction",
+            Self::Apart => "not supported: the groups differ by more than the margin",
             Self::CannotTell => "cannot tell",
-            Self::NoMissions => "cannot tell: a group has no missions with this figure",
+            Self::NoMissions => "cannot tell: a group has no missions with this metric",
             Self::TooFew => "cannot tell: too few terrains",
         }
     }
@@ -201,7 +201,7 @@ impl Tested<'_> {
         }
     }
 
-    /// Whether a difference that was found goes where the claim says.
+    /// Whether a significant difference has the claimed direction.
     fn direction(&self) -> Outcome {
         let right = match self.claim.direction {
             None => true,
@@ -215,31 +215,32 @@ impl Tested<'_> {
 fn in_words(tested: &[Tested]) -> String {
     let of = |is: fn(Outcome) -> bool| tested.iter().filter(|t| is(t.outcome())).count();
     let (holds, open) = (of(Outcome::holds), of(Outcome::is_open));
-    let claims = if tested.len() == 1 { "claim".into() } else { format!("{} claims", set::count(tested.len())) };
-    format!(
-        "Of the {claims} that the study declares, {} hold{}, {} not supported{}.",
-        set::count(holds),
-        if holds == 1 { "s" } else { "" },
-        match tested.len() - holds - open {
-            1 => "1 is".into(),
-            n => format!("{} are", set::count(n)),
-        },
-        match open {
-            0 => String::new(),
-            1 => ", of one the data cannot tell".into(),
-            n => format!(", of {} the data cannot tell", set::count(n)),
-        },
-    )
+    let fails = tested.len() - holds - open;
+    match (tested.len(), holds, open) {
+        (1, 1, _) => return "One hypothesis was declared; the data support it.".to_owned(),
+        (1, _, 1) => return "One hypothesis was declared; the data cannot decide it.".to_owned(),
+        (1, ..) => return "One hypothesis was declared; the data do not support it.".to_owned(),
+        (n, 0, 0) => return format!("None of the {} declared hypotheses is supported.", set::count(n)),
+        _ => {}
+    }
+    let be = |n: usize| format!("{} {}", set::count(n), if n == 1 { "is" } else { "are" });
+    let parts = [
+        (holds, format!("{} supported", be(holds))),
+        (fails, format!("{} not supported", be(fails))),
+        (open, format!("{} undecided", be(open))),
+    ];
+    let stated: Vec<String> = parts.into_iter().filter(|(n, _)| *n > 0).map(|(_, words)| words).collect();
+    format!("Of {} declared hypotheses, {}.", set::count(tested.len()), stated.join(", "))
 }
 
 fn introduction(data: &Data) -> String {
     format!(
-        "Declared as [[hypothesis]] in study.toml, whose SHA-256 is {}: with another claim, margin or level this hash, which the \
-         manifest and every table carry, would be another. Tests and units are those of the exploratory part: every terrain (or \
-         block of paired terrains) counts once. Holm's adjustment is over the hypotheses of a family; a claim holds when its \
-         adjusted p is at or below its level and, where it says which way, the estimate goes that way. p is two-sided. Intervals \
-         have the coverage that goes with the level, not adjusted: 1 − α, for equivalence (two one-sided t tests) 1 − 2 α. Too few \
-         terrains: no data of so many could have supported the claim after the adjustment.",
+        "The hypotheses are declared as [[hypothesis]] in study.toml. Its SHA-256 is {}; the manifest and every table carry this \
+         hash, which would change with any claim, margin or level. Tests and units are those of the exploratory part: every \
+         terrain (or block of paired terrains) counts once. Holm's adjustment is made within each family. A claim is supported if \
+         its adjusted p is at or below its level and the estimate has the claimed direction, if one is claimed. p is two-sided. \
+         Intervals are not adjusted; their coverage is 1 − α, or 1 − 2 α for equivalence (two one-sided t tests). \"Too few \
+         terrains\" means that no data from this many terrains could have supported the claim after adjustment.",
         data.study_sha256
     )
 }
@@ -251,7 +252,7 @@ fn table(data: &Data, tested: &[Tested]) -> TableBlock {
         ("estimate", ""),
         ("low", ""),
         ("high", ""),
-        ("of what", ""),
+        ("measure", ""),
         ("p", ""),
         ("p, Holm", ""),
         ("level", ""),

@@ -1,4 +1,4 @@
-//! Whether groups of missions differ, by tests whose unit is the terrain.
+//! Do groups of missions differ? Tests whose unit is the terrain.
 
 mod declared;
 mod model;
@@ -15,7 +15,7 @@ use crate::render::number as set;
 use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::normal;
 use std::collections::BTreeSet;
-use values::Figure;
+use values::Metric;
 
 /// Registry entry.
 pub const QUESTION: Question =
@@ -23,8 +23,9 @@ pub const QUESTION: Question =
 
 /// Level of the tests.
 pub const ALPHA: f64 = 0.05;
-/// Terrains in a group below which a reader is warned.
+/// Terrains in a group below which the reader is warned.
 const FEW: usize = 10;
+
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let groups = data.mission_groups();
     let pairing = Pairing::among(&groups);
@@ -35,7 +36,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// What came of the declared hypotheses; `None` where there is nothing to compare.
+/// Verdict on the declared hypotheses; `None` where there is nothing to compare.
 pub(super) fn claims(data: &Data) -> Option<String> {
     let groups = data.mission_groups();
     let none = "The study declared no hypothesis, so every comparison of groups is exploratory.";
@@ -45,16 +46,16 @@ pub(super) fn claims(data: &Data) -> Option<String> {
     }
 }
 
-/// Everything that no hypothesis of the study asked for.
+/// All comparisons that no hypothesis of the study declares.
 fn exploratory(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> Vec<Block> {
     let heading = |_| Block::Heading("Everything else is exploratory".into());
     let mut blocks: Vec<Block> = data.study.hypotheses.first().map(heading).into_iter().collect();
-    let figures = values::figures(groups, pairing);
-    let verdicts = verdicts::verdicts(data, &figures);
+    let metrics = values::metrics(groups, pairing);
+    let verdicts = verdicts::verdicts(data, &metrics);
     if verdicts.iter().all(|v| v.test.is_none()) {
         blocks.push(Block::Warning(
-            "Groups cannot be compared: there are too few terrains for a test. Missions are no substitute, because those on \
-             one terrain resemble each other."
+            "The groups cannot be compared: there are too few terrains for a test. Missions are not a substitute, because \
+             missions on one terrain are correlated."
                 .into(),
         ));
         return blocks;
@@ -62,74 +63,74 @@ fn exploratory(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> 
     blocks.extend([
         Block::Text(verdicts::in_words(&verdicts)),
         Block::Text(introduction(data, groups, pairing)),
-        Block::Text(refusal(groups, &figures, pairing)),
-        Block::Figures(verdicts::drawing(data, &figures, &verdicts).into_iter().collect()),
+        Block::Text(refusal(groups, &metrics, pairing)),
+        Block::Figures(verdicts::drawing(data, &metrics, &verdicts).into_iter().collect()),
         Block::Table(verdicts::table_of_pairs(data, &verdicts)),
         Block::Table(verdicts::table_of_trends(data, &verdicts)),
     ]);
     blocks.extend(model::blocks(data, groups, pairing));
-    blocks.extend(planning::blocks(data, &figures, pairing));
+    blocks.extend(planning::blocks(data, &metrics, pairing));
     blocks
 }
 
 fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> String {
     let registered = match data.study.hypotheses.len() {
-        0 => "Exploratory: no hypothesis was registered before the run.",
-        _ => "Exploratory: nothing below was declared before the run, and its p values count as hints.",
+        0 => "Exploratory: no hypothesis was declared before the run.",
+        _ => "Exploratory: nothing below was declared before the run, so its p values are only indicative.",
     };
     let tests = if pairing.is_common() {
-        "Groups share their random draws, so terrains are compared within blocks, over the missions of pairs that have the figure in \
-         all groups compared: signed-rank tests of pairs, shifts and deltas of differences within blocks, and Page's trend; signs or \
-         labels are laid anew within blocks."
+        "The groups share their random draws, so terrains are compared within blocks, using only pairs of missions that have the \
+         metric in all groups compared: signed-rank tests for pairs of groups, shift and delta of the differences within blocks, \
+         and Page's test for trend; signs or labels are permuted within blocks."
     } else {
-        "Rank-sum tests of pairs, and the rank correlation with the order of the groups as trend; labels are laid anew over the \
-         terrains."
+        "Pairs of groups are compared by rank-sum tests; the trend is the rank correlation with the order of the groups. Terrain \
+         labels are permuted."
     };
     let few = match few_terrains(groups) {
         Some(fewest) => format!(
-            " The smallest group has {}: with fewer than about {FEW} most differences stay unfound, and intervals are wide or without \
-             an end.",
+            " The smallest group has {}: below about {FEW}, most differences go undetected, and intervals are wide or unbounded.",
             set::counted(fewest, "terrain")
         ),
         None => String::new(),
     };
     format!(
-        "{registered} Every terrain counts once, by the mean of its missions \
-         (success: of all; other figures: of the successful ones). {tests} p is the share of all arrangements, or where they are \
-         more than about ten thousand of as many random ones, that are as extreme; from 300 values on that of the normal \
-         distribution with the variance of all arrangements, where no value stands out. The shift is Hodges and Lehmann's, its {} % interval \
-         the shifts that the test would not reject if there were no ties, which make it too wide; delta is Cliff's, with Newcombe's interval, \
-         of pairs Clopper and Pearson's; correlations have Bonett and Wright's, of blocks Clopper and Pearson's. Intervals hold less often \
-         where the smaller group scatters more. Groups are equivalent, at {} %, within any margin above the one in the last column (two one-sided t tests of means); a margin is \
-         a claim only when it was set before.{few}",
+        "{registered} Every terrain counts once, with the mean over its missions (success: all missions; other metrics: successful \
+         missions only). {tests} p is the share of all arrangements that are at least as extreme, or of about ten thousand random \
+         ones where there are more; from 300 values on, it comes from the normal distribution with the variance over all \
+         arrangements, unless a value stands out. The shift is Hodges and Lehmann's; its {} % interval holds the shifts that the \
+         test would not reject if there were no ties (ties make it too wide). Delta is Cliff's, with Newcombe's interval, or \
+         Clopper and Pearson's for blocks; correlations have Bonett and Wright's interval, or Clopper and Pearson's for blocks. \
+         Coverage is below nominal where the smaller group scatters more. At {} %, the groups are equivalent within any margin \
+         above the one in the last column (two one-sided t tests of means); a margin is a claim only if it was set \
+         beforehand.{few}",
         set::fixed(100.0 * LEVEL, 0),
         set::fixed(100.0 * ALPHA, 0),
     )
 }
 
-/// The fewest terrains of a group, where they are few.
+/// Number of terrains in the smallest group, if below [`FEW`].
 fn few_terrains(groups: &[Group<MissionRow>]) -> Option<usize> {
     let terrains = |g: &Group<MissionRow>| g.rows.iter().map(|m| &m.terrain_id).collect::<BTreeSet<_>>().len();
     groups.iter().map(terrains).min().filter(|n| *n < FEW)
 }
 
-/// Why missions are not tested, with what that would do here.
-fn refusal(groups: &[Group<MissionRow>], figures: &[Figure], pairing: &Pairing) -> String {
+/// Why missions are not tested, with the false-alarm rate that such a test would have here.
+fn refusal(groups: &[Group<MissionRow>], metrics: &[Metric], pairing: &Pairing) -> String {
     let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
     let terrains: usize =
         groups.iter().map(|g| g.rows.iter().map(|m| &m.terrain_id).collect::<BTreeSet<_>>().len()).sum();
     let per_terrain = missions as f64 / terrains as f64;
-    let words = "Tests that take missions for independent are not given: missions on one terrain resemble each other.";
-    // Of pairs the terrain's part cancels out of differences, as far as both groups share it.
-    let scatter = planning::scatter(&figures[0]).filter(|s| s.0 > 0.0 && !pairing.is_common());
+    let words = "Tests that treat missions as independent are not reported: missions on one terrain are correlated.";
+    // In differences of pairs the terrain's part cancels, as far as both groups share it.
+    let scatter = planning::scatter(&metrics[0]).filter(|s| s.0 > 0.0 && !pairing.is_common());
     let Some((between, within)) = scatter else { return words.into() };
     let share = between / (between + within);
     let inflation = 1.0 + (per_terrain - 1.0) * share;
     let level = 2.0 * normal::cdf(normal::quantile(0.5 * ALPHA) / inflation.sqrt());
     format!(
-        "{words} Here {} of the variance of success within groups lies between terrains, so that {} missions a terrain tell \
-         as much as {} independent ones, and a test of missions at {} % would find differences that are \
-         not there in about {} of cases.",
+        "{words} Here {} of the variance of success within groups lies between terrains. The {} missions per terrain therefore \
+         count as {} independent missions, and a mission-level test at {} % would report a difference that does not exist in \
+         about {} of cases.",
         set::percent(share, 0),
         set::plain(per_terrain, 3),
         set::plain(per_terrain / inflation, 2),

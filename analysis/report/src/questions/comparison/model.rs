@@ -1,4 +1,4 @@
-//! The logistic model of success with an intercept of the terrain.
+//! Mixed logistic model of success with a random intercept per terrain.
 
 use super::few_terrains;
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
@@ -12,14 +12,14 @@ use sastrugi_statistics::mixed_logistic::{Fit, Missions};
 use sastrugi_statistics::normal;
 use std::collections::BTreeMap;
 
-const WORDS: &str = "The odds of success, mission by mission, with an intercept of the terrain that is normal on the logarithmic \
-scale: missions on one terrain share it. Odds ratios compare missions on terrains that are alike otherwise; intervals are Wald's, \
-tests compare likelihoods with those of a model without the term, and are not among those that Holm's adjustment is over.";
-const FEW_TERRAINS: &str = "With fewer than about ten terrains in a group intervals are too short and p too small: the tests of terrains \
-above hold for any number.";
-const OF_BLOCKS: &str = "Terrains of one block are taken as independent, which makes intervals wider than need be.";
+const WORDS: &str = "Logistic regression of the success of each mission, with a random intercept per terrain that is normal on the \
+log-odds scale and shared by the missions on the terrain. Odds ratios compare missions on terrains that are otherwise alike. \
+Intervals are Wald's. Tests are likelihood-ratio tests against the model without the term and are not part of Holm's adjustment.";
+const FEW_TERRAINS: &str = "With fewer than about ten terrains in a group, intervals are too short and p is too small; the tests of \
+terrains above hold for any number.";
+const OF_BLOCKS: &str = "Terrains of one block are treated as independent, which makes intervals wider than necessary.";
 
-/// The table and what it is; a sentence where there is no estimate.
+/// The table and its explanation; a sentence instead where there is no estimate.
 pub fn blocks(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> Vec<Block> {
     let notes = [(pairing.is_common(), OF_BLOCKS), (few_terrains(groups).is_some(), FEW_TERRAINS)];
     let words = notes.iter().filter(|n| n.0).fold(WORDS.to_owned(), |words, (_, note)| format!("{words} {note}"));
@@ -31,9 +31,9 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> V
 fn without_estimate(groups: &[Group<MissionRow>]) -> &'static str {
     let one_outcome = |g: &Group<MissionRow>| g.rows.iter().all(|m| successful(m) == successful(g.rows[0]));
     if groups.iter().any(one_outcome) {
-        "The model has no finite estimate here: in a group every mission succeeded, or none did."
+        "The model has no finite estimate here: in at least one group, all missions or none succeeded."
     } else {
-        "The model has no finite estimate here: missions do not tell the scatter between terrains from that of the missions."
+        "The model has no finite estimate here: the data do not separate the variance between terrains from that between missions."
     }
 }
 
@@ -56,13 +56,13 @@ fn table(data: &Data, groups: &[Group<MissionRow>]) -> Option<TableBlock> {
     let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
     for (g, group) in groups.iter().enumerate().skip(1) {
         let weights: Vec<f64> = (0..groups.len()).map(|k| unit(k == g)).collect();
-        let term = format!("{} against {}", group.name, groups[0].name);
+        let term = format!("{} versus {}", group.name, groups[0].name);
         numbers.row(odds(&term, full.contrast(&weights)).into_iter().chain([Cell::Null, Cell::Null, Cell::Null]));
     }
-    numbers.row(std::iter::once(text("groups, all")).chain(vec![Cell::Null; 5]).chain(ratio(&full, &null)));
+    numbers.row(std::iter::once(text("all groups")).chain(vec![Cell::Null; 5]).chain(ratio(&full, &null)));
     if let Some(trend) = fit(groups, |g| vec![1.0, g as f64]).filter(|_| groups.len() > 2) {
         numbers.row(
-            odds("per group, in their order", trend.contrast(&[0.0, 1.0])).into_iter().chain(ratio(&trend, &null)),
+            odds("trend, per group in order", trend.contrast(&[0.0, 1.0])).into_iter().chain(ratio(&trend, &null)),
         );
     }
     let scatter = [number(full.deviation), number(full.deviation_error)];
@@ -95,7 +95,7 @@ fn fit(groups: &[Group<MissionRow>], covariates: impl Fn(usize) -> Vec<f64>) -> 
     Fit::of(&terrains.values().map(|t| t.iter().map(missions).collect()).collect::<Vec<_>>())
 }
 
-/// Term, odds ratio with its interval, coefficient with its error.
+/// Term, odds ratio with its interval, coefficient with its standard error.
 fn odds(term: &str, (coefficient, error): (f64, f64)) -> [Cell; 6] {
     let reach = normal::quantile(0.5 * (1.0 + LEVEL)) * error;
     let ratio = |log_odds: f64| number(libm::exp(log_odds));

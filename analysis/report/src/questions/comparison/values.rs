@@ -1,4 +1,4 @@
-//! What is compared: for every figure and group, one number per terrain, or per block of paired terrains.
+//! Values that are compared: for every metric and group, one number per terrain, or per block of paired terrains.
 
 use crate::data::Group;
 use crate::questions::clusters::{Pairing, block};
@@ -7,13 +7,13 @@ use sastrugi_schemas::study::Statistic;
 use sastrugi_schemas::tables::MissionRow;
 use std::collections::{BTreeMap, BTreeSet};
 
-/// A figure that is compared.
-pub struct Figure<'a> {
-    /// Words.
+/// A metric that is compared.
+pub struct Metric<'a> {
+    /// Name on the page.
     pub name: &'static str,
-    /// Unit as it is set in text.
+    /// Unit as set in text.
     pub unit: &'static str,
-    /// Name of its streams.
+    /// Column, which also names its random streams.
     pub column: &'static str,
     /// Its groups, in their order.
     pub groups: Vec<Values<'a>>,
@@ -21,7 +21,7 @@ pub struct Figure<'a> {
 
 /// Values of a group.
 pub struct Values<'a> {
-    /// Label of the group.
+    /// Label of the group, with the run where there are several.
     pub name: &'a str,
     /// Label alone.
     pub label: &'a str,
@@ -29,7 +29,7 @@ pub struct Values<'a> {
     pub run: Option<&'a str>,
     /// Values of the missions on each terrain.
     pub terrains: BTreeMap<&'a str, Vec<f64>>,
-    /// Values in each cluster, with the pair of each: of a terrain, or of a block where groups share draws.
+    /// Values in each cluster with the pair of each: a terrain, or a block where groups share draws.
     clusters: BTreeMap<&'a str, Vec<(&'a str, f64)>>,
     /// Pairs of all missions, whether they have a value or not.
     pairs: BTreeSet<&'a str>,
@@ -49,8 +49,8 @@ impl<'a> Values<'a> {
     }
 }
 
-/// What every report compares.
-const FIGURES: [Statistic; 5] = [
+/// Metrics that every report compares.
+const METRICS: [Statistic; 5] = [
     Statistic::Success,
     Statistic::RmsVerticalAccelerationMS2,
     Statistic::RmsPitchRateDegS,
@@ -58,19 +58,19 @@ const FIGURES: [Statistic; 5] = [
     Statistic::TimeS,
 ];
 
-/// Success, then every figure of the successful missions.
-pub fn figures<'a>(groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Figure<'a>> {
-    FIGURES.into_iter().map(|statistic| figure(statistic, groups, pairing)).collect()
+/// Success, then the metrics of the successful missions.
+pub fn metrics<'a>(groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Metric<'a>> {
+    METRICS.into_iter().map(|statistic| metric(statistic, groups, pairing)).collect()
 }
 
-/// One figure of all groups.
-pub fn figure<'a>(statistic: Statistic, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Figure<'a> {
+/// One metric of all groups.
+pub fn metric<'a>(statistic: Statistic, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Metric<'a> {
     let (name, unit) = words(statistic);
     let groups = groups.iter().map(|g| values(g, pairing, |m| statistic.of(m))).collect();
-    Figure { name, unit, column: statistic.column(), groups }
+    Metric { name, unit, column: statistic.column(), groups }
 }
 
-/// Name of a figure, and its unit as it is set in text.
+/// Name of a metric, and its unit as set in text.
 pub const fn words(statistic: Statistic) -> (&'static str, &'static str) {
     match statistic {
         Statistic::Success => ("success on a terrain", "%"),
@@ -95,7 +95,7 @@ fn values<'a>(
         if value.is_finite() {
             let terrain = mission.terrain_id.as_str();
             terrains.entry(terrain).or_default().push(value);
-            // By the mission's own pair: several tables of missions may lie on one terrain.
+            // By the mission's own pair: several runs may use one terrain.
             let cluster = if pairing.is_common() { block(&mission.pair_id) } else { terrain };
             clusters.entry(cluster).or_default().push((&mission.pair_id, value));
         }
@@ -107,14 +107,14 @@ fn values<'a>(
     Values { name, label, run, terrains, clusters, pairs, means }
 }
 
-/// True when all these groups have pairs in common, whatever became of their missions.
+/// True when all these groups have pairs in common, whatever the outcome of their missions.
 pub fn share_pairs(groups: &[&Values]) -> bool {
     let Some((first, others)) = groups.split_first() else { return false };
     first.pairs.iter().any(|pair| others.iter().all(|g| g.pairs.contains(pair)))
 }
 
-/// The clusters that all these groups have, for each its missions in every group. Where groups share pairs these are the pairs that have
-/// a value in all of them, in one order: means over the survivors of each group alone would compare other missions.
+/// The clusters that all these groups have, each with its missions in every group. Where groups share pairs, only pairs with a value
+/// in all groups are kept, in one order: means over the survivors of each group alone would compare different missions.
 pub fn common_missions(groups: &[&Values]) -> Vec<Vec<Vec<f64>>> {
     let Some((first, others)) = groups.split_first() else { return Vec::new() };
     let paired = share_pairs(groups);

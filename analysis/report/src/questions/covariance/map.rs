@@ -9,7 +9,7 @@ use crate::render::{colour, picture};
 use sastrugi_schemas::Cell;
 use sastrugi_schemas::tables::FitRow;
 
-/// Map of the lags; `None` without the file, or where all lags lie on one line (transects).
+/// Map over the lags; `None` without the file, or where all lags lie on one line (transects).
 pub fn figure(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> {
     let path = format!("fit/{}.covariance.tif", fit.fit_id);
     let Some(grid) = data.files.grid(&path)? else { return Ok(None) };
@@ -30,8 +30,8 @@ pub fn figure(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> 
     Ok(Some(Figure {
         id: slug(&format!("covariance-map-{}", fit.fit_id)),
         title: format!("Covariance at every lag, {}.", fit.fit_id),
-        caption: "Lag zero in the middle; round rings are those of an isotropic texture.".into(),
-        description: format!("Map of the covariance of {path} about lag zero: {}.", extent(&grid)),
+        caption: "Lag zero is at the centre; an isotropic texture gives circular rings.".into(),
+        description: format!("Map of the covariance {path} about lag zero: {}.", extent(&grid)),
         svg: Map::new(&picture, MAP_WIDTH, &key).svg,
         numbers,
     }))

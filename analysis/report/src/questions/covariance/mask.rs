@@ -1,4 +1,4 @@
-//! Which cells of the DEM a fit was made from.
+//! Which cells of the DEM a fit used.
 
 use crate::ReportError;
 use crate::content::{Figure, slug};

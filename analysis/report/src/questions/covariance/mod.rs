@@ -1,5 +1,5 @@
-//! How well each fit describes its measured DEM: what can be believed, the covariance with its models, the parameters of all
-//! fits side by side, the DEM and what was fitted of it.
+//! How well each fit describes its measured DEM: a verdict, the covariance with its models, the parameters of all fits side by
+//! side, and maps of the DEM, its background and its residual.
 
 mod map;
 mod mask;
@@ -23,7 +23,7 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{CovarianceRow, FitRow};
 use std::collections::BTreeSet;
 
-/// The fits of a DEM.
+/// Query for the fits of a DEM.
 fn of_dem(dem: &str) -> String {
     format!("select * from 'tables/fits/*.parquet' where dem_id = {}", quoted(dem))
 }
@@ -32,7 +32,7 @@ fn of_dem(dem: &str) -> String {
 pub const QUESTION: Question =
     Question { id: "covariance", name: "Fits", title: "How well do the fits describe the measured surface?", answer };
 
-/// Measured DEMs whose maps are drawn; the fits of all are in the table.
+/// Measured DEMs that are drawn; the table has the fits of all.
 const DEMS_MAX: usize = 4;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
@@ -46,7 +46,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
             blocks.push(Block::Text(verdict::paragraph(fit, &models::of_fit(data, fit), file.as_ref())));
         }
         let sentences = warnings(data, &fits)?;
-        let summary = format!("{} warnings about {}", set::count(sentences.len()), set::counted(fits.len(), "fit"));
+        let summary = format!("{} about {}", set::counted(sentences.len(), "warning"), set::counted(fits.len(), "fit"));
         blocks.push(Block::Warnings { summary, sentences });
         blocks.push(Block::Figures(covariances(data, &fits)));
         blocks.push(Block::Table(verdict::intervals(dem, &fits)));
@@ -57,7 +57,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     if dems.len() > DEMS_MAX {
         blocks.push(Block::Text(format!(
-            "The first {DEMS_MAX} of {} DEMs are drawn; the table holds all fits.",
+            "The first {DEMS_MAX} of {} DEMs are shown above; the table lists the fits of all.",
             dems.len()
         )));
     }
@@ -70,7 +70,7 @@ fn file(data: &Data, fit: &FitRow) -> Result<Option<FitFile>, ReportError> {
     data.files.fit(&format!("fit/{}.json", fit.fit_id))
 }
 
-/// What a reader must know, as full sentences, each once with the fits it concerns.
+/// Warnings as full sentences, each once, with the fits that it concerns.
 fn warnings(data: &Data, fits: &[&FitRow]) -> Result<Vec<String>, ReportError> {
     let mut sentences: Vec<(String, Vec<&str>)> = Vec::new();
     for fit in fits {
@@ -86,10 +86,10 @@ fn warnings(data: &Data, fits: &[&FitRow]) -> Result<Vec<String>, ReportError> {
     Ok(sentences.into_iter().map(|(sentence, of)| format!("{}: {sentence}", of.join(", "))).collect())
 }
 
-/// How sentences begin that begin with a symbol.
+/// Symbols at the start of a sentence, which keep their case.
 const SYMBOLS: [&str; 3] = ["b ", "sigma ", "sigma^2"];
 
-/// The words with a capital and a full stop; a symbol at the start stays as it is.
+/// The words with a capital and a full stop; a symbol at the start keeps its case.
 fn sentence(words: &str) -> String {
     let words = words.trim();
     let symbol = SYMBOLS.iter().any(|symbol| words.starts_with(symbol));
@@ -102,7 +102,7 @@ fn sentence(words: &str) -> String {
     format!("{start}{}{stop}", chars.as_str())
 }
 
-/// Bins of a fit in all directions together.
+/// Isotropic bins of a fit.
 fn rings<'a>(data: &'a Data, fit: &FitRow) -> Vec<&'a CovarianceRow> {
     let isotropic =
         |r: &&CovarianceRow| r.fit_id == fit.fit_id && r.azimuth_deg.is_none() && r.covariance_m2.is_finite();
@@ -112,7 +112,7 @@ fn rings<'a>(data: &'a Data, fit: &FitRow) -> Vec<&'a CovarianceRow> {
 fn covariances(data: &Data, fits: &[&FitRow]) -> Vec<Figure> {
     let drawn: Vec<(&FitRow, Vec<&CovarianceRow>)> =
         fits.iter().map(|f| (*f, rings(data, f))).filter(|(_, b)| !b.is_empty()).collect();
-    // Common axes, so that the modes can be compared by eye.
+    // Common axes, so that the fits can be compared by eye.
     let all = || drawn.iter().flat_map(|(_, bins)| bins.iter());
     let finite = |values: Vec<f64>| values.into_iter().filter(|v| v.is_finite());
     let values = || {
@@ -137,18 +137,18 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     let id = slug(&format!("covariance-{}", fit.fit_id));
     let seen = Stroke::new(Paint::Series(1), 2.0);
     let surface = Stroke::new(Paint::Series(0), 2.0).dashed("7 4");
-    // Closer than a line is wide.
+    // Closer than the width of a line.
     let close = 0.01 * bins.iter().map(|b| b.model_m2.abs()).fold(0.0, f64::max);
     let same = bins.iter().all(|b| (b.model_m2 - b.surface_model_m2).abs() <= close);
     let mut legend = vec![(Mark::Symbol(Symbol::Disc, Paint::Ink), "measured (area: pairs)".to_owned())];
     let banded = bins.iter().any(|b| b.covariance_low_m2.is_finite());
     if banded {
-        legend.push((Mark::Line(BAND), "95 % over the site".into()));
+        legend.push((Mark::Line(BAND), "95 % (jackknife)".into()));
     }
     match same {
         true => legend.push((Mark::Line(seen), "fitted model".into())),
         false => legend.extend([
-            (Mark::Line(seen), "model as the estimator sees it".into()),
+            (Mark::Line(seen), "model, detrended".into()),
             (Mark::Line(surface), "model of the surface".into()),
         ]),
     }
@@ -173,10 +173,10 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     figure(id, fit, bins, plot, banded)
 }
 
-/// Bars about the bins.
+/// Bars at the bins.
 const BAND: Stroke = Stroke { paint: Paint::Ink, width: 4.0, dash: "", opacity: 0.22 };
 
-/// Discs whose area grows with the number of pairs.
+/// Discs whose area increases with the number of pairs.
 fn draw_bins(plot: &mut Plot, bins: &[&CovarianceRow]) {
     let most = bins.iter().map(|b| b.pairs).max().unwrap_or(1).max(1) as f64;
     for bin in bins {
@@ -190,7 +190,7 @@ fn draw_bins(plot: &mut Plot, bins: &[&CovarianceRow]) {
 fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded: bool) -> Figure {
     let pairs = bins.iter().map(|b| b.pairs);
     let (fewest, most) = (pairs.clone().min().unwrap_or(0), pairs.max().unwrap_or(0));
-    let band = if banded { " Bars: how much tiles of the site differ (jackknife)." } else { "" };
+    let band = if banded { " Bars are 95 % intervals from a jackknife over tiles of the site." } else { "" };
     let caption = format!(
         "Covariance of the residual after a moving average of {} × {} m, {} model; {} to {} pairs of cells in a bin.{band}",
         set::significant(fit.window_x_m, 3),
@@ -222,7 +222,7 @@ fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded:
     Figure { id, title, caption, description, svg: plot.svg, numbers }
 }
 
-/// A parameter of every fit: name, unit, figure.
+/// A parameter of every fit: name, unit, value.
 type Parameter = (&'static str, &'static str, fn(&FitRow) -> f64);
 
 const PARAMETERS: [Parameter; 16] = [
@@ -236,9 +236,9 @@ const PARAMETERS: [Parameter; 16] = [
     ("trim level", "1", |f| f.trim_level),
     ("trim threshold", "m", |f| f.trim_threshold_m),
     ("share of cells used", "1", |f| f.used_share),
-    ("rms misfit of the bins", "m2", |f| f.misfit_m2),
-    ("rms height below the window", "m", |f| f.band_rms_m),
-    ("white noise of a cell", "m", |f| f.noise_sigma_m),
+    ("RMS misfit of the bins", "m2", |f| f.misfit_m2),
+    ("band RMS below the window", "m", |f| f.band_rms_m),
+    ("white noise per cell", "m", |f| f.noise_sigma_m),
     ("correlated noise", "m", |f| f.correlated_noise_sigma_m),
     ("range of correlated noise", "m", |f| f.correlated_noise_range_m),
     ("effective resolution", "m", |f| f.effective_resolution_m),
@@ -282,7 +282,7 @@ fn maps(data: &Data, dem: &str, fits: &[&FitRow]) -> Result<Vec<Figure>, ReportE
 
 fn background(data: &Data, fit: &FitRow, style: Option<Style>) -> Result<Option<Figure>, ReportError> {
     let id = slug(&format!("background-{}", fit.fit_id));
-    let caption = "Centred moving average: what is taken away before the covariance.".to_owned();
+    let caption = "Centred moving average, which is subtracted before the covariance is computed.".to_owned();
     let words = Words { id, title: format!("Background, {}.", fit.fit_id), caption };
     relief(data, &format!("fit/{}.background.tif", fit.fit_id), style, words)
 }
@@ -291,7 +291,7 @@ fn residual(data: &Data, fit: &FitRow) -> Result<Option<Figure>, ReportError> {
     let path = format!("fit/{}.residual.tif", fit.fit_id);
     let Some(grid) = data.files.grid(&path)? else { return Ok(None) };
     let caption = format!(
-        "DEM less background; {} of the cells entered the covariance, grey ones did not (no data, border, objects, trimmed).",
+        "DEM minus background. {} of the cells entered the covariance; grey cells did not (no data, border, objects, trimmed).",
         set::percent(fit.used_share, 1)
     );
     let id = slug(&format!("residual-{}", fit.fit_id));

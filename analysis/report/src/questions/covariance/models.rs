@@ -1,4 +1,4 @@
-//! The models that a fit tried, how its likelihood falls away, and the covariance by direction.
+//! The candidate models of a fit, its profile likelihood over the range, and the covariance by direction.
 
 use super::super::curves::HEIGHT;
 use super::of_dem;
@@ -14,16 +14,16 @@ use sastrugi_schemas::Cell;
 use sastrugi_schemas::tables::{CovarianceRow, FitRow};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// Candidates that are drawn; all are in the table.
+/// Candidates drawn; all are in the table.
 const CANDIDATES_MAX: usize = 6;
-/// Rise of the sum of squares at the edge of a 95 % interval (chi-squared, one degree of freedom).
+/// Rise of the sum of squares at the end of a 95 % interval (chi-squared, one degree of freedom).
 const EDGE: f64 = 3.84;
-/// Highest rise that is drawn over the edge of the interval.
+/// Largest rise that is drawn, as a multiple of the rise at the end of the interval.
 const RISE_MAX: f64 = 4.0;
-/// Dashes that tell lines apart without colour.
+/// Dashes that distinguish lines without colour.
 const DASHES: [&str; 6] = ["", "7 4", "2 3", "9 3 2 3", "4 2", "12 4"];
 
-/// Candidates, profile and directions of a fit, as far as it has them.
+/// Candidates, profile and directions of a fit, where it has them.
 pub fn figures(data: &Data, fit: &FitRow) -> Vec<Figure> {
     [candidates(data, fit), profile(data, fit), directions(data, fit)].into_iter().flatten().collect()
 }
@@ -32,7 +32,7 @@ fn line(i: usize) -> Stroke {
     Stroke::new(Paint::Series(i), 1.8).dashed(DASHES[i % DASHES.len()])
 }
 
-/// Every candidate over the measured covariance; none where only one was tried.
+/// Every candidate over the measured covariance; `None` where only one was tried.
 fn candidates(data: &Data, fit: &FitRow) -> Option<Figure> {
     let all = data.candidates_of(&fit.fit_id);
     let drawn: Vec<_> = all
@@ -70,15 +70,16 @@ fn candidates(data: &Data, fit: &FitRow) -> Option<Figure> {
     let rows = drawn.iter().flat_map(|(_, curve)| curve.iter().copied());
     Some(Figure {
         id,
-        title: format!("Models that {} tried.", fit.fit_id),
-        caption: "Each candidate after the same detrending and trimming as the data, the best by AICc first.".into(),
+        title: format!("Candidate models of {}.", fit.fit_id),
+        caption: "Each candidate after the same detrending and trimming as the data; the best by AICc comes first."
+            .into(),
         description: format!("Covariance against lag with {} candidate models.", drawn.len()),
         svg: plot.svg,
         numbers: Numbers::select(&query, rows, &names),
     })
 }
 
-/// How the sum of squares rises when the range is held elsewhere.
+/// Rise of the sum of squares when the range is fixed at other values.
 fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let points = data.profile_of(&fit.fit_id);
     if points.len() < 3 {
@@ -87,7 +88,7 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let id = slug(&format!("profile-{}", fit.fit_id));
     let ends = points.iter().fold((f64::INFINITY, 0.0f64), |(l, h), p| (l.min(p.range_m), h.max(p.range_m)));
     let highest = points.iter().map(|p| p.chi2_rise).fold(0.0, f64::max);
-    // A model that does not fit knows its parameters less well than its sum of squares says.
+    // If the model does not fit, its sum of squares overstates how well the parameters are known.
     let misfit = if fit.misfit_chi2_per_freedom > 1.0 { fit.misfit_chi2_per_freedom } else { 1.0 };
     let at_edge = EDGE * misfit;
     let top = highest.clamp(2.0 * at_edge, RISE_MAX * at_edge);
@@ -97,11 +98,11 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let ends_of_b: Vec<f64> =
         [fit.range_low_m, fit.range_high_m].into_iter().filter(|end| *end > 0.0 && end.is_finite()).collect();
     let mut legend =
-        vec![(Mark::Line(curve), "rise of the misfit".to_owned()), (Mark::Line(edge), "edge of 95 %".to_owned())];
+        vec![(Mark::Line(curve), "rise of χ²".to_owned()), (Mark::Line(edge), "95 % threshold".to_owned())];
     if !ends_of_b.is_empty() {
         legend.push((Mark::Line(interval), "ends of the interval".into()));
     }
-    let x = (Axis::log(ends.0 / 1.05, ends.1 * 1.05), "range b held, m");
+    let x = (Axis::log(ends.0 / 1.05, ends.1 * 1.05), "fixed range b, m");
     let y = (Axis::linear(0.0, 1.05 * top), "rise of χ²");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &legend);
     plot.clip(&format!("{id}-clip"));
@@ -121,10 +122,10 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let query = format!("fit_id = {} and range_m > 0 and isfinite(chi2_rise)", quoted(&fit.fit_id));
     Some(Figure {
         id,
-        title: format!("How sharply {} knows b.", fit.fit_id),
+        title: format!("How well {} constrains b.", fit.fit_id),
         caption: format!(
-            "Rise of the generalised sum of squares when b is held and everything else is fitted anew. The edge of a 95 % \
-             interval is at 3.84{allowance}. A flat curve: b cannot be told.{cut}"
+            "Rise of the generalised sum of squares when b is fixed and all other parameters are refitted. A 95 % interval ends \
+             at a rise of 3.84{allowance}. A flat curve means that b is not identified.{cut}"
         ),
         description: format!("Profile likelihood over ranges from {}.", span(ends)),
         svg: plot.svg,
@@ -174,14 +175,14 @@ fn directions(data: &Data, fit: &FitRow) -> Option<Figure> {
     Some(Figure {
         id,
         title: format!("Covariance by direction, {}.", fit.fit_id),
-        caption: format!("Sectors about azimuths clockwise from north, opposite directions together. {verdict}"),
+        caption: format!("Sectors centred on azimuths clockwise from north; opposite directions are pooled. {verdict}"),
         description: format!("Covariance against lag in {} directions. {verdict}", sectors.len()),
         svg: plot.svg,
         numbers: Numbers::select(&query, rows, &names),
     })
 }
 
-/// Every parameter of a fit's model with its unit; empty where the release does not say.
+/// Every parameter of a fit's model with its unit; empty where the release does not state them.
 pub fn of_fit(data: &Data, fit: &FitRow) -> Vec<(String, &'static str, f64)> {
     let first = data.candidates_of(&fit.fit_id).iter().find(|c| c.rank == 1);
     let all = first.map(|c| parameters(&c.parameters)).unwrap_or_default();
@@ -192,13 +193,13 @@ fn parameters(json: &str) -> BTreeMap<String, f64> {
     serde_json::from_str(json).unwrap_or_default()
 }
 
-/// The candidates of all fits of a DEM, one parameter a column; without rows where no fit had a choice.
+/// The candidates of all fits of a DEM, one column per parameter; without rows where every fit had a single candidate.
 pub fn table(data: &Data, dem: &str, fits: &[&FitRow]) -> TableBlock {
     let of_fit = |f: &&FitRow| data.candidates_of(&f.fit_id);
     let rows: Vec<_> = fits.iter().map(of_fit).filter(|all| all.len() > 1).flatten().collect();
     let names: BTreeSet<String> = rows.iter().flat_map(|c| parameters(&c.parameters).into_keys()).collect();
     let mut columns =
-        vec![("fit", ""), ("rank", ""), ("model", ""), ("AICc above best", "1"), ("χ²", "1"), ("free", "")];
+        vec![("fit", ""), ("rank", ""), ("model", ""), ("AICc above best", "1"), ("χ²", "1"), ("free parameters", "")];
     let units: Vec<(String, &str)> = names.iter().map(|n| (n.clone(), unit_of(n))).collect();
     columns.extend(units.iter().map(|(n, u)| (n.as_str(), *u)));
     let mut numbers = Numbers::computed(
@@ -212,7 +213,7 @@ pub fn table(data: &Data, dem: &str, fits: &[&FitRow]) -> TableBlock {
         let values = names.iter().map(|n| optional(own.get(n).copied()));
         numbers.row(first.into_iter().chain([Cell::I64(c.free)]).chain(values));
     }
-    let caption = format!("Models tried on {dem}");
+    let caption = format!("Candidate models for {dem}");
     TableBlock { id: slug(&format!("candidates-of-{dem}")), caption, numbers }
 }
 

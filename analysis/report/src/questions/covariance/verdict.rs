@@ -1,4 +1,4 @@
-//! What of a fit can be believed: its parameters with their intervals, and what the data says against it, in sentences.
+//! How far a fit can be trusted: its parameters with their intervals, and the tests that speak against it, in sentences.
 
 use super::of_dem;
 use crate::content::{Numbers, TableBlock, number, slug, text};
@@ -10,13 +10,13 @@ use sastrugi_schemas::tables::FitRow;
 const LEVEL: f64 = 0.01;
 /// Standard errors by which fits at other windows may differ.
 const WINDOWS_Z: f64 = 2.58;
-/// Ratio of ranges above which a direction is slight, whatever its p-value.
+/// Ratio of ranges above which anisotropy is called slight, whatever its p value.
 const SLIGHT_RATIO: f64 = 0.9;
-/// Spread of block sigmas below which it is slight, whatever its p-value.
+/// Ratio of block sigmas below which their spread is called slight, whatever its p value.
 const SLIGHT_SPREAD: f64 = 1.2;
 /// Width of an interval, high over low, beyond which a parameter is called poorly known.
 const WIDE: f64 = 2.0;
-/// Factor by which σ²/b moves between windows from which on that is said.
+/// Factor by which σ²/b varies between windows above which the paragraph states it.
 const SPREAD: f64 = 1.25;
 
 /// A parameter with its intervals: name in words, unit, estimate, parametric and block interval.
@@ -41,19 +41,19 @@ fn known([low, high]: [f64; 2]) -> bool {
     low.is_finite() && high.is_finite()
 }
 
-/// An interval in words, as after a value; `None` where there is none.
+/// An interval in words, to follow a value; `None` where there is none.
 fn interval_words([low, high]: [f64; 2], unit: &str) -> Option<String> {
     match (low > 0.0, high.is_finite()) {
         _ if low.is_nan() || high.is_nan() => None,
         (true, true) => Some(format!("{} to {}", set::significant(low, 3), set::with_unit(high, 3, unit))),
         (true, false) => Some(format!("at least {}", set::with_unit(low, 3, unit))),
         (false, true) => Some(format!("at most {}", set::with_unit(high, 3, unit))),
-        (false, false) => Some("anything".to_owned()),
+        (false, false) => Some("unbounded".to_owned()),
     }
 }
 
-/// The paragraph of one fit; `all` are the parameters of its model, `file` its fit file where the release has it: its verdict
-/// comes first, as `sastrugi fit` prints it.
+/// The paragraph on one fit. `all` are the parameters of its model; `file` is its fit file where the release has it, whose
+/// verdict comes first, as `sastrugi fit` prints it.
 pub fn paragraph(fit: &FitRow, all: &[(String, &str, f64)], file: Option<&FitFile>) -> String {
     let verdict = file.map(|f| f.verdict.clone()).filter(|verdict| !verdict.is_empty());
     let sentences = [
@@ -70,12 +70,12 @@ pub fn paragraph(fit: &FitRow, all: &[(String, &str, f64)], file: Option<&FitFil
     format!("{} ({} mode, {}): {}", fit.fit_id, fit.mode, fit.model, all.join(" "))
 }
 
-/// Figures that hold whatever the window, where σ and b do not.
+/// Quantities that do not depend on the window, where σ and b do.
 fn no_scale(fit: &FitRow) -> Option<String> {
     let disagree = fit.window_disagreement_z > WINDOWS_Z;
     disagree.then(|| {
         let below = format!(
-            "There is no one scale: the root mean square height below {} is {}",
+            "There is no scale separation: the band RMS below {} is {}",
             set::with_unit(fit.window_x_m, 3, "m"),
             set::with_unit(fit.band_rms_m, 3, "m")
         );
@@ -104,26 +104,26 @@ fn estimate(fit: &FitRow, all: &[(String, &str, f64)], file: Option<&FitFile>) -
     };
     let mut values: Vec<String> = parameters(fit).into_iter().filter(|p| p.2.is_finite()).map(one).collect();
     if values.is_empty() {
-        // A sum or a self-affine surface has no one σ and b; its intervals are in the file of the fit.
+        // A sum of models or a self-affine surface has no single σ and b; its intervals are in the fit file.
         values.extend(all.iter().map(|(name, unit, value)| match *unit {
             "1" => format!("{name} = {}", set::significant(*value, 3)),
             unit => format!("{name} = {}", set::with_unit(*value, 3, &set::unit(unit))),
         }));
     }
     if values.is_empty() {
-        return "Its parameters are in the file of the fit.".to_owned();
+        return "The parameters are in the fit file.".to_owned();
     }
     let values = values.join(", ");
     match fit.replicates {
         0 => format!("{values}, without intervals."),
         n => format!(
-            "{values}; {} intervals from {n} surfaces of the fitted model.",
+            "{values}; {} intervals from {n} surfaces simulated from the fitted model.",
             set::percent(fit.interval_level, 0)
         ),
     }
 }
 
-/// σ and b of a fit whose search for the range ended at its bound: at most their lower limits are known.
+/// σ and b of a fit whose search for the range ended at its bound: only a lower limit is known, if any.
 fn at_bound(file: &FitFile, name: &str) -> Option<String> {
     let parameter = match name {
         "σ" => "sigma_m",
@@ -153,7 +153,7 @@ fn poorly_known(fit: &FitRow, file: Option<&FitFile>) -> Option<String> {
             let factor = set::significant(high / low, 2);
             format!("b is known only to within a factor of {factor}; {ratio_words}.")
         }
-        _ => format!("The data set no upper limit on b; {ratio_words}."),
+        _ => format!("The data give no upper limit for b; {ratio_words}."),
     })
 }
 
@@ -164,7 +164,7 @@ fn model(fit: &FitRow) -> Option<String> {
             "The model does not describe the residual ({}): intervals that assume it are too narrow.",
             p_value(p)
         ),
-        false => format!("The misfit is no larger than chance makes it ({}).", p_value(p)),
+        false => format!("The misfit is no larger than expected by chance ({}).", p_value(p)),
     })
 }
 
@@ -179,21 +179,21 @@ fn window(fit: &FitRow) -> Option<String> {
     })
 }
 
-/// What the test of direction found.
+/// Result of the test of isotropy.
 pub fn direction(fit: &FitRow) -> Option<String> {
     let p = Some(fit.isotropy_p).filter(|p| p.is_finite())?;
     let longer = || {
         format!(
-            "({}): it is {} times as long along {}° from north as across",
+            "({}): its range along {}° from north is {} times the range across",
             p_value(p),
-            set::significant(1.0 / fit.isotropy_ratio, 3),
-            set::fixed(fit.isotropy_azimuth_deg, 0)
+            set::fixed(fit.isotropy_azimuth_deg, 0),
+            set::significant(1.0 / fit.isotropy_ratio, 3)
         )
     };
     Some(match p <= LEVEL {
-        true if fit.isotropy_ratio < SLIGHT_RATIO => format!("The texture has a direction {}.", longer()),
-        true => format!("The texture has a direction {}, which is slight.", longer()),
-        false => format!("No direction stands out ({}).", p_value(p)),
+        true if fit.isotropy_ratio < SLIGHT_RATIO => format!("The texture is anisotropic {}.", longer()),
+        true => format!("The texture is slightly anisotropic {}.", longer()),
+        false => format!("No anisotropy was detected ({}).", p_value(p)),
     })
 }
 
@@ -202,14 +202,14 @@ fn site(fit: &FitRow) -> Option<String> {
     let apart = set::significant(fit.block_sigma_max_over_min, 3);
     Some(match p <= LEVEL {
         true if fit.block_sigma_max_over_min <= SLIGHT_SPREAD => format!(
-            "Blocks of the site differ slightly: σ by a factor of {apart}, more than chance makes it ({}).",
+            "The site is slightly non-stationary: σ of its blocks differs by a factor of {apart}, more than by chance ({}).",
             p_value(p)
         ),
         true => {
-            format!("The site is not of one piece: σ of its blocks differs by a factor of {apart} ({}).", p_value(p))
+            format!("The site is not stationary: σ of its blocks differs by a factor of {apart} ({}).", p_value(p))
         }
         false => format!(
-            "Blocks of the site are alike: σ differs by a factor of {apart}, as chance makes it ({}).",
+            "The blocks of the site agree: their σ differs by a factor of {apart}, as expected by chance ({}).",
             p_value(p)
         ),
     })
@@ -218,8 +218,8 @@ fn site(fit: &FitRow) -> Option<String> {
 fn distribution(fit: &FitRow) -> Option<String> {
     let p = Some(fit.normality_p).filter(|p| p.is_finite())?;
     Some(match p <= 2.0 * LEVEL {
-        true => format!("Heights of the residual are not normal ({}).", p_value(p)),
-        false => format!("Heights of the residual are as normal ones would be ({}).", p_value(p)),
+        true => format!("The heights of the residual are not normally distributed ({}).", p_value(p)),
+        false => format!("The heights of the residual are compatible with a normal distribution ({}).", p_value(p)),
     })
 }
 
@@ -249,7 +249,7 @@ pub fn intervals(dem: &str, fits: &[&FitRow]) -> TableBlock {
             numbers.row([text(&fit.fit_id), text(name)].into_iter().chain(figures));
         }
     }
-    // A kind of interval that no fit has would be a column of dashes.
+    // A kind of interval that no fit has would be a column of dashes only.
     let alone = with_intervals.len() == 1;
     for column in (0..columns.len()).rev() {
         let absent = numbers.rows.iter().all(|row| row[column] == sastrugi_schemas::Cell::Null);
@@ -272,7 +272,7 @@ mod tests {
     use sastrugi_schemas::fit::{Diagnostics, Intervals};
 
     #[test]
-    fn val_sentences_say_what_the_row_says() {
+    fn val_sentences_agree_with_the_row() {
         let data = made_up::full(1, 24);
         let corrected = paragraph(&data.fits[0], &[], None);
         for part in [
@@ -280,9 +280,9 @@ mod tests {
             "95 % intervals from 99 surfaces",
             "does not describe the residual (p = 0.010)",
             "agree within their errors (1.2 standard errors)",
-            "(p < 0.0001): it is 1.41 times as long along 48° from north",
-            "not of one piece: σ of its blocks differs by a factor of 1.60",
-            "as normal ones would be (p = 0.40)",
+            "anisotropic (p < 0.0001): its range along 48° from north is 1.41 times the range across",
+            "not stationary: σ of its blocks differs by a factor of 1.60",
+            "compatible with a normal distribution (p = 0.40)",
         ] {
             assert!(corrected.contains(part), "{part} in {corrected}");
         }
@@ -301,10 +301,10 @@ mod tests {
         };
         let lost = paragraph(&lost, &[("hurst".into(), "1", 0.61)], None);
         for part in [
-            "There is no one scale: the root mean square height below 3034 m is 15.0 m, and increments grow as 0.500 m × \
+            "There is no scale separation: the band RMS below 3034 m is 15.0 m, and increments grow as 0.500 m × \
              (lag / 1 m)^0.60",
             "hurst = 0.610; 95 % intervals from 99 surfaces",
-            "which is slight",
+            "slightly anisotropic",
         ] {
             assert!(lost.contains(part), "{part} in {lost}");
         }

@@ -1,4 +1,4 @@
-//! Which items of the study failed: a release says so as soon as it is sealed.
+//! Which items of the study failed. A release lists them once it is sealed.
 
 use super::Question;
 use crate::ReportError;
@@ -26,7 +26,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
 pub(super) fn in_words(data: &Data) -> Option<String> {
     match data.failed.len() {
         0 => None,
-        1 => Some("1 item of the study failed and is not in any figure below.".to_owned()),
-        n => Some(format!("{} items of the study failed and are not in any figure below.", set::count(n))),
+        1 => Some("1 item of the study failed and is missing from this report.".to_owned()),
+        n => Some(format!("{} items of the study failed and are missing from this report.", set::count(n))),
     }
 }

@@ -1,4 +1,4 @@
-//! How well teams keep their formation: errors, separation and outcome by formation and group, errors over time, tracks.
+//! How well teams keep formation: errors, separation and outcome by formation and group, errors over time, tracks.
 
 use super::team::{IN_RANGE, Scene, TOLERABLE, errors, runs, tracks};
 use super::{Question, sql};
@@ -12,9 +12,9 @@ use std::collections::BTreeMap;
 
 /// Registry entry.
 pub const QUESTION: Question =
-    Question { id: "formations", name: "Formations", title: "Does the formation hold?", answer };
+    Question { id: "formations", name: "Formations", title: "Do the teams keep formation?", answer };
 
-/// Largest number of sets of runs that are drawn.
+/// Largest number of sets of runs drawn.
 const DRAWN_MAX: usize = 12;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
@@ -22,12 +22,13 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         return Ok(Vec::new());
     }
     let mut blocks = Vec::new();
-    blocks.extend(unfinished(data).map(Block::Warning));
     blocks.extend(verdict(data).map(Block::Text));
+    blocks.extend(unfinished(data).map(Block::Warning));
     blocks.push(Block::Text(format!(
-        "Errors are those of a follower's place beside its slot: depth along and width across its predecessor's direction of travel, mean absolute \
-         values over followers and time. In range means both at most {} of the spacing, tolerable at most {} (Bayrak, 2008, section 5.3). Figures of a \
-         group are means over its runs; the least separation is the smallest of all.",
+        "The error of a follower is its offset from its slot, along (depth) and across (width) its predecessor's direction of travel. \
+         Values are mean absolute errors over followers and time. A team is in range if both errors are at most {} of the spacing, and \
+         in tolerance if they are at most {} (Bayrak, 2008, section 5.3). Group values are means over runs; the least separation is the \
+         smallest over all runs.",
         set::percent(IN_RANGE, 0),
         set::percent(TOLERABLE, 0)
     )));
@@ -45,10 +46,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-const CURVES: &str = "Means over followers, then over runs, in sixty equal intervals of time; bands hold 5 to 95 % of the runs. Runs that have \
-ended drop out, so late times stand for the long runs alone.";
-const TRACKS: &str = "One run of each formation: the one with the middle depth error (the lower middle of an even number) among those that \
-arrived, or among all where none did. The window is fourteen spacings wide, about the leader halfway through the run.";
+const CURVES: &str = "Means over followers, then over runs, in sixty equal time intervals; bands hold 5 to 95 % of the runs. Runs that have \
+ended drop out, so late times represent only the long runs.";
+const TRACKS: &str = "One run of each formation: the one with the median depth error (the lower middle of an even number) among those that \
+arrived, or among all if none did. The window is fourteen spacings wide and centred on the leader halfway through the run.";
 
 fn section(blocks: &mut Vec<Block>, heading: &str, words: &str, figures: Vec<Figure>) {
     if !figures.is_empty() {
@@ -61,8 +62,8 @@ fn unfinished(data: &Data) -> Option<String> {
     let of = |outcome: &str| data.formations.iter().filter(|f| f.outcome == outcome).count();
     let words = [
         ("stuck", "stuck"),
-        ("timeout", "out of time"),
-        ("team_lost", "without members"),
+        ("timeout", "timed out"),
+        ("team_lost", "with all members lost"),
         ("no_path", "without a path"),
     ];
     let ends: Vec<String> = words
@@ -73,21 +74,21 @@ fn unfinished(data: &Data) -> Option<String> {
         .collect();
     (!ends.is_empty()).then(|| {
         format!(
-            "{} of {} runs did not arrive: {}. Their errors count up to where they ended.",
+            "{} of {} did not arrive: {}. The errors of such a run count until it ended.",
             set::count(data.formations.iter().filter(|f| f.outcome != "arrived").count()),
-            set::count(data.formations.len()),
+            set::counted(data.formations.len(), "run"),
             ends.join(", ")
         )
     })
 }
 
-/// Whether errors are tolerable, in a sentence; `None` where no run has followers.
+/// How much of the time errors are tolerable, in a sentence; `None` where no run has followers.
 fn verdict(data: &Data) -> Option<String> {
     let known: Vec<&FormationRow> = data.formations.iter().filter(|f| f.tolerable.is_finite()).collect();
     let share = |of: fn(&FormationRow) -> f64| sums::mean(&known.iter().map(|f| of(f)).collect::<Vec<_>>());
     (!known.is_empty()).then(|| {
         format!(
-            "Teams stay in tolerance {} of the time and in range {}, over {} with followers.",
+            "Teams stay in tolerance {} of the time and in range {} of the time, averaged over the {} with followers.",
             set::percent(share(|f| f.tolerable), 0),
             set::percent(share(|f| f.in_range), 0),
             set::counted(known.len(), "run")
@@ -97,7 +98,7 @@ fn verdict(data: &Data) -> Option<String> {
 
 /// How the teams fared; `None` without teams.
 pub(super) fn in_words(data: &Data) -> Option<String> {
-    let sentences: Vec<String> = [unfinished(data), verdict(data)].into_iter().flatten().collect();
+    let sentences: Vec<String> = [verdict(data), unfinished(data)].into_iter().flatten().collect();
     (!sentences.is_empty()).then(|| sentences.join(" "))
 }
 
@@ -184,7 +185,7 @@ fn curve(data: &Data, set: &Set) -> Result<Option<Figure>, ReportError> {
     Ok(errors(slug(&format!("formation-errors-{}", set.name)), words, &series, "time, s", samples_of(set)))
 }
 
-/// Query of the samples of a set of runs.
+/// Query for the samples of a set of runs.
 fn samples_of(set: &Set) -> String {
     let ids: Vec<String> = set
         .runs

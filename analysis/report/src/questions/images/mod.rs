@@ -1,4 +1,4 @@
-//! What cameras see: the rendered images of the release.
+//! What the cameras see: the rendered images of the release.
 
 use super::Question;
 use super::relief::MAP_WIDTH;
@@ -10,19 +10,20 @@ use crate::render::svg::Svg;
 use crate::render::{number as set, picture};
 use sastrugi_imaging::display;
 use sastrugi_schemas::tables::ImageRow;
+use std::collections::BTreeSet;
 
 /// Registry entry.
-pub const QUESTION: Question = Question { id: "images", name: "Images", title: "What do cameras see?", answer };
+pub const QUESTION: Question = Question { id: "images", name: "Images", title: "What do the cameras see?", answer };
 
-/// Images that are drawn; all are in the table.
+/// Images drawn; all are in the table.
 const DRAWN_MAX: usize = 12;
 /// Largest number of rows or columns of a picture.
 const PIXELS: usize = 640;
 /// Camera whose images are maps.
 const NADIR: &str = "nadir";
-const WORDS: &str = "Brightness is that of the ground over that of a white Lambert surface that faces the sun (I/F): 35 % Lambert, 65 % \
-Lommel-Seeliger unless the study says otherwise. Cast shadows are black; pixels that see no ground are left out. Each picture has its own white, \
-the brightness that one pixel in 200 exceeds, and a screen's gamma of 2.2.";
+const WORDS: &str = "Brightness is the radiance of the ground over that of a white Lambert surface facing the sun (I/F). The ground \
+scatters 35 % Lambert and 65 % Lommel-Seeliger unless the study states otherwise. Cast shadows are black; pixels that see no ground \
+are left out. Each picture has its own white point, the brightness that one pixel in 200 exceeds, and a display gamma of 2.2.";
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     if data.images.is_empty() {
@@ -32,11 +33,17 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     for image in data.images.iter().take(DRAWN_MAX) {
         figures.extend(figure(data, image)?);
     }
-    let mut blocks = vec![Block::Text(WORDS.into())];
-    if data.images.len() > DRAWN_MAX {
-        let all = data.images.len();
-        blocks.push(Block::Text(format!("The first {DRAWN_MAX} of {all} images are drawn; all are in the table.")));
-    }
+    let surfaces = data.images.iter().map(|i| i.surface_id.as_str()).collect::<BTreeSet<_>>().len();
+    let shown = match data.images.len() > DRAWN_MAX {
+        true => format!(" The first {DRAWN_MAX} are shown; the table lists all."),
+        false => String::new(),
+    };
+    let holds = format!(
+        "The release has {} of {}.{shown}",
+        set::counted(data.images.len(), "rendered image"),
+        set::counted(surfaces, "surface")
+    );
+    let mut blocks = vec![Block::Text(holds), Block::Text(WORDS.into())];
     blocks.push(Block::Figures(figures));
     blocks.push(Block::Table(table(data)));
     Ok(blocks)
@@ -59,7 +66,7 @@ fn figure(data: &Data, image: &ImageRow) -> Result<Option<Figure>, ReportError> 
     }))
 }
 
-/// A picture without scale: its pixels are of no one size on the ground.
+/// A picture without a scale: the ground size of its pixels varies.
 fn plain(picture: &picture::Picture) -> Svg {
     let [width, height] = picture.size_m;
     let size = (MAP_WIDTH, MAP_WIDTH * height / width);
@@ -69,7 +76,7 @@ fn plain(picture: &picture::Picture) -> Svg {
 }
 
 fn caption(image: &ImageRow) -> String {
-    let albedo = if image.has_albedo_map { "albedo by its map" } else { "one albedo" };
+    let albedo = if image.has_albedo_map { "albedo from its map" } else { "uniform albedo" };
     let pixel = if image.pixel_m.is_finite() {
         format!(", pixels of {}", set::with_unit(image.pixel_m, 3, "m"))
     } else {
@@ -108,5 +115,5 @@ fn table(data: &Data) -> TableBlock {
             number(100.0 * image.share_without_ground),
         ]);
     }
-    TableBlock { id: "images".into(), caption: "Rendered images.".into(), numbers }
+    TableBlock { id: "images".into(), caption: "Rendered images".into(), numbers }
 }

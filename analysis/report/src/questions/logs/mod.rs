@@ -1,4 +1,4 @@
-//! Whether missions are like logs of real drives: where each log's figures fall among those of the missions.
+//! Do missions match the logs of real drives? The rank of each log's metrics among those of the missions.
 
 use super::Question;
 use super::clusters::LEVEL;
@@ -19,23 +19,23 @@ use std::collections::{BTreeMap, BTreeSet};
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "logs", name: "Logs", title: "Do the missions match the logs?", answer };
 
-/// What counts as the middle of the missions, %.
+/// Percentiles that bound the middle of the missions.
 const MIDDLE: [f64; 2] = [2.5, 97.5];
 const BELOW: &str = "below the missions";
 const ABOVE: &str = "above the missions";
 const TOO_FEW: &str = "cannot tell: at the edge, and too few terrains";
-/// Logs that are drawn; all are in the table.
+/// Logs drawn; all are in the table.
 const DRAWN_MAX: usize = 6;
-/// Groups that a chart tells apart.
+/// Marks that distinguish groups in a chart.
 const SYMBOLS: [Symbol; 4] = [Symbol::Disc, Symbol::Square, Symbol::Triangle, Symbol::Diamond];
 
-/// A figure that missions and logs have in common.
+/// A metric that missions and logs have in common.
 struct Shared {
     column: &'static str,
     name: &'static str,
     unit: &'static str,
     of_mission: fn(&MissionRow) -> f64,
-    /// Value, noise floor (NaN where none is known), and whether it tells.
+    /// Value, noise floor (NaN if unknown), and whether the value is above the noise.
     of_log: fn(&LogRow) -> (f64, f64, bool),
 }
 
@@ -100,7 +100,7 @@ const SHARED: [Shared; 8] = [
     },
 ];
 
-/// A log's figure beside the missions of a group.
+/// A metric of a log compared with the missions of a group.
 struct Placed<'a> {
     /// Number of the log among all.
     log: usize,
@@ -115,7 +115,7 @@ struct Placed<'a> {
     /// 5th, 50th and 95th percentile of the missions.
     spread: [f64; 3],
     place: Option<Place>,
-    /// Why the log is no drive to its goal.
+    /// Why the log is not a complete drive to a goal.
     unfinished: Option<String>,
 }
 
@@ -123,10 +123,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let Some(logs) = &data.logs else { return Ok(Vec::new()) };
     let groups = data.mission_groups();
     if logs.is_empty() {
-        return Ok(vec![Block::Warning("The tables of logs hold no log.".into())]);
+        return Ok(vec![Block::Warning("The tables given with --logs are empty.".into())]);
     }
     if groups.is_empty() {
-        return Ok(vec![Block::Warning("The release has no missions to put beside the logs.".into())]);
+        return Ok(vec![Block::Warning("The release has no missions to compare the logs with.".into())]);
     }
     let logs = &named(logs);
     let placed = placed(logs, &groups);
@@ -139,10 +139,9 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// Every log once, named by as many parts of its path from the end as tell it from the others: a page says nothing of the machine
-/// that it was made on.
+/// Every log once, named by the shortest end of its path that is unique: the page must not reveal the machine it was made on.
 fn named(logs: &[LogRow]) -> Vec<LogRow> {
-    // Unknown figures are NaN, which is equal to nothing: rows are told apart by their words.
+    // Unknown values are NaN, which equals nothing, so rows are compared as text.
     let mut seen = BTreeSet::new();
     let all: Vec<LogRow> = logs.iter().filter(|log| seen.insert(format!("{log:?}"))).cloned().collect();
     let tail = |id: &str, parts: usize| {
@@ -155,7 +154,7 @@ fn named(logs: &[LogRow]) -> Vec<LogRow> {
         let parts = (1..64).find(|&n| others().all(|other| tail(other, n) != tail(id, n)));
         tail(id, parts.unwrap_or(64))
     };
-    // The same log analysed twice, in two ways.
+    // The same log, analysed more than once with different settings.
     let again = |k: usize| match ids[..k].iter().filter(|id| **id == ids[k]).count() {
         0 => String::new(),
         n => format!(" ({})", n + 1),
@@ -164,7 +163,7 @@ fn named(logs: &[LogRow]) -> Vec<LogRow> {
     all.into_iter().zip(names).map(|(log, log_id)| LogRow { log_id, ..log }).collect()
 }
 
-/// Every figure of every log beside the group that the log names, or beside every group.
+/// Every metric of every log, compared with the group that the log names, or with every group.
 fn placed<'a>(logs: &'a [LogRow], groups: &'a [Group<'a, MissionRow>]) -> Vec<Placed<'a>> {
     let mut placed = Vec::new();
     for (log, row) in logs.iter().enumerate() {
@@ -208,14 +207,14 @@ fn place<'a>((log, row): (usize, &'a LogRow), group: &'a Group<'a, MissionRow>, 
     }
 }
 
-/// Figures of a drive that broke off or failed are not those of drives to the goal, which the missions are.
+/// Why a log cannot be compared with successful missions: it is incomplete, or its drive failed.
 fn unfinished(log: &LogRow) -> Option<String> {
     let failed = log.outcome.as_deref().filter(|outcome| *outcome != outcome::ALL[0].word);
     let words =
         |outcome: &str| outcome::ALL.iter().find(|o| o.word == outcome).map_or(outcome.to_owned(), |o| o.name.into());
     match (&log.broken, failed) {
-        (Some(_), _) => Some("not judged: the log broke off".into()),
-        (None, Some(outcome)) => Some(format!("not judged: it ended as {}", words(outcome))),
+        (Some(_), _) => Some("not judged: the log is incomplete".into()),
+        (None, Some(outcome)) => Some(format!("not judged: outcome {}", words(outcome))),
         (None, None) => None,
     }
 }
@@ -226,7 +225,7 @@ impl Placed<'_> {
         let inside = (MIDDLE[0]..=MIDDLE[1]).contains(&(100.0 * place.share_below.estimate));
         match &self.unfinished {
             Some(why) => why,
-            None if !self.tells => "cannot tell: below three noise floors",
+            None if !self.tells => "cannot tell: below three times the noise floor",
             None if place.p() <= ALPHA && place.p_above < place.p_below => ABOVE,
             None if place.p() <= ALPHA => BELOW,
             None if inside => "within the middle 95 %",
@@ -237,9 +236,16 @@ impl Placed<'_> {
 }
 
 fn in_words(placed: &[Placed]) -> String {
-    let words = ["within the middle 95 %", BELOW, ABOVE, "cannot tell", "not judged", "no value"];
-    let part = |word: &&str| {
-        let n = placed.iter().filter(|p| p.verdict().starts_with(word)).count();
+    let words = [
+        ("within the middle 95 %", "within the middle 95 % of the missions"),
+        (BELOW, BELOW),
+        (ABOVE, ABOVE),
+        ("cannot tell", "undecided"),
+        ("not judged", "not judged"),
+        ("no value", "without a value"),
+    ];
+    let part = |(verdict, word): &(&str, &str)| {
+        let n = placed.iter().filter(|p| p.verdict().starts_with(verdict)).count();
         (n > 0).then(|| format!("{} {word}", set::count(n)))
     };
     let logs = placed.iter().map(|p| p.log).max().map_or(0, |last| last + 1);
@@ -247,16 +253,16 @@ fn in_words(placed: &[Placed]) -> String {
     let told = |p: &&Placed| p.tells && p.unfinished.is_none() && p.place.is_some_and(|place| place.least_p() <= ALPHA);
     let judged = placed.iter().filter(told).count();
     format!(
-        "{} of {}, each beside a group of missions: {}.{}",
-        set::counted(placed.len(), "figure"),
+        "{} of {} with groups of missions, metric by metric: {}.{}",
+        set::counted(placed.len(), "comparison"),
         set::counted(logs, "log"),
         parts.join(", "),
         match judged {
             0 => String::new(),
             n => format!(
-                " Of {} of drives like the missions, about {} would be below or above them by chance.",
-                set::counted(n, "figure"),
-                set::plain(ALPHA * n as f64, 2)
+                " If the drives were like the missions, about {} of the {} that can be decided would be below or above them by chance.",
+                set::plain(ALPHA * n as f64, 2),
+                set::counted(n, "comparison")
             ),
         }
     )
@@ -264,20 +270,21 @@ fn in_words(placed: &[Placed]) -> String {
 
 fn introduction() -> String {
     format!(
-        "Columns of the same name mean the same in the tables missions and logs (sastrugi analyze). Beside each figure of a log stand the missions that \
-         reached their goal: their 5th, 50th and 95th percentile, and the place of the log among them, which is the share of missions below it \
-         (every terrain weighs the same, equal ones count half), with a {} % interval over terrains (Clopper and Pearson's). p says how often one \
-         more drive, on one more terrain of the kind, would lie so far out (a rank among terrains, Lee, Barber and Willett; two-sided, not \
-         adjusted). A log is below or above the missions where p is at most {}, and elsewhere within their middle 95 % where its place is; p is never under 2 / (terrains + 1), so that it takes {} terrains to say \
-         so. One log is one drive: it may be an odd one. Below three noise floors the log itself cannot tell, and a log that broke off or \
-         failed is not judged. A log that names a group stands beside that group only. Exploratory.",
+        "Columns of the same name have the same meaning in the tables missions and logs (sastrugi analyze). Each metric of a log is compared \
+         with the missions that reached their goal: the table gives their 5th, 50th and 95th percentile and the share of missions below the log \
+         (every terrain has the same weight, ties count half), with a {} % interval over terrains (Clopper and Pearson's). p is the probability \
+         that one more drive, on one more terrain of the kind, would lie as far out (a rank among terrains, Lee, Barber and Willett; two-sided, \
+         not adjusted). A log is below or above the missions if p is at most {}; otherwise it is within their middle 95 % if its share is. p is \
+         never below 2 / (terrains + 1), so at least {} terrains are needed to find a log below or above. One log is one drive and may be \
+         atypical. Below three times its noise floor, a metric cannot tell; a log that is incomplete or failed is not judged. A log that names a \
+         group is compared with that group only. Exploratory.",
         set::fixed(100.0 * LEVEL, 0),
         set::plain(ALPHA, 2),
         set::fixed((2.0 / ALPHA - 1.0).ceil(), 0),
     )
 }
 
-/// Groups with fewer terrains than any p could show.
+/// Groups with too few terrains for a significant p.
 fn too_few(placed: &[Placed]) -> Option<String> {
     let few = |p: &&Placed| p.place.is_some_and(|place| place.least_p() > ALPHA);
     let groups: BTreeMap<&str, usize> =
@@ -285,18 +292,18 @@ fn too_few(placed: &[Placed]) -> Option<String> {
     let list: Vec<String> =
         groups.iter().map(|(group, n)| format!("{group} ({})", set::counted(*n, "terrain"))).collect();
     (!list.is_empty())
-        .then(|| format!("Too few terrains to say of a drive that it is unlike the missions: {}.", list.join(", ")))
+        .then(|| format!("Too few terrains to show that a drive differs from the missions: {}.", list.join(", ")))
 }
 
-/// Root mean squares of derivatives grow with the rate of the samples.
+/// Logs sampled at another rate than the missions: the RMS of a derivative grows with the sample rate.
 fn rates(data: &Data, logs: &[LogRow]) -> Option<String> {
     let missions = data.missions.first()?.sample_rate_hz;
     let other = |log: &&LogRow| (log.sample_rate_hz / missions - 1.0).abs() > 0.01;
     let logs: Vec<&str> = logs.iter().filter(other).map(|log| log.log_id.as_str()).collect();
     (!logs.is_empty()).then(|| {
         format!(
-            "Sampled at another rate than the missions ({} Hz), so that accelerations and rates are not of one band: {}. Analyse \
-             these logs with --rate.",
+            "Sampled at another rate than the missions ({} Hz), so that accelerations and angular rates cover different bands: {}. \
+             Analyse these logs with --rate.",
             set::plain(missions, 4),
             logs.join(", ")
         )
@@ -308,7 +315,7 @@ fn drawings(placed: &[Placed]) -> Vec<Figure> {
     (0..DRAWN_MAX).map(of_log).filter(|p| !p.is_empty()).map(|p| drawing(&p)).collect()
 }
 
-/// The places of a log: a row for each figure, a mark for each group.
+/// The rank of a log: a row for each metric, a mark for each group.
 fn drawing(placed: &[&Placed]) -> Figure {
     let mut figures: Vec<&Shared> = Vec::new();
     let mut groups: Vec<(usize, &str)> = Vec::new();
@@ -355,10 +362,10 @@ fn drawing(placed: &[&Placed]) -> Figure {
     Figure {
         id: format!("log-{log_id}"),
         title: format!("Where {log_id} falls among the missions."),
-        caption: "Marks are the share of missions below the log, lines 95 % intervals over terrains; between the two upright lines lie \
-                  the middle 95 % of the missions. Grey: the log cannot tell, or is not judged."
+        caption: "Marks are the share of missions below the log; lines are 95 % intervals over terrains. The middle 95 % of the missions \
+                  lie between the two vertical lines. Grey: the log cannot tell, or is not judged."
             .into(),
-        description: format!("Share of missions below the figures of the log. {}.", parts.join("; ")),
+        description: format!("Share of missions below the log, by metric. {}.", parts.join("; ")),
         svg: rows.svg,
         numbers: numbers(placed.iter().copied()),
     }
@@ -372,7 +379,7 @@ fn in_percent(share: Interval) -> Interval {
 fn numbers<'a>(placed: impl Iterator<Item = &'a Placed<'a>>) -> Numbers {
     let columns = [
         ("log", ""),
-        ("figure", ""),
+        ("metric", ""),
         ("group", ""),
         ("verdict", ""),
         ("unit", ""),
@@ -388,7 +395,7 @@ fn numbers<'a>(placed: impl Iterator<Item = &'a Placed<'a>>) -> Numbers {
         ("missions", ""),
         ("terrains", ""),
     ];
-    let query = "LOGS.parquet of --logs, beside tables/missions";
+    let query = "LOGS.parquet of --logs, with tables/missions";
     let mut numbers = Numbers::of_file(query, &columns).with_mixed_units();
     for p in placed {
         let head = [text(p.log_id), text(p.shared.name), text(p.group), text(p.verdict()), text(p.shared.unit)];
@@ -404,11 +411,11 @@ fn numbers<'a>(placed: impl Iterator<Item = &'a Placed<'a>>) -> Numbers {
 }
 
 fn table(placed: &[Placed]) -> TableBlock {
-    let caption = "Figures of the logs beside the missions".into();
+    let caption = "Metrics of the logs compared with the missions".into();
     TableBlock { id: "logs-beside-missions".into(), caption, numbers: numbers(placed.iter()) }
 }
 
-/// What `analyze` says of each log.
+/// What `analyze` found out about each log.
 fn all(logs: &[LogRow]) -> TableBlock {
     let names = [
         "log_id",
@@ -427,7 +434,7 @@ fn all(logs: &[LogRow]) -> TableBlock {
     ];
     let table = Numbers::select("", logs, &names);
     let numbers = Numbers { query: "LOGS.parquet of --logs".into(), gives: Gives::File, ..table };
-    TableBlock { id: "logs".into(), caption: "The logs".into(), numbers }
+    TableBlock { id: "logs".into(), caption: "All logs".into(), numbers }
 }
 
 #[cfg(test)]
@@ -435,7 +442,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn val_logs_are_named_by_what_tells_them_apart() {
+    fn val_logs_have_the_shortest_unique_names() {
         let log =
             |log_id: &str, samples: i64| LogRow { log_id: log_id.into(), samples, ..crate::tests::made_up::log() };
         let logs = [("/data/a/run.mcap", 1), ("/data/b/run.mcap", 1), ("c.mcap", 1), ("c.mcap", 2), ("c.mcap", 1)];

@@ -1,4 +1,4 @@
-//! What the loss of a member does to a team: errors about the loss, time until the team is back in tolerance, tracks, events.
+//! How the loss of a member affects a team: errors around the loss, time to return to tolerance, tracks, events.
 
 use super::Question;
 use super::clusters::{Clusters, LEVEL, stream};
@@ -13,13 +13,14 @@ use sastrugi_schemas::tables::{FormationEventRow, FormationRow};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Registry entry.
-pub const QUESTION: Question = Question { id: "losses", name: "Losses", title: "What does a loss do?", answer };
+pub const QUESTION: Question =
+    Question { id: "losses", name: "Losses", title: "Do teams recover from the loss of a member?", answer };
 
-/// How long a team must stay in tolerance to count as back, s.
+/// How long a team must stay in tolerance to count as recovered, s.
 const HOLD_S: f64 = 5.0;
-/// Time before and after a loss that is drawn, s.
+/// Time drawn before and after a loss, s.
 const WINDOW_S: [f64; 2] = [10.0, 60.0];
-/// Stands for a return that never comes: longer than any run, finite so that medians and redraws order it.
+/// Recovery time of a team that does not recover: longer than any run, but finite, so that medians and bootstrap samples sort it.
 const NEVER_S: f64 = 1e12;
 /// Largest number of losses whose tracks are drawn.
 const TRACKS_MAX: usize = 3;
@@ -33,8 +34,8 @@ struct Loss<'a> {
 }
 
 impl Loss<'_> {
-    /// Time until the team is in tolerance and stays there for [`HOLD_S`]; `None` where that does not come before the next loss or the end,
-    /// or where nobody follows.
+    /// Time until the team is in tolerance and stays there for [`HOLD_S`]; `None` if that does not happen before the next loss or the
+    /// end of the run, or if there are no followers.
     fn recovery_s(&self) -> Option<f64> {
         let after: Vec<&Instant> = self.instants.iter().filter(|i| i.time_s >= 0.0).collect();
         let within = |i: &&Instant| i.worst_m <= TOLERABLE * self.run.spacing_m;
@@ -43,7 +44,7 @@ impl Loss<'_> {
         Some(held[0].time_s)
     }
 
-    /// True where the team was in tolerance just before the loss; `None` without followers then.
+    /// True if the team was in tolerance just before the loss; `None` if it had no followers then.
     fn in_tolerance_before(&self) -> Option<bool> {
         let last = self.instants.iter().rfind(|i| i.time_s < 0.0)?;
         Some(last.worst_m <= TOLERABLE * self.run.spacing_m)
@@ -62,7 +63,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let maps = maps(data, &losses)?;
     if !maps.is_empty() {
         let words = format!(
-            "{} of {}: those with the shortest, the middle and the longest time until the team was back in tolerance, as far as there are such. \
+            "{} of {}: those with the shortest, the median and the longest time until the team returned to tolerance, where they differ. \
              Members are marked at the loss; the window is fourteen spacings wide.",
             set::count(maps.len()),
             counted(losses.len())
@@ -92,7 +93,7 @@ fn losses<'a>(data: &'a Data, runs: &[Run<'a>]) -> Vec<Loss<'a>> {
     losses
 }
 
-/// Losses whose recovery can be told: members follow and the spacing is known.
+/// Losses whose recovery can be determined: the team has followers and its spacing is known.
 fn telling<'a, 'b>(losses: &'b [Loss<'a>]) -> Vec<&'b Loss<'a>> {
     let tells = |l: &&Loss| l.run.spacing_m > 0.0 && l.instants.iter().any(|i| i.time_s >= 0.0);
     losses.iter().filter(tells).collect()
@@ -103,25 +104,31 @@ fn verdict(data: &Data, losses: &[Loss], rows: &[&FormationRow]) -> String {
     let telling = telling(losses);
     let before = telling.iter().filter(|l| l.in_tolerance_before() == Some(true)).count();
     let back: Vec<f64> = telling.iter().filter_map(|l| l.recovery_s()).collect();
-    let introduction =
-        format!("{} lost in {}.", set::counted(count_of(lost), "member"), set::counted(rows.len(), "run"));
+    let members = set::counted(count_of(lost), "member");
+    let were = if lost == 1 { "was" } else { "were" };
+    let introduction = format!("{members} {were} lost in {}.", set::counted(rows.len(), "run"));
     if telling.is_empty() {
-        return format!("{introduction} No recording tells what followed.");
+        return format!("{introduction} No recording shows what followed.");
     }
     let time = match back.is_empty() {
-        true => "No team came back into tolerance.".to_owned(),
+        true => "No team returned to tolerance.".to_owned(),
         false => format!(
-            "{} of {} came back into tolerance ({} of the spacing, every follower, for at least {} s): median time {}{}, losses without a return \
-             counted as longer than any.",
+            "After {} of {}, the team returned to tolerance ({} of the spacing, every follower, for at least {} s); the median time is {}{}, \
+             counting losses without a return as longer than any.",
             set::count(back.len()),
-            set::counted(telling.len(), "team"),
+            counted(telling.len()),
             set::percent(TOLERABLE, 0),
             set::fixed(HOLD_S, 0),
             time_words(sums::median(&recoveries(&telling).iter().map(|r| r.1).collect::<Vec<_>>())),
             interval_words(data, &telling)
         ),
     };
-    format!("{introduction} {time} {} were in tolerance just before the loss.", set::count(before))
+    let before = match before {
+        0 => "No team was".to_owned(),
+        1 => "1 team was".to_owned(),
+        n => format!("{} teams were", set::count(n)),
+    };
+    format!("{introduction} {time} {before} in tolerance just before the loss.")
 }
 
 fn count_of(n: i64) -> usize {
@@ -133,7 +140,7 @@ fn counted(losses: usize) -> String {
     if losses == 1 { "1 loss".into() } else { format!("{} losses", set::count(losses)) }
 }
 
-/// Recovery of each loss with its terrain; [`NEVER_S`] where the team does not come back.
+/// Recovery time after each loss, with its terrain; [`NEVER_S`] if the team does not recover.
 fn recoveries<'a>(losses: &[&Loss<'a>]) -> Vec<(&'a str, f64)> {
     losses.iter().map(|l| (l.run.terrain_id.as_str(), l.recovery_s().unwrap_or(NEVER_S))).collect()
 }
@@ -147,13 +154,13 @@ fn interval_words(data: &Data, losses: &[&Loss]) -> String {
     let items = recoveries(losses);
     let terrains = items.iter().map(|i| i.0).collect::<BTreeSet<_>>().len();
     if terrains < TERRAINS_MIN {
-        return format!(" (no interval: {} are too few)", set::counted(terrains, "terrain"));
+        return format!(" (no interval: only {})", set::counted(terrains, "terrain"));
     }
     let mut stream = stream(data, "losses", "recovery");
     let interval = Clusters::new(&[items]).interval(&mut stream, LEVEL, |pooled| sums::median(&pooled[0]));
     interval.map_or_else(String::new, |i| {
         format!(
-            " ({} % interval {} to {}, terrains drawn anew)",
+            " ({} % interval {} to {}, resampling terrains)",
             set::fixed(100.0 * LEVEL, 0),
             time_words(i.low),
             time_words(i.high)
@@ -200,7 +207,7 @@ fn table(data: &Data, losses: &[Loss]) -> TableBlock {
     TableBlock { id: "losses".into(), caption: "Losses".into(), numbers }
 }
 
-/// Sentences of the rearrangements at the time of a loss.
+/// Descriptions of the rearrangements after a loss.
 fn rearranged(data: &Data, loss: &Loss) -> String {
     let event = loss.event;
     let own = |e: &&FormationEventRow| {
@@ -215,7 +222,7 @@ fn rearranged(data: &Data, loss: &Loss) -> String {
     if words.is_empty() { set::ABSENT.into() } else { words.join(" ") }
 }
 
-/// Errors about the losses of each formation.
+/// Errors around the losses of each formation.
 fn curves(losses: &[Loss]) -> Vec<Figure> {
     let mut formations: BTreeMap<&str, Vec<Vec<Instant>>> = BTreeMap::new();
     for loss in losses {
@@ -224,17 +231,17 @@ fn curves(losses: &[Loss]) -> Vec<Figure> {
     }
     let figure = |(formation, series): (&str, Vec<Vec<Instant>>)| {
         let caption = format!(
-            "{}. Means over followers and losses; the band holds 5 to 95 % of the losses. A loss leaves the mean at the next loss of its run.",
+            "{}. Means over followers and losses; the band holds 5 to 95 % of the losses. A loss drops out at the next loss of its run.",
             counted(series.len())
         );
         let query = "select terrain_id, run_id, member, time_s, depth_error_m, width_error_m from 'tables/formation_samples/*.parquet' where state != 'lost'";
-        let words = [format!("Errors about a loss, {formation}."), caption];
+        let words = [format!("Errors around a loss, {formation}."), caption];
         errors(slug(&format!("loss-errors-{formation}")), words, &series, "time since the loss, s", query.to_owned())
     };
     formations.into_iter().filter_map(figure).collect()
 }
 
-/// Tracks about the losses with the shortest, the middle and the longest recovery.
+/// Tracks around the losses with the shortest, the median and the longest recovery.
 fn maps(data: &Data, losses: &[Loss]) -> Result<Vec<Figure>, ReportError> {
     let mut ranked: Vec<(f64, &Loss)> =
         telling(losses).into_iter().map(|l| (l.recovery_s().unwrap_or(f64::INFINITY), l)).collect();

@@ -1,4 +1,4 @@
-//! Box plots by group, with sampling bands of the medians and the paper's figures where there are any.
+//! Box plots by group, with sampling bands of the medians and published medians where there are any.
 
 use super::{METRICS, Metric};
 use crate::content::{Figure, Numbers, TableBlock, count, number, slug, text};
@@ -15,10 +15,10 @@ use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{BoxPlot, Interval};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How much outliers may widen an axis on either side, in lengths of what stands without them.
+/// How much outliers may widen an axis on either side, as a multiple of its length without them.
 const OUTLIERS_WIDEN: f64 = 0.5;
 
-/// A group as it is drawn.
+/// A group as drawn.
 pub struct Sample<'a> {
     group: String,
     index: usize,
@@ -35,18 +35,18 @@ impl Sample<'_> {
     }
 }
 
-/// A figure that is compared between groups, and its values.
+/// A metric that is compared between groups, and its values.
 pub struct Compared<'a> {
     name: &'static str,
     unit: &'static str,
-    /// Name in the papers and of the stream of its band.
+    /// Name in the papers, and of the random stream of its band.
     figure: &'static str,
     n_is: &'static str,
     query: String,
     samples: Vec<Sample<'a>>,
 }
 
-/// Success on each terrain, then every figure of the successful missions.
+/// Success on each terrain, then the metrics of the successful missions.
 pub fn compared<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<Compared<'a>> {
     let success = Compared {
         name: "success on a terrain",
@@ -70,10 +70,10 @@ pub fn compared<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<Compar
     std::iter::once(success).chain(METRICS.iter().map(metric)).collect()
 }
 
-/// Medians, quartiles and sampling bands of every figure and group.
+/// Medians, quartiles and sampling bands of every metric and group.
 pub fn medians(data: &Data, compared: &[Compared]) -> TableBlock {
     let columns = [
-        ("figure", ""),
+        ("metric", ""),
         ("unit", ""),
         ("group", ""),
         ("values", ""),
@@ -104,7 +104,7 @@ pub fn medians(data: &Data, compared: &[Compared]) -> TableBlock {
             ]);
         }
     }
-    let caption = "Success on terrains, and successful missions, by group".into();
+    let caption = "Success per terrain, and metrics of successful missions, by group".into();
     TableBlock { id: "mission-medians".into(), caption, numbers }
 }
 
@@ -146,7 +146,7 @@ pub fn success_shares<'a>(group: &Group<'a, MissionRow>) -> Vec<(&'a str, f64)> 
     terrains.into_iter().map(|(id, (goals, all))| (id, 100.0 * goals as f64 / all as f64)).collect()
 }
 
-/// Box plots of a figure; `None` when no mission has it, or when success is known on one terrain a group alone.
+/// Box plots of a metric; `None` when no mission has it, or when success is known on only one terrain per group.
 pub fn figure(data: &Data, compared: &Compared) -> Option<Figure> {
     let samples = &compared.samples;
     if samples.is_empty() || compared.figure == "success" && samples.iter().all(|s| s.values.len() < 2) {
@@ -157,7 +157,7 @@ pub fn figure(data: &Data, compared: &Compared) -> Option<Figure> {
     let axis = axis(samples);
     let beyond = match beyond(samples, &axis) {
         0 => String::new(),
-        n => format!(" {} beyond the axis: triangles at its edge.", set::counted(n, "value")),
+        n => format!(" Triangles at the edge: {} beyond the axis.", set::counted(n, "value")),
     };
     let axis_title = format!("{}, {}", compared.name, compared.unit);
     let mut rows = Rows::new(&labels, 54.0, (axis, &axis_title), &legend(data, compared));
@@ -169,7 +169,7 @@ pub fn figure(data: &Data, compared: &Compared) -> Option<Figure> {
     let title = papers::title(data, &id, &format!("{}.", capital(compared.name)));
     Some(Figure {
         title,
-        caption: format!("n counts {}.{beyond}", compared.n_is),
+        caption: format!("n is the number of {}.{beyond}", compared.n_is),
         description: describe(samples, &axis_title),
         svg: rows.svg,
         numbers: numbers(compared),
@@ -201,7 +201,7 @@ fn axis(samples: &[Sample]) -> Axis {
     Axis::linear(low - margin, high + margin)
 }
 
-/// Outliers that the axis does not reach.
+/// Number of outliers beyond the axis.
 fn beyond(samples: &[Sample], axis: &Axis) -> usize {
     let (low, high) = axis.range();
     samples.iter().flat_map(|s| &s.plot.outliers).filter(|v| **v < low || **v > high).count()

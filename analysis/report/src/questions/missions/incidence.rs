@@ -1,4 +1,4 @@
-//! How far missions came: cumulative incidence of the ways to fail, over the distance along the line.
+//! How far missions got: cumulative incidence of each kind of failure, over the distance along the line.
 
 use crate::content::{Block, Figure, Numbers, count, number, slug, text};
 use crate::data::{Data, Group};
@@ -12,11 +12,11 @@ use crate::render::svg::{Paint, Stroke};
 use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{Ending, Incidence, Interval, bootstrap};
 
-/// Ways to fail, in the order of their numbers: name, and the outcome whose colour and dashes it has.
+/// Causes of failure in the order of their numbers: name, and the outcome whose colour and dashes it has.
 const CAUSES: [(&str, usize); 3] = [("stuck", 1), ("tipped", 2), ("other failure", 5)];
-/// Distances at which bands are known.
+/// Steps of the distance at which bands are computed.
 const STEPS: usize = 70;
-/// Largest number of groups that are drawn.
+/// Largest number of groups drawn.
 const GROUPS_MAX: usize = 12;
 const HEIGHT: f64 = 260.0;
 
@@ -28,7 +28,7 @@ struct Curves<'a> {
     bands: Vec<Vec<Option<Interval>>>,
 }
 
-/// Words, and one figure for each group with failures; nothing when no distance is known.
+/// Text, and one figure for each group with failures; empty when no distance is known.
 pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
     let lengths = groups.iter().flat_map(|g| g.rows.iter().map(|m| length(m))).filter(|l| l.is_finite());
     let length = lengths.fold(0.0, f64::max);
@@ -38,7 +38,7 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
     if length <= 0.0 {
         return Vec::new();
     }
-    let heading = Block::Heading("Distance before failure".into());
+    let heading = Block::Heading("Distance to failure".into());
     let fails = |group: &&Group<MissionRow>| outcome::counts(group.rows.iter().copied())[1..].iter().any(|n| *n > 0);
     let whole: Vec<String> = groups
         .iter()
@@ -46,19 +46,19 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
         .map(|g| format!("{} ({})", g.name, set::counted(g.rows.len(), "mission")))
         .collect();
     if whole.len() == groups.len() {
-        return vec![heading, Block::Text("No mission failed: every one reached its goal.".into())];
+        return vec![heading, Block::Text("No mission failed.".into())];
     }
     let words = format!(
-        "The share of missions that have failed in each way up to a distance along their line: competing risks, by Aalen and \
-         Johansen (1978). A mission that reached its goal counts as not watched beyond its line. A goal is reached by those \
-         that met nothing bad on the way, so figures of successful missions describe the ground that lets vehicles pass. \
-         Bands are {} % at each distance, from {REPLICATES} redraws of whole terrains.",
+        "The curves give the share of missions that have failed up to a distance along their line, by cause: competing risks, \
+         by Aalen and Johansen's estimator (1978). Missions that reach the goal are censored there. Only missions that meet no \
+         severe obstacle reach the goal, so metrics of successful missions describe the ground that lets vehicles pass. Bands are \
+         pointwise {} % intervals from {REPLICATES} bootstrap samples of whole terrains.",
         set::fixed(100.0 * LEVEL, 0)
     );
     let figures = all.iter().filter(|c| top > 0.0 && fails(&c.group)).map(|c| figure(data, c, length, top)).collect();
     let mut blocks = vec![heading, Block::Text(words), Block::Figures(figures)];
     if !whole.is_empty() {
-        blocks.push(Block::Text(format!("Without a failure: {}.", whole.join(", "))));
+        blocks.push(Block::Text(format!("No failures in {}.", whole.join(", "))));
     }
     blocks
 }
@@ -101,7 +101,7 @@ fn distances(length: f64) -> impl Iterator<Item = f64> {
     (0..=STEPS).map(move |i| length * i as f64 / STEPS as f64)
 }
 
-/// The largest shares that are drawn.
+/// The largest shares drawn.
 fn tops(curves: &Curves) -> Vec<f64> {
     let ends = curves.bands.iter().flatten().flatten().map(|b| b.high);
     let curve = curves.incidence.shares.iter().filter_map(|s| s.last().copied());
@@ -124,7 +124,7 @@ fn figure(data: &Data, curves: &Curves, length: f64, top: f64) -> Figure {
     Figure {
         id,
         title: format!("Group {}.", curves.group.name),
-        caption: format!("Missions that failed, by distance; {} in all.", set::count(rows)),
+        caption: format!("Share of missions that have failed, by distance; {} in all.", set::counted(rows, "mission")),
         description: describe(curves, &causes, length),
         svg: plot.svg,
         numbers: numbers(data, curves, length),
@@ -133,7 +133,7 @@ fn figure(data: &Data, curves: &Curves, length: f64, top: f64) -> Figure {
 
 fn stroke(cause: usize) -> Stroke {
     let kind = CAUSES[cause].1;
-    // Long dashes where the track of a map has short ones: a step curve is short of room for either.
+    // Long dashes where the track of a map has short ones: a step curve has little room for either.
     let dash = ["", "7 3", "2 3"][cause];
     Stroke::new(Paint::Outcome(kind), 2.0).dashed(dash)
 }
@@ -163,7 +163,7 @@ fn draw_band(plot: &mut Plot, bands: &[Option<Interval>], length: f64, kind: usi
 fn describe(curves: &Curves, causes: &[usize], length: f64) -> String {
     let part = |&k: &usize| {
         let share = |at: f64| set::percent(curves.incidence.share(k, at), 1);
-        format!("{} {} half way and {} at the end", CAUSES[k].0, share(0.5 * length), share(length))
+        format!("{} {} halfway and {} at the end", CAUSES[k].0, share(0.5 * length), share(length))
     };
     let parts: Vec<String> = causes.iter().map(part).collect();
     let parts = if parts.is_empty() { "none".into() } else { parts.join("; ") };

@@ -17,7 +17,7 @@ use std::collections::BTreeMap;
 
 /// Largest number of rows or columns of a class map.
 const PIXELS: usize = 420;
-/// Largest number of groups that are drawn.
+/// Largest number of groups drawn.
 const GROUPS_MAX: usize = 12;
 /// Marks on maps do not follow the theme.
 const DARK: Paint = Paint::Fixed([0x1b, 0x20, 0x26]);
@@ -33,7 +33,7 @@ pub struct Drawn<'a> {
     pub samples: Vec<SampleRow>,
 }
 
-/// The terrain of each group whose share of successful missions is in the middle.
+/// The terrain of each group with the median share of successful missions.
 pub fn drawn<'a>(data: &'a Data, groups: &[Group<'a, MissionRow>]) -> Result<Vec<Drawn<'a>>, ReportError> {
     let mut all = Vec::new();
     for group in groups.iter().take(GROUPS_MAX) {
@@ -45,7 +45,7 @@ pub fn drawn<'a>(data: &'a Data, groups: &[Group<'a, MissionRow>]) -> Result<Vec
     Ok(all)
 }
 
-/// Id of the terrain with the middle share of successes: the lower middle of an even number, the first of equals.
+/// Id of the terrain with the median share of successes: the lower middle of an even number, the first of equals.
 fn middle<'a>(group: &Group<'a, MissionRow>) -> Option<&'a str> {
     let mut terrains: BTreeMap<&str, Vec<&MissionRow>> = BTreeMap::new();
     group.rows.iter().for_each(|m| terrains.entry(&m.terrain_id).or_default().push(m));
@@ -63,7 +63,7 @@ pub fn of_mission<'a>(samples: &'a [SampleRow], mission: &MissionRow) -> &'a [Sa
     &samples[from..][..samples[from..].partition_point(|s| s.mission_id.as_str() <= id)]
 }
 
-/// One map for each terrain whose class map the release holds.
+/// One map for each terrain whose class map is in the release.
 pub fn figures(data: &Data, drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError> {
     let mut figures = Vec::new();
     for one in drawn {
@@ -92,10 +92,10 @@ fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
         id,
         title: format!("Missions, group {group}."),
         caption: format!(
-            "{}: {} of {} reached their goal. On its {} over the relief.",
+            "{}: {} of {} reached the goal. Background: {} over the relief.",
             terrain.terrain_id,
             set::count(counts[0]),
-            set::count(missions.len()),
+            set::counted(missions.len(), "mission"),
             class_map_words(data)
         ),
         description: format!("Map of missions, {}; missions by outcome: {}.", extent(&codes), outcomes.join(", ")),
@@ -121,7 +121,7 @@ fn entries(missions: &[&MissionRow]) -> Vec<Entry> {
     entries
 }
 
-/// The path driven where it was recorded, else the straight line that was asked for.
+/// The path driven where it was recorded, otherwise the straight line from start to goal.
 fn track_of(samples: &[SampleRow], mission: &MissionRow) -> Vec<(f64, f64)> {
     let path: Vec<(f64, f64)> = of_mission(samples, mission).iter().map(|s| (s.x_m, s.y_m)).collect();
     match path.len() {

@@ -1,4 +1,4 @@
-//! How the missions went, by group: outcomes and how far they came, figures of the successful ones, maps, missions in detail.
+//! How the missions went, by group: outcomes, distance to failure, metrics of the successful missions, maps, missions in detail.
 
 pub mod boxes;
 mod incidence;
@@ -19,20 +19,20 @@ use std::collections::BTreeSet;
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "missions", name: "Missions", title: "How did the missions go?", answer };
 
-/// A figure of a mission.
+/// A metric of a mission.
 #[derive(Clone, Copy, Debug)]
 pub struct Metric {
     /// Column of the table `missions`.
     pub column: &'static str,
-    /// Words.
+    /// Name on the page.
     pub name: &'static str,
-    /// Unit as it is set in text.
+    /// Unit as set in text.
     pub unit: &'static str,
     /// Value in a row.
     pub of: fn(&MissionRow) -> f64,
 }
 
-/// The figures that are compared between groups: successful missions only.
+/// Metrics that are compared between groups, over successful missions only.
 pub const METRICS: [Metric; 4] = [
     Metric {
         column: "rms_vertical_acceleration_m_s2",
@@ -62,17 +62,17 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     blocks.extend(incidence::blocks(data, &groups));
     blocks.extend(survivors::blocks(data, &groups));
     let drawn = maps::drawn(data, &groups)?;
-    section(&mut blocks, "Where they drove", MAPS, maps::figures(data, &drawn)?);
+    section(&mut blocks, "Where the missions drove", MAPS, maps::figures(data, &drawn)?);
     section(&mut blocks, "Missions in detail", STRIPS, strip::figures(data, &groups, &drawn)?);
     blocks.extend(parameters(data).map(Block::FoldedTable));
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
 }
 
-const MAPS: &str = "One terrain of each group: the one whose share of successful missions is in the middle (the lower middle of \
-an even number, the first of equals). Paths are those recorded; where none was, the line that was asked for.";
-const STRIPS: &str = "One mission of each kind of outcome: the one whose vertical acceleration is in the middle among those on \
-the terrains above (on all terrains where there is none). Acceleration is the second difference of the recorded height.";
+const MAPS: &str = "One terrain of each group: the one with the median share of successful missions (the lower middle of an even \
+number, the first of equals). Paths are as recorded; without a recording, the straight line to the goal is drawn.";
+const STRIPS: &str = "One mission for each of success, tipped and stuck: the one with the median vertical acceleration among those on the \
+terrains above (on all terrains if these have none). Acceleration is the second difference of the recorded height.";
 
 fn section(blocks: &mut Vec<Block>, heading: &str, words: &str, figures: Vec<crate::content::Figure>) {
     if !figures.is_empty() {
@@ -86,22 +86,22 @@ fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) ->
     let vehicles: BTreeSet<&str> = groups.iter().flat_map(|g| g.rows.iter().map(|m| m.vehicle.as_str())).collect();
     let variants = match data.missions.len() - missions {
         0 => String::new(),
-        n => format!(" {} more belong to variants and are compared further below.", set::count(n)),
+        n => format!(" The variants, with another {}, are compared further below.", set::counted(n, "mission")),
     };
     format!(
-        "{} missions driven by {}; {} reached their goal.{variants} Missions on one terrain resemble each other: intervals draw \
-         whole {} anew ({REPLICATES} samples, fewer beyond 10 000 values; percentiles); with fewer than about ten in a group they are too short. The \
-         sampling band of a figure holds 5 to 95 % of what such redraws give. Boxes are quartiles (linear between order \
-         statistics), whiskers reach the last value within 1.5 interquartile ranges, circles lie beyond. Everything here is \
-         exploratory.",
-        set::count(missions),
-        vehicles.into_iter().collect::<Vec<_>>().join(", "),
+        "{} of {} reached the goal, driven by {}.{variants} Missions on one terrain are correlated, so intervals are percentiles of \
+         bootstrap samples of whole {} ({REPLICATES} samples, fewer beyond 10 000 values); with fewer than about ten of these in a \
+         group, intervals are too short. The sampling band of a metric holds 5 to 95 % of the bootstrap values. Boxes are quartiles \
+         (linear between order statistics), whiskers extend to the last value within 1.5 interquartile ranges, circles lie beyond. \
+         Everything here is exploratory.",
         set::count(goals),
+        set::counted(missions, "mission"),
+        vehicles.into_iter().collect::<Vec<_>>().join(", "),
         in_words(pairing),
     )
 }
 
-/// Every number of the plain runs: what was assumed stands beside what was measured or published.
+/// Every parameter of the plain runs, with its source: assumed, measured or published.
 fn parameters(data: &Data) -> Option<TableBlock> {
     let plain: BTreeSet<&str> =
         data.missions.iter().filter(|m| m.variant.is_none()).map(|m| m.traverse_id.as_str()).collect();
@@ -113,7 +113,7 @@ fn parameters(data: &Data) -> Option<TableBlock> {
         let source = row.source.as_deref().unwrap_or("setting of the study");
         numbers.row([text(&row.traverse_id), text(&row.parameter), text(&row.value), text(source)]);
     }
-    let caption = "Every number of vehicle, surface, steering and rules, with its source".into();
+    let caption = "All parameters of vehicle, surface, steering and rules, with their sources".into();
     (!numbers.rows.is_empty()).then(|| TableBlock { id: "run-parameters".into(), caption, numbers })
 }
 

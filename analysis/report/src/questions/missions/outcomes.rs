@@ -24,7 +24,7 @@ pub fn stacked(data: &Data, groups: &[Group<MissionRow>]) -> Figure {
     Figure {
         id: "outcomes".into(),
         title: "Outcomes.".into(),
-        caption: "Figures in the bars are counts of missions.".into(),
+        caption: "Numbers in the bars are counts of missions.".into(),
         description: describe(groups, &counts),
         svg: rows.svg,
         numbers: numbers(data, groups, &counts, &kinds),

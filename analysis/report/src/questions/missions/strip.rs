@@ -1,4 +1,4 @@
-//! Missions against time: pitch and roll, vertical acceleration, and the roughness class under the vehicle.
+//! Missions over time: pitch and roll, vertical acceleration, and the roughness class under the vehicle.
 
 use super::maps::{Drawn, of_mission};
 use crate::ReportError;
@@ -13,7 +13,7 @@ use crate::render::{number as set, thin};
 use sastrugi_schemas::RoughnessClass;
 use sastrugi_schemas::tables::{MissionRow, SampleRow};
 
-/// A figure of a sample.
+/// An angle of a sample, degrees.
 type Angle = fn(&SampleRow) -> f64;
 
 const PITCH: Stroke = Stroke { paint: Paint::Series(0), width: 1.6, dash: "", opacity: 1.0 };
@@ -23,10 +23,10 @@ const HEAVE: Stroke = Stroke { paint: Paint::Series(2), width: 1.1, dash: "", op
 const BAND: f64 = 12.0;
 const ANGLES: f64 = 230.0;
 const HEAVES: f64 = 190.0;
-/// Outcomes that are shown, by their numbers: success, tipped, stuck.
+/// Outcomes shown, by their numbers: success, tipped, stuck.
 const SHOWN: [usize; 3] = [0, 2, 1];
 
-/// One figure for each kind of outcome with a mission whose samples are known.
+/// One figure for each outcome that has a mission with recorded samples.
 pub fn figures(data: &Data, groups: &[Group<MissionRow>], drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError> {
     let mut figures = Vec::new();
     for kind in SHOWN {
@@ -44,16 +44,16 @@ pub fn figures(data: &Data, groups: &[Group<MissionRow>], drawn: &[Drawn]) -> Re
     Ok(figures)
 }
 
-/// The mission with the middle vertical acceleration; those without one come last.
+/// The mission with the median vertical acceleration; those without a value come last.
 fn middle(mut missions: Vec<&MissionRow>) -> Option<&MissionRow> {
-    // Without a sign, what is not a number sorts behind all numbers.
+    // NaN without a sign sorts after all numbers.
     let figure = |m: &MissionRow| m.rms_vertical_acceleration_m_s2.abs();
     missions.sort_by(|a, b| figure(a).total_cmp(&figure(b)));
     let known = missions.iter().filter(|m| figure(m).is_finite()).count();
     missions.get(known.max(1).saturating_sub(1) / 2).copied()
 }
 
-/// Second difference of the height over the squared interval, m/s2: NaN at both ends and where the clock stands.
+/// Second difference of the height over the squared time step, m/s2: NaN at both ends and where time does not advance.
 fn heaves(samples: &[SampleRow]) -> Vec<f64> {
     let mut all = vec![f64::NAN; samples.len()];
     for (i, w) in samples.windows(3).enumerate() {
@@ -63,7 +63,7 @@ fn heaves(samples: &[SampleRow]) -> Vec<f64> {
     all
 }
 
-/// An axis that holds the values and zero over at least `least`, with room below and above in shares of its length.
+/// An axis that holds zero and the values, at least `least` long, with room below and above as shares of its length.
 fn axis(values: impl Iterator<Item = f64> + Clone, least: f64, (below, above): (f64, f64)) -> Axis {
     let finite = values.filter(|v| v.is_finite());
     let (low, high) = (finite.clone().fold(0.0, f64::min), finite.fold(0.0, f64::max));
@@ -105,7 +105,7 @@ fn angles(id: &str, mission: &MissionRow, samples: &[SampleRow], y: Axis, room: 
     plot
 }
 
-/// The mark of the outcome at the last sample, on the line of zero, with its words.
+/// The mark of the outcome at the last sample, on the zero line, with its name.
 fn mark_end(plot: &mut Plot, mission: &MissionRow, samples: &[SampleRow]) {
     let kind = outcome::index(mission);
     let end = samples.last().map_or(0.0, |s| s.time_s);
@@ -158,8 +158,8 @@ fn spacing(samples: &[SampleRow]) -> f64 {
 fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], heaves: &[f64], svg: Svg) -> Figure {
     let outcome = ALL[outcome::index(mission)].name;
     let caption = format!(
-        "{} on {}. Pitch and roll above; vertical acceleration below. Along its foot the roughness class under the vehicle, cell by cell as \
-         it was before the class map was closed. Recording: {}.",
+        "{} on {}. Top: pitch and roll. Bottom: vertical acceleration and, along the lower edge, the roughness class under the vehicle, \
+         cell by cell before the class map was closed. Recording: {}.",
         mission.mission_id, mission.terrain_id, mission.path
     );
     let largest = heaves.iter().filter(|v| v.is_finite()).fold(0.0, |a: f64, v| a.max(v.abs()));
@@ -177,5 +177,5 @@ fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], heaves: &[f64
     let mut numbers = Numbers { gives: Gives::Input, ..Numbers::select(&query, samples, &columns) };
     numbers.columns.push(Heading { name: "vertical_acceleration_m_s2".into(), unit: "m/s2".into() });
     numbers.rows.iter_mut().zip(heaves).for_each(|(row, a)| row.push(number(*a)));
-    Figure { id, title: format!("A mission with outcome: {outcome}."), caption, description, svg, numbers }
+    Figure { id, title: format!("A mission with the outcome {outcome}."), caption, description, svg, numbers }
 }

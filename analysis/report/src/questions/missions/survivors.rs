@@ -1,4 +1,4 @@
-//! The same missions in every group: figures of survivors are not figures of terrains.
+//! The same missions in every group: metrics of the survivors alone are biased.
 
 use super::METRICS;
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
@@ -11,21 +11,24 @@ use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::MissionRow;
 use std::collections::BTreeMap;
 
-/// The table and what it is for; nothing where groups share no pairs.
+/// The table and its purpose; empty where groups share no pairs.
 pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
     if groups.len() < 2 || !paired(groups) {
         return Vec::new();
     }
     let pairs = common(groups);
     let table = table(data, groups, &pairs);
+    let common = match pairs.len() {
+        0 => "No mission".to_owned(),
+        n => set::counted(n, "mission"),
+    };
     vec![
         Block::Heading("The same missions in every group".into()),
         Block::Text(format!(
-            "Medians over successful missions compare different missions: in a harder group only the easier ones are left. {} \
-             led from the same start to the same goal in every group and succeeded in all of them. Below are their medians, \
-             and the median of the change of each from one group to the next ({} % interval, blocks of paired terrains drawn \
-             anew).",
-            set::counted(pairs.len(), "mission"),
+            "{common} with the same start and goal in every group succeeded in all groups. Medians over all successful missions \
+             compare different missions, because in a harder group only the easier ones are left. The table gives the medians of \
+             the common missions, and the median of their changes from one group to the next ({} % interval, resampling blocks of \
+             paired terrains).",
             set::fixed(100.0 * LEVEL, 0)
         )),
         Block::Table(table),
@@ -49,7 +52,7 @@ fn common<'a>(groups: &[Group<'a, MissionRow>]) -> Vec<(&'a str, Vec<&'a Mission
 
 fn table(data: &Data, groups: &[Group<MissionRow>], pairs: &[(&str, Vec<&MissionRow>)]) -> TableBlock {
     let columns = [
-        ("figure", ""),
+        ("metric", ""),
         ("unit", ""),
         ("group", ""),
         ("successful", ""),
@@ -93,5 +96,9 @@ fn table(data: &Data, groups: &[Group<MissionRow>], pairs: &[(&str, Vec<&Mission
             ]);
         }
     }
-    TableBlock { id: "survivors".into(), caption: "All successful missions, and those of every group".into(), numbers }
+    TableBlock {
+        id: "survivors".into(),
+        caption: "All successful missions, and those that succeeded in every group".into(),
+        numbers,
+    }
 }

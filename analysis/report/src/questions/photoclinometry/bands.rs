@@ -1,4 +1,5 @@
-//! Truth and recovered by wavelength: rms height, rms slope, squared coherence. Surfaces recovered on one map of one truth share a frame.
+//! True and recovered surface by wavelength: RMS height, RMS slope, squared coherence. Surfaces recovered on one map of one true surface
+//! share a frame.
 
 use super::surfaces::Surface;
 use crate::content::{Figure, Numbers, slug};
@@ -15,10 +16,10 @@ const CURVES_MAX: usize = 6;
 const DASHES: [&str; CURVES_MAX] = ["", "7 3", "2 3", "9 3 2 3", "5 2 1 2 1 2", "1 4"];
 const TRUTH: Stroke = Stroke { paint: Paint::Ink, width: 2.6, dash: "", opacity: 1.0 };
 
-/// A figure of an octave.
+/// A quantity of an octave.
 type Value = fn(&PhotoclinometryBandRow) -> f64;
 
-/// What a frame shows: the recovered figure, and the true one where there is one.
+/// What a frame shows: the recovered quantity, and the true one where it exists.
 struct Quantity {
     id: &'static str,
     title: &'static str,
@@ -31,23 +32,23 @@ struct Quantity {
 const QUANTITIES: [Quantity; 3] = [
     Quantity {
         id: "photoclinometry-heights-by-wavelength",
-        title: "Rms height by wavelength",
-        axis: "rms height of the octave, m",
+        title: "RMS height by wavelength",
+        axis: "RMS height of the octave, m",
         truth: Some(|b| b.truth_rms_m),
         recovered: |b| b.recovered_rms_m,
         columns: &["truth_rms_m", "recovered_rms_m"],
     },
     Quantity {
         id: "photoclinometry-slopes-by-wavelength",
-        title: "Rms slope by wavelength",
-        axis: "rms slope of the octave",
+        title: "RMS slope by wavelength",
+        axis: "RMS slope of the octave",
         truth: Some(|b| b.truth_slope_rms),
         recovered: |b| b.recovered_slope_rms,
         columns: &["truth_slope_rms", "recovered_slope_rms"],
     },
     Quantity {
         id: "photoclinometry-coherence",
-        title: "Squared coherence of truth and recovered",
+        title: "Squared coherence of true and recovered heights",
         axis: "squared coherence",
         truth: None,
         recovered: |b| b.coherence,
@@ -55,7 +56,7 @@ const QUANTITIES: [Quantity; 3] = [
     },
 ];
 
-/// The frames; none where no true surface is known.
+/// The frames; empty where no true surface is known.
 pub fn figures(surfaces: &[Surface], drawn: &[&Surface]) -> Vec<Figure> {
     let frames = frames(surfaces, drawn);
     frames
@@ -65,7 +66,7 @@ pub fn figures(surfaces: &[Surface], drawn: &[&Surface]) -> Vec<Figure> {
         .collect()
 }
 
-/// Surfaces with octaves, by truth and map: all of them where they fit into a frame, else those that are drawn.
+/// Surfaces with octaves, by true surface and map: all of them if they fit into a frame, otherwise those that are drawn.
 fn frames<'a, 'b>(surfaces: &'b [Surface<'a>], drawn: &[&'b Surface<'a>]) -> Vec<Vec<&'b Surface<'a>>> {
     let key = |s: &Surface| (s.row.surface_id.clone(), s.row.rows, s.row.cols, s.row.cell_m.to_bits());
     let mut frames: Vec<Vec<&Surface>> = Vec::new();

@@ -1,4 +1,4 @@
-//! Covariance of truth and of recovered, where the study fits both.
+//! Covariance of the true and the recovered surface, where the study fits both.
 
 use super::surfaces::Surface;
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, slug, text};
@@ -14,15 +14,16 @@ use sastrugi_schemas::tables::{CovarianceRow, FitRow};
 
 /// Largest ratio of the windows of two fits that are compared.
 const WINDOWS_MAX: f64 = 1.1;
-/// Pairs that are drawn; all are in the table.
+/// Pairs drawn; all are in the table.
 const DRAWN_MAX: usize = 6;
 const TRUTH: Stroke = Stroke { paint: Paint::Ink, width: 2.0, dash: "", opacity: 1.0 };
 const RECOVERED: Stroke = Stroke { paint: Paint::Series(0), width: 2.0, dash: "7 3", opacity: 1.0 };
-const WORDS: &str = "Covariances of the residuals of both fits, all directions together; both windows have nearly the same size. The difference is the rms over the lags of the recovered \
-surface, the covariance of the truth interpolated between its own lags, as a share of the truth's covariance at the shortest of these lags. The rms height below the window needs no model; a range that is not \
-identified makes sigma and b meaningless, but not their ratio.";
+const WORDS: &str = "Isotropic covariances of the residuals of two fits, whose windows have nearly the same size. The difference is the RMS over \
+the lags of the recovered surface, with the truth's covariance interpolated between its own lags, as a share of the truth's covariance at the \
+shortest of these lags. The band RMS below the window needs no model. If the range is not identified, sigma and b are meaningless, but their \
+ratio is not.";
 
-/// Fits of a true surface and of one recovered from its images, in one mode with alike windows.
+/// Fits of a true surface and of one recovered from its images, in the same mode with similar windows.
 pub struct Pair<'a> {
     /// Fit of the true surface.
     pub truth: &'a FitRow,
@@ -46,7 +47,7 @@ pub fn pairs<'a>(data: &'a Data, surfaces: &[Surface]) -> Vec<Pair<'a>> {
     surfaces.iter().flat_map(pair).collect()
 }
 
-/// One mode and windows of one size, but for whole cells.
+/// Same mode, and windows of the same size up to rounding to whole cells.
 fn comparable(a: &FitRow, b: &FitRow) -> bool {
     let alike = |a: f64, b: f64| a.max(b) <= WINDOWS_MAX * a.min(b);
     a.mode == b.mode && alike(a.window_x_m, b.window_x_m) && alike(a.window_y_m, b.window_y_m)
@@ -66,7 +67,7 @@ impl Pair<'_> {
         Some(between[0].covariance_m2 + share * (between[1].covariance_m2 - between[0].covariance_m2))
     }
 
-    /// True and recovered covariance at the lags that both know, but for lag 0, which holds the noise of a cell.
+    /// True and recovered covariance at the lags that both have, except lag 0, which includes the noise of a cell.
     fn common(&self) -> Vec<(f64, f64)> {
         self.bins
             .iter()
@@ -75,7 +76,7 @@ impl Pair<'_> {
             .collect()
     }
 
-    /// Rms difference over the truth's covariance at the shortest common lag; NaN without common lags.
+    /// RMS difference over the truth's covariance at the shortest common lag; NaN without common lags.
     fn difference(&self) -> f64 {
         let common = self.common();
         let squares: Vec<f64> = common.iter().map(|(t, r)| (r - t) * (r - t)).collect();
@@ -85,7 +86,7 @@ impl Pair<'_> {
     /// The verdict on covariance.
     pub fn sentence(&self) -> String {
         format!(
-            "Covariance: it differs from the truth's by {} (rms over lags); rms height below a window of {}: {} of the truth's.",
+            "Its covariance differs from the truth's by {} (RMS over lags); its band RMS below a window of {} is {} of the truth's.",
             set::percent(self.difference(), 0),
             set::with_unit(self.truth.window_x_m, 3, "m"),
             set::percent(self.recovered.band_rms_m / self.truth.band_rms_m, 0)
@@ -93,12 +94,12 @@ impl Pair<'_> {
     }
 }
 
-/// Words, figures and the table; nothing where no surface and its truth are both fitted.
+/// Text, figures and the table; empty where no surface has fits of both itself and its truth.
 pub fn blocks(data: &Data, pairs: &[Pair]) -> Vec<Block> {
     if pairs.is_empty() {
         let both = data.photoclinometry.iter().any(|r| data.fits.iter().any(|f| f.dem_id == r.photoclinometry_id));
-        let missing = "Recovered surfaces are fitted, but no true surface is with a window of nearly the same size: a `[[fit]]` of each with one \
-                       `outer_scale_m` puts their covariances beside each other.";
+        let missing = "Covariances cannot be compared: recovered surfaces have fits, but no true surface has one with a window of nearly the \
+                       same size. Add a `[[fit]]` of each with the same `outer_scale_m`.";
         return if both { vec![Block::Text(missing.into())] } else { Vec::new() };
     }
     let figures = pairs.iter().take(DRAWN_MAX).map(figure).collect();
@@ -141,8 +142,15 @@ fn figure(pair: &Pair) -> Figure {
     Figure {
         id,
         title: format!("Covariance of {} and its truth.", pair.recovered.dem_id),
-        caption: format!("Fits {} and {}; lag 0 holds the noise of a cell.", pair.truth.fit_id, pair.recovered.fit_id),
-        description: format!("Covariance of truth and of {} against lag. {}", pair.recovered.dem_id, pair.sentence()),
+        caption: format!(
+            "Fits {} and {}; lag 0 includes the noise of a cell.",
+            pair.truth.fit_id, pair.recovered.fit_id
+        ),
+        description: format!(
+            "Covariance of the truth and of {} against lag. {}",
+            pair.recovered.dem_id,
+            pair.sentence()
+        ),
         svg: plot.svg,
         numbers,
     }
@@ -152,7 +160,7 @@ fn figure(pair: &Pair) -> Figure {
 type Fitted = (&'static str, &'static str, fn(&FitRow) -> [f64; 3]);
 
 const FITTED: [Fitted; 4] = [
-    ("rms height below the window", "m", |f| [f.band_rms_m, f64::NAN, f64::NAN]),
+    ("band RMS below the window", "m", |f| [f.band_rms_m, f64::NAN, f64::NAN]),
     ("σ", "m", |f| [f.sigma_m, f.sigma_low_m, f.sigma_high_m]),
     ("range b", "m", |f| [f.range_m, f.range_low_m, f.range_high_m]),
     ("σ²/b", "m", |f| [f.sigma2_over_range_m, f.sigma2_over_range_low_m, f.sigma2_over_range_high_m]),
@@ -162,7 +170,7 @@ fn table(pairs: &[Pair]) -> TableBlock {
     let columns = [
         ("surface", ""),
         ("model", ""),
-        ("of", ""),
+        ("parameter", ""),
         ("unit", ""),
         ("truth", ""),
         ("low", ""),
@@ -171,8 +179,8 @@ fn table(pairs: &[Pair]) -> TableBlock {
         ("low", ""),
         ("high", ""),
         ("recovered over truth", "1"),
-        ("lags in common", "1"),
-        ("covariances differ by", "%"),
+        ("common lags", "1"),
+        ("covariance difference", "%"),
     ];
     let mut numbers = Numbers::computed("select * from 'tables/fits/*.parquet'", &columns).with_mixed_units();
     for pair in pairs {
@@ -201,7 +209,7 @@ fn table(pairs: &[Pair]) -> TableBlock {
     }
     TableBlock {
         id: "photoclinometry-covariance".into(),
-        caption: "Fits of truth and recovered, with the intervals of the fits".into(),
+        caption: "Fits of true and recovered surfaces, with their intervals".into(),
         numbers,
     }
 }

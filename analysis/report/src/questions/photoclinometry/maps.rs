@@ -1,4 +1,5 @@
-//! Maps of one recovered surface: shaded relief of truth and recovered, their difference, albedo, uncertainty, lit images.
+//! Maps of one recovered surface: shaded relief of the true and the recovered surface, their difference, albedo, uncertainty, number of
+//! lit images.
 
 use super::surfaces::Surface;
 use crate::ReportError;
@@ -14,7 +15,7 @@ use sastrugi_numeric::{Grid, sums};
 /// Largest number of rows or columns of a picture.
 const PIXELS: usize = 400;
 
-/// The maps that the release has files for.
+/// The maps for which the release has files.
 pub fn figures(data: &Data, surface: &Surface) -> Result<Vec<Figure>, ReportError> {
     let Some(recovered) = data.files.grid(&surface.row.path)? else { return Ok(Vec::new()) };
     let truth = match data.terrain(&surface.row.surface_id) {
@@ -48,24 +49,24 @@ fn companion(surface: &Surface, ending: &str) -> String {
     format!("{stem}.{ending}.tif")
 }
 
-/// Less its mean over the cells with data.
+/// Minus its mean over the cells with data.
 fn centred(grid: &Grid) -> Grid {
     let mean = sums::mean(&sums::finite(&grid.values));
     grid.map(|v| v - mean)
 }
 
-/// Both surfaces under one light, with one range of colours and one exaggeration, less their means.
+/// Both surfaces minus their means, with the same light, colour range and exaggeration.
 fn reliefs(surface: &Surface, truth: Option<(&str, &Grid)>, recovered: &Grid) -> Result<Vec<Figure>, ReportError> {
     let recovered = centred(recovered);
     let truth = truth.map(|(path, grid)| (path, centred(grid)));
-    // The truth sets the colours: a tilted result would leave none for the relief.
+    // The truth sets the colour range: a tilted result would leave no contrast for the relief.
     let Some(range_m) = percentiles(truth.as_ref().map_or(&recovered, |t| &t.1)) else { return Ok(Vec::new()) };
     let style = Style { range_m, exaggeration: exaggeration(surface.row.slope_rms), pixels: PIXELS };
     let shading = exaggeration_words(style.exaggeration);
     let mut figures = Vec::new();
     if let Some((path, grid)) = &truth {
         let caption =
-            format!("{}, averaged over the cells of the map, less its mean.{shading}", surface.row.surface_id);
+            format!("{}, averaged over the cells of the map, minus its mean.{shading}", surface.row.surface_id);
         figures.extend(relief_of(
             grid,
             path,
@@ -74,29 +75,30 @@ fn reliefs(surface: &Surface, truth: Option<(&str, &Grid)>, recovered: &Grid) ->
         )?);
     }
     let beside = if truth.is_some() { " Light, colours and scale are those of the true surface." } else { "" };
-    let caption = format!("{}, less its mean.{beside}{shading}", surface.id());
+    let caption = format!("{}, minus its mean.{beside}{shading}", surface.id());
     let words = words("photoclinometry-heights", surface, "Recovered surface.", caption);
     figures.extend(relief_of(&recovered, &surface.row.path, Some(style), words)?);
     Ok(figures)
 }
 
-/// Recovered less true heights, less their mean.
+/// Recovered minus true heights, minus their mean.
 fn errors(surface: &Surface, truth: &Grid, recovered: &Grid) -> Result<Option<Figure>, ReportError> {
     let values = recovered.values.iter().zip(&truth.values).map(|(r, t)| r - t).collect();
     let errors = centred(&Grid::new(recovered.geometry, values));
     let limit = limit_m(&errors);
     let limit = if limit > 0.0 { limit } else { f64::MIN_POSITIVE };
     let caption = format!(
-        "Recovered less true heights, less the mean; colours span ±{}, larger errors have the colours of the ends. Rms {}, {} less the plane.",
+        "Recovered minus true heights, minus the mean. Colours span ±{}; larger errors have the end colours. RMS {}, or {} after subtracting the \
+         plane.",
         set::with_unit(limit, 3, "m"),
         set::with_unit(surface.row.height_error_rms_m, 3, "m"),
         set::with_unit(surface.row.height_error_rms_detrended_m, 3, "m")
     );
-    let words = words("photoclinometry-error", surface, "Error of heights.", caption);
+    let words = words("photoclinometry-error", surface, "Height error.", caption);
     deviations(&errors, &surface.row.path, limit, "not recovered", words)
 }
 
-/// Recovered albedo, after the true one where the surface has a map of it.
+/// Recovered albedo, preceded by the true albedo if the surface has a map of it.
 fn albedos(data: &Data, surface: &Surface, recovered: &Grid) -> Result<Vec<Figure>, ReportError> {
     let path = companion(surface, "albedo");
     let Some(found) = data.files.grid(&path)? else { return Ok(Vec::new()) };
@@ -118,7 +120,7 @@ fn albedos(data: &Data, surface: &Surface, recovered: &Grid) -> Result<Vec<Figur
     let beside = if truth.is_some() {
         "Colours are those of the true albedo.".into()
     } else {
-        format!("{span}. The true surface has one albedo.")
+        format!("{span}. The true surface has a uniform albedo.")
     };
     let caption = format!("Mean {}. {beside}", set::significant(surface.row.albedo_mean, 3));
     let words = words("photoclinometry-albedo", surface, "Recovered albedo.", caption);
@@ -131,7 +133,7 @@ fn uncertainty(data: &Data, surface: &Surface) -> Result<Option<Figure>, ReportE
     let Some(grid) = data.files.grid(&path)? else { return Ok(None) };
     let Some((_, high)) = percentiles(&grid) else { return Ok(None) };
     let caption = format!(
-        "Standard deviation of the heights by the noise of the images; rms {}. Colours end at 0 and the 99th percentile.",
+        "Standard deviation of the heights due to image noise; RMS {}. Colours end at 0 and the 99th percentile.",
         set::with_unit(surface.row.height_sigma_m, 3, "m")
     );
     let words = words("photoclinometry-uncertainty", surface, "Uncertainty.", caption);
@@ -144,8 +146,8 @@ fn lit(data: &Data, surface: &Surface) -> Result<Option<Figure>, ReportError> {
     let shown: Vec<f64> = grid.values.iter().copied().filter(|n| *n > 0.0).collect();
     let few = shown.iter().filter(|n| **n < 3.0).count() as f64 / shown.len().max(1) as f64;
     let caption = format!(
-        "Of {}: how many show a cell lit. {} of the cells that are lit at all are lit in fewer than three.",
-        set::counted(surface.row.images.max(0) as usize, "image"),
+        "Number of images that show a cell lit, of {} in all. {} of the cells that are lit at all are lit in fewer than three.",
+        set::count(surface.row.images.max(0) as usize),
         set::percent(few, 1)
     );
     let words = words("photoclinometry-lit", surface, "Lit images.", caption);

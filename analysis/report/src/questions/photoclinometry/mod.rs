@@ -1,5 +1,5 @@
-//! What images tell of the heights: every surface recovered from images beside the true one, by wavelength, by covariance, cell by cell, and with the
-//! errors that a study sweeps.
+//! How accurate heights from images are: every recovered surface compared with the true one, by wavelength, by covariance, cell by cell, and
+//! along the settings that a study sweeps.
 
 mod bands;
 mod covariances;
@@ -20,18 +20,19 @@ use surfaces::{Surface, all, chosen};
 pub const QUESTION: Question = Question {
     id: "photoclinometry",
     name: "Heights from images",
-    title: "What do images tell of the heights?",
+    title: "How accurate are heights recovered from images?",
     answer,
 };
 
-/// Surfaces of which sentences, curves and maps are made; all are in the tables.
+/// Surfaces that have sentences, curves and maps; the tables list all.
 const CHOSEN_MAX: usize = 6;
 
-const CEILINGS: &str = "A ceiling is what the true surface itself reaches once it is averaged over the cells of the map: no inversion on these cells can be \
-expected to do better. The correlation is that of the shaded surfaces at albedo 1, the slope error the rms length of the difference of both gradients, at the truth's own cells. \
-Heights are less their mean, or less the plane through their errors.";
-const BY_WAVELENGTH: &str = "Octaves of wavelength, from two cells upwards: both surfaces less their planes, the true one averaged over the cells, under a Hann window. Points lie at the \
-geometric middle of an octave. The squared coherence is 1 where the recovered waves lie on the true ones and have one factor to them; amplitudes are what the rms says.";
+const CEILINGS: &str = "A ceiling is the value that the true surface itself reaches after averaging over the cells of the map; no inversion on \
+these cells can be expected to do better. The correlation is that of the shaded surfaces at albedo 1. The slope error is the RMS length of the \
+difference of the two gradients, at the truth's own cells. Height errors are computed after subtracting their mean, or the plane through them.";
+const BY_WAVELENGTH: &str = "Octaves of wavelength, from two cells upwards. The plane is subtracted from both surfaces, the true one is averaged \
+over the cells, and a Hann window is applied. Points lie at the geometric mean of an octave's ends. The squared coherence is 1 where the \
+recovered waves are in phase with the true ones at a constant ratio; the RMS compares their amplitudes.";
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let surfaces = all(data);
@@ -66,12 +67,12 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// How surfaces were chosen to be drawn; `None` when all are.
+/// How the drawn surfaces were chosen; `None` when all are drawn.
 fn left_out(surfaces: &[Surface], drawn: &[&Surface]) -> Option<String> {
     (drawn.len() < surfaces.len()).then(|| {
         format!(
-            "Drawn are {} of {}: of each item of the study the one with the least and the one with the greatest slope error, {CHOSEN_MAX} at most. \
-             The tables hold all.",
+            "The figures show {} of {}: for each item of the study, those with the smallest and the largest slope error, at most {CHOSEN_MAX} in \
+             all. The tables list all.",
             set::count(drawn.len()),
             set::counted(surfaces.len(), "recovered surface")
         )

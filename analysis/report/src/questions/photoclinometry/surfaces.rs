@@ -8,7 +8,7 @@ use sastrugi_schemas::tables::{PhotoclinometryBandRow, PhotoclinometryRow};
 pub struct Surface<'a> {
     /// Its row.
     pub row: &'a PhotoclinometryRow,
-    /// Octaves, the shortest first; none where the true surface is not known.
+    /// Octaves, the shortest first; empty where the true surface is not known.
     pub bands: &'a [PhotoclinometryBandRow],
 }
 
@@ -24,7 +24,7 @@ impl Surface<'_> {
     }
 }
 
-/// All recovered surfaces: by item, settings in natural order.
+/// All recovered surfaces by item, with settings in natural order.
 pub fn all(data: &Data) -> Vec<Surface<'_>> {
     let mut rows: Vec<&PhotoclinometryRow> = data.photoclinometry.iter().collect();
     rows.sort_by_key(|r| {
@@ -35,7 +35,7 @@ pub fn all(data: &Data) -> Vec<Surface<'_>> {
     rows.into_iter().map(|row| Surface { row, bands: bands(row) }).collect()
 }
 
-/// Of each item the surface with the least slope error, then that with the greatest; all without a truth come as they are.
+/// For each item, the surfaces with the smallest and the largest slope error; all surfaces of an item without a truth.
 pub fn chosen<'a, 'b>(surfaces: &'b [Surface<'a>]) -> Vec<&'b Surface<'a>> {
     let of_item = |run: &'b [Surface<'a>]| {
         let mut ranked: Vec<&Surface> = run.iter().collect();

@@ -1,4 +1,4 @@
-//! How errors grow with one swept setting: error of slopes with its ceiling, error of heights with and without the plane.
+//! How errors grow with a swept setting: slope error with its ceiling, height error minus the mean and minus the plane.
 
 use super::surfaces::Surface;
 use crate::content::{Block, Figure, Numbers, number, slug, text};
@@ -9,10 +9,10 @@ use crate::render::chart::{Entry, Mark, Plot, WIDTH};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 
-/// Sweeps that are drawn; the table of errors holds all.
+/// Sweeps drawn; the table of errors lists all.
 const DRAWN_MAX: usize = 8;
-const WORDS: &str = "One setting swept, everything else alike. A wrong exposure or sun tilts the surface: heights suffer, shading hardly shows it. A misplaced image does the \
-reverse.";
+const WORDS: &str = "One setting is swept and all others are fixed. A wrong exposure or sun position tilts the surface, which affects heights but \
+hardly the shading. A misplaced image does the reverse.";
 
 /// A curve: its name, line, mark and value of a surface.
 type Curve = (&'static str, Stroke, Symbol, fn(&Surface) -> f64);
@@ -26,11 +26,11 @@ const SLOPES: [Curve; 2] = [
     }),
 ];
 const HEIGHTS: [Curve; 2] = [
-    ("less the mean", Stroke { paint: Paint::Series(1), width: 2.0, dash: "", opacity: 1.0 }, Symbol::Square, |s| {
+    ("minus the mean", Stroke { paint: Paint::Series(1), width: 2.0, dash: "", opacity: 1.0 }, Symbol::Square, |s| {
         s.row.height_error_rms_m
     }),
     (
-        "less the plane",
+        "minus the plane",
         Stroke { paint: Paint::Series(2), width: 2.0, dash: "7 3", opacity: 1.0 },
         Symbol::Triangle,
         |s| s.row.height_error_rms_detrended_m,
@@ -66,17 +66,14 @@ fn sweeps<'a, 'b>(surfaces: &'b [Surface<'a>]) -> Vec<Sweep<'a, 'b>> {
     sweeps
 }
 
-/// Words and figures; nothing where no number is swept.
+/// Text and figures; empty where no number is swept.
 pub fn blocks(surfaces: &[Surface]) -> Vec<Block> {
     let sweeps = sweeps(surfaces);
     let figures: Vec<Figure> = sweeps
         .iter()
         .take(DRAWN_MAX)
         .flat_map(|s| {
-            [
-                figure(s, "slopes", "rms error of slopes", &SLOPES),
-                figure(s, "heights", "rms error of heights, m", &HEIGHTS),
-            ]
+            [figure(s, "slopes", "RMS slope error", &SLOPES), figure(s, "heights", "RMS height error, m", &HEIGHTS)]
         })
         .collect();
     if figures.is_empty() {
@@ -85,7 +82,7 @@ pub fn blocks(surfaces: &[Surface]) -> Vec<Block> {
     let mut blocks = vec![Block::Heading("How errors grow".into()), Block::Text(WORDS.into())];
     if sweeps.len() > DRAWN_MAX {
         blocks.push(Block::Text(format!(
-            "The first {DRAWN_MAX} of {} sweeps are drawn; the table of errors holds all.",
+            "The first {DRAWN_MAX} of {} sweeps are drawn; the table of errors lists all.",
             set::count(sweeps.len())
         )));
     }

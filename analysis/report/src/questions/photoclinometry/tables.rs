@@ -1,4 +1,4 @@
-//! Tables: errors beside their ceilings, how inversions went, octaves of wavelength.
+//! Tables: errors and their ceilings, the inversions, octaves of wavelength.
 
 use super::surfaces::Surface;
 use crate::content::{Numbers, TableBlock, count, number, text};
@@ -13,14 +13,14 @@ const ERRORS: [Column; 9] = [
     ("ceiling", "1", |r| r.shaded_correlation_ceiling),
     ("slope error", "1", |r| r.slope_error_rms),
     ("ceiling", "1", |r| r.slope_error_rms_ceiling),
-    ("true rms slope", "1", |r| r.slope_rms),
+    ("true RMS slope", "1", |r| r.slope_rms),
     ("height error", "m", |r| r.height_error_rms_m),
-    ("less the plane", "m", |r| r.height_error_rms_detrended_m),
+    ("minus the plane", "m", |r| r.height_error_rms_detrended_m),
     ("uncertainty", "m", |r| r.height_sigma_m),
-    ("true rms height", "m", |r| r.height_rms_m),
+    ("true RMS height", "m", |r| r.height_rms_m),
 ];
 
-/// Errors of every surface beside what averaging alone costs.
+/// Errors of every surface, with the error that averaging alone causes.
 pub fn errors(surfaces: &[Surface]) -> TableBlock {
     let columns: Vec<(&str, &str)> =
         [("recovered", ""), ("setting", ""), ("truth", "")].into_iter().chain(ERRORS.map(|c| (c.0, c.1))).collect();
@@ -31,10 +31,10 @@ pub fn errors(surfaces: &[Surface]) -> TableBlock {
         let head = [text(surface.id()), text(row.variant.as_deref().unwrap_or_default()), text(&row.surface_id)];
         numbers.row(head.into_iter().chain(ERRORS.iter().map(|c| number(c.2(row)))));
     }
-    TableBlock { id: "photoclinometry-errors".into(), caption: "Errors beside their ceilings".into(), numbers }
+    TableBlock { id: "photoclinometry-errors".into(), caption: "Errors and their ceilings".into(), numbers }
 }
 
-/// What the inversions had and how they went.
+/// Input and convergence of the inversions.
 pub fn inversions(surfaces: &[Surface]) -> TableBlock {
     let columns = [
         ("recovered", ""),
@@ -43,15 +43,15 @@ pub fn inversions(surfaces: &[Surface]) -> TableBlock {
         ("cols", "1"),
         ("cell", "m"),
         ("lit images, mean", "1"),
-        ("cells leaning on neighbours", "%"),
+        ("cells with albedo from neighbours", "%"),
         ("condition number, median", "1"),
         ("correlation of albedo and slopes", "1"),
         ("rounds", "1"),
-        ("settled", ""),
+        ("converged", ""),
         ("last change", "m"),
         ("brightness misfit", "%"),
         ("stereo points", "1"),
-        ("noise over assumed", "1"),
+        ("noise / assumed noise", "1"),
         ("mean albedo", "1"),
     ];
     let mut numbers =
@@ -78,7 +78,7 @@ pub fn inversions(surfaces: &[Surface]) -> TableBlock {
             number(row.albedo_mean),
         ]);
     }
-    TableBlock { id: "photoclinometry".into(), caption: "How the inversions went".into(), numbers }
+    TableBlock { id: "photoclinometry".into(), caption: "Input and convergence of the inversions".into(), numbers }
 }
 
 /// Every octave of every surface.
@@ -97,5 +97,9 @@ pub fn bands(data: &Data) -> TableBlock {
         "coherence",
     ];
     let numbers = Numbers::select("", &data.photoclinometry_bands, &names);
-    TableBlock { id: "photoclinometry-bands".into(), caption: "Truth and recovered by wavelength".into(), numbers }
+    TableBlock {
+        id: "photoclinometry-bands".into(),
+        caption: "True and recovered surfaces by wavelength".into(),
+        numbers,
+    }
 }

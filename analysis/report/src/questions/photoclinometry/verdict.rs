@@ -1,4 +1,4 @@
-//! What recovered surfaces have of the true ones, in sentences: at which wavelengths their texture is the truth's, and at which it is not.
+//! How well recovered surfaces agree with the true ones, in sentences: at which wavelengths the textures match, and at which they do not.
 
 use super::covariances::Pair;
 use super::surfaces::Surface;
@@ -6,22 +6,22 @@ use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::PhotoclinometryBandRow;
 
-/// Largest deviation of an rms from the truth's that counts as the same.
+/// Largest relative deviation of an RMS from the truth's that counts as agreement.
 const ALIKE: f64 = 0.1;
-/// Least squared coherence that counts as the same waves.
+/// Smallest squared coherence that counts as coherent.
 const COHERENT: f64 = 0.9;
-/// Condition number from which the suns hardly tell slopes from albedo.
+/// Condition number above which the sun positions barely separate slopes from albedo.
 const CONDITION_MAX: f64 = 20.0;
-/// Share of cells leaning on their neighbours that is worth a warning.
+/// Share of cells with albedo from their neighbours above which a warning is given.
 const LEANING_MAX: f64 = 0.05;
-/// An error of heights over their uncertainty that noise does not explain.
+/// Ratio of height error to uncertainty that noise does not explain.
 const UNEXPLAINED: f64 = 3.0;
 /// Ids named in a warning.
 const NAMED_MAX: usize = 4;
-/// Plane over the whole error of heights, as variances, from which a tilt is named.
+/// Share of the plane in the variance of the height error above which a tilt is reported.
 const TILTED: f64 = 0.5;
 
-/// Rms height and rms slope over all octaves, recovered over true; NaN where not known.
+/// RMS height and RMS slope over all octaves, recovered over true; NaN if unknown.
 fn totals(bands: &[PhotoclinometryBandRow]) -> [f64; 2] {
     let rms = |of: fn(&PhotoclinometryBandRow) -> f64| {
         let squares: Vec<f64> = bands.iter().map(|b| of(b) * of(b)).collect();
@@ -30,10 +30,10 @@ fn totals(bands: &[PhotoclinometryBandRow]) -> [f64; 2] {
     [rms(|b| b.recovered_rms_m) / rms(|b| b.truth_rms_m), rms(|b| b.recovered_slope_rms) / rms(|b| b.truth_slope_rms)]
 }
 
-/// True where an octave holds the truth's waves with the truth's height and slope.
+/// True where an octave is coherent with the truth and has its RMS height and slope.
 pub fn alike(band: &PhotoclinometryBandRow) -> bool {
     let near = |recovered: f64, truth: f64| (recovered - truth).abs() <= ALIKE * truth;
-    // Octaves of a release that has no slopes are judged by their heights.
+    // Octaves of a release without slopes are judged by their heights alone.
     let slopes = !band.truth_slope_rms.is_finite() || near(band.recovered_slope_rms, band.truth_slope_rms);
     band.coherence >= COHERENT && near(band.recovered_rms_m, band.truth_rms_m) && slopes
 }
@@ -53,15 +53,16 @@ fn surface(surface: &Surface) -> String {
     }
     let row = surface.row;
     let [height, slope] = totals(surface.bands).map(|ratio| set::percent(ratio, 0));
-    let slope = if slope == set::ABSENT { String::new() } else { format!(", rms slope {slope}") };
+    let slope = if slope == set::ABSENT { String::new() } else { format!(", the RMS slope {slope}") };
     let (whole, level) = (row.height_error_rms_m, row.height_error_rms_detrended_m);
     let tilt = if level * level < (1.0 - TILTED) * whole * whole {
-        format!("; most of it is a tilt: {} remain less the plane", set::with_unit(level, 3, "m"))
+        format!("; most of it is a tilt: {} remain after subtracting the plane", set::with_unit(level, 3, "m"))
     } else {
         String::new()
     };
     format!(
-        "{}: {}. Over all these wavelengths: rms height {height} of the truth's{slope}. Heights are off by {} (rms) where the true ones have {}{tilt}.",
+        "{}: {}. Over all these wavelengths, the RMS height is {height} of the truth's{slope}. The RMS height error is {}, for a true RMS height \
+         of {}{tilt}.",
         surface.id(),
         wavelengths(surface.bands),
         set::with_unit(whole, 3, "m"),
@@ -69,18 +70,18 @@ fn surface(surface: &Surface) -> String {
     )
 }
 
-/// At which wavelengths the texture is the truth's, and what is wrong at the others.
+/// At which wavelengths the texture matches the truth, and how it deviates at the others.
 fn wavelengths(bands: &[PhotoclinometryBandRow]) -> String {
     let runs: Vec<&[PhotoclinometryBandRow]> = bands.chunk_by(|a, b| alike(a) == alike(b)).collect();
     let join = |is: bool, words: fn(&[PhotoclinometryBandRow]) -> String| {
         runs.iter().filter(|r| alike(&r[0]) == is).map(|r| words(r)).collect::<Vec<_>>().join(", and ")
     };
     let (good, bad) = (join(true, span), join(false, fault));
-    let has = format!("the truth's rms height and slope to {}, on the same waves,", set::percent(ALIKE, 0));
+    let has = format!("RMS height and slope within {} of the truth, and coherent with it,", set::percent(ALIKE, 0));
     match (good.is_empty(), bad.is_empty()) {
         (_, true) => format!("{has} at all wavelengths ({good})"),
-        (true, _) => format!("the truth's texture at no wavelength: {bad}"),
-        _ => format!("{has} at {good}; not at {bad}"),
+        (true, _) => format!("the texture matches the truth at no wavelength: {bad}"),
+        _ => format!("{has} at {good}, but not at {bad}"),
     }
 }
 
@@ -90,7 +91,7 @@ fn span(run: &[PhotoclinometryBandRow]) -> String {
     ends.map_or_else(String::new, |(low, high)| format!("{} to {} m", set::plain(low, 3), set::plain(high, 3)))
 }
 
-/// The same with what is wrong there.
+/// The same, with the deviations from the truth.
 fn fault(run: &[PhotoclinometryBandRow]) -> String {
     let ratios: Vec<f64> = run.iter().map(|b| b.recovered_rms_m / b.truth_rms_m).collect();
     let slopes: Vec<f64> =
@@ -103,17 +104,17 @@ fn fault(run: &[PhotoclinometryBandRow]) -> String {
     };
     let slopes = match slopes.is_empty() {
         true => String::new(),
-        false => format!(", rms slope {}", range(&slopes, &|v| set::percent(v, 0))),
+        false => format!(", RMS slope {}", range(&slopes, &|v| set::percent(v, 0))),
     };
     format!(
-        "{} (rms height {}{slopes} of the truth's, squared coherence {})",
+        "{} (RMS height {}{slopes} of the truth's, squared coherence {})",
         span(run),
         range(&ratios, &|v| set::percent(v, 0)),
         range(&coherences, &|v| set::significant(v, 2))
     )
 }
 
-/// What a reader must know of the inversions, one sentence for each cause.
+/// Warnings about the inversions, one sentence for each cause.
 pub fn warnings(surfaces: &[Surface]) -> Vec<String> {
     let ids = |of: &[&Surface]| {
         let mut names: Vec<String> = of.iter().take(NAMED_MAX).map(|s| s.id().to_owned()).collect();
@@ -131,25 +132,26 @@ pub fn warnings(surfaces: &[Surface]) -> Vec<String> {
     let causes = [
         that(&|s| !s.row.converged, &|of| {
             format!(
-                "heights did not settle, they still changed by up to {} in the last round.",
+                "heights did not converge; they still changed by up to {} in the last round.",
                 set::with_unit(most(of, |s| s.row.change_m), 2, "m")
             )
         }),
         that(&|s| s.row.condition > CONDITION_MAX, &|of| {
             format!(
-                "the suns hardly tell slopes from albedo (median condition number of a cell up to {}).",
+                "the sun positions barely separate slopes from albedo (median condition number of a cell up to {}).",
                 set::significant(most(of, |s| s.row.condition), 2)
             )
         }),
         that(&|s| s.row.share_leaning > LEANING_MAX, &|of| {
             format!(
-                "up to {} of the cells take their albedo from their neighbours, because too few images show them lit or the suns hardly tell slopes from albedo there.",
+                "up to {} of the cells take their albedo from their neighbours, because too few images show them lit or the sun positions barely \
+                 separate slopes from albedo there.",
                 set::percent(most(of, |s| s.row.share_leaning), 0)
             )
         }),
         that(&|s| s.row.height_error_rms_detrended_m > UNEXPLAINED * s.row.height_sigma_m, &|_| {
-            "heights are off by more than three times their uncertainty, which holds the noise of the images and neither wrong suns or exposures nor relief \
-             inside a cell."
+            "height errors exceed three times the uncertainty, which includes image noise but neither wrong sun positions or exposures nor relief \
+             within a cell."
                 .to_owned()
         }),
     ];

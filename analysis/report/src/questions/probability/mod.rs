@@ -1,4 +1,4 @@
-//! Outcomes as probabilities: several starts per mission, and what their scatter belongs to.
+//! Outcomes as probabilities: missions with several starts, and the components of the variance of their outcomes.
 
 use super::Question;
 use super::clusters::{LEVEL, REPLICATES, stream};
@@ -14,19 +14,19 @@ use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{Components, Interval, bootstrap, components};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// What everything here is computed from.
+/// Query for the rows from which everything here is computed.
 const REPLICATES_QUERY: &str = "select * from 'tables/replicates/*.parquet'";
 
 /// Registry entry.
 pub const QUESTION: Question =
     Question { id: "probability", name: "Probability", title: "How certain are the outcomes?", answer };
 
-/// Largest number of groups that are drawn.
+/// Largest number of groups drawn.
 const GROUPS_MAX: usize = 12;
-/// Boxes of the histogram where missions have more starts than this.
+/// Largest number of intervals of the histogram.
 const BOXES_MAX: usize = 20;
 const HEIGHT: f64 = 220.0;
-/// What a component is, and its colour.
+/// Name and colour of each component.
 const PARTS: [(&str, Paint); 3] = [
     ("terrain", Paint::Series(0)),
     ("mission on a terrain", Paint::Series(2)),
@@ -64,7 +64,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let known: Vec<&Split> = drawn.iter().filter(|g| g.shares.is_some()).collect();
     if !known.is_empty() {
         blocks.extend([
-            Block::Heading("What the scatter belongs to".into()),
+            Block::Heading("Where the scatter comes from".into()),
             Block::Text(WORDS.into()),
             Block::Figures(vec![stacked(&known)]),
         ]);
@@ -76,27 +76,33 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
 const WORDS: &str = "The variance of an outcome (success 1, failure 0) split into terrains, missions on a terrain, and starts of \
 a mission, by the estimators of the nested analysis of variance for unbalanced data (Searle, Casella and McCulloch, Variance \
 Components, 1992): sums of squares between terrains, between missions, and within missions are set equal to their expectations. \
-The part of the starts is the mean of p (1 − p) over missions with success probability p: what a better description of \
-terrain and line could never foresee. Estimates can come out below zero where there is little; they are shown as zero and named \
-in the table.";
+The component of the starts is the mean of p (1 − p) over missions with success probability p; no better description of terrain \
+and line could predict it. Estimates of small components can be negative; they are shown as zero and marked in the table.";
 
 fn introduction(groups: &[Split]) -> String {
     let missions: usize = groups.iter().map(|g| g.missions.len()).sum();
     let starts: usize = groups.iter().flat_map(|g| g.missions.iter().map(|m| m.outcomes.len())).sum();
     let even = |m: &&Started| m.probability() > 0.0 && m.probability() < 1.0;
     let undecided = groups.iter().flat_map(|g| g.missions.iter().filter(even)).count();
+    let mixed = match undecided {
+        0 => "every mission had the same result from all of its starts".to_owned(),
+        1 => "1 succeeded from some starts and failed from others, so its outcome is a probability, not a fact"
+            .to_owned(),
+        n => format!(
+            "{} succeeded from some starts and failed from others, so their outcome is a probability, not a fact",
+            set::count(n)
+        ),
+    };
     format!(
-        "{} were driven from {} starts in all, a hair apart: the drawn one and perturbed ones. {} of them ended in success from \
-         some starts and in failure from others: their outcome is a probability, not a fact. Intervals are {} %, from \
-         {REPLICATES} redraws of whole terrains.",
+        "Of {} with several starts, {mixed}. They were driven from {} starts in all, the drawn one and slightly perturbed ones. \
+         Intervals have {} % coverage, from {REPLICATES} bootstrap samples of whole terrains.",
         set::counted(missions, "mission"),
         set::count(starts),
-        set::count(undecided),
         set::fixed(100.0 * LEVEL, 0)
     )
 }
 
-/// Missions with several starts by group: those of the plain run, or of the first variant that has any.
+/// Missions with several starts, by group: those of the plain run, or of the first variant that has any.
 fn groups(data: &Data) -> Vec<Split<'_>> {
     let variants: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).collect();
     let of = |variant: &str| {
@@ -107,7 +113,7 @@ fn groups(data: &Data) -> Vec<Split<'_>> {
     splits.find(|run| !run.is_empty()).unwrap_or_default()
 }
 
-/// Missions of a group with more than one start; `None` where there is none.
+/// Missions of a group with more than one start; `None` if it has none.
 fn split<'a>(data: &Data, group: &Group<'a, MissionRow>) -> Option<Split<'a>> {
     let started = |mission: &&'a MissionRow| {
         let starts = data.starts_of(mission);
@@ -201,8 +207,8 @@ fn stacked(groups: &[&Split]) -> Figure {
     };
     Figure {
         id: "variance-of-outcomes".into(),
-        title: "Parts of the variance of an outcome.".into(),
-        caption: "n counts missions. Intervals stand in the table.".into(),
+        title: "Components of the variance of an outcome.".into(),
+        caption: "n is the number of missions. Intervals are in the table.".into(),
         description: format!("Shares of the variance. {}.", groups.iter().map(in_words).collect::<Vec<_>>().join("; ")),
         svg: rows.svg,
         numbers: components_of(groups.iter().copied()),
@@ -235,7 +241,7 @@ fn components_of<'a>(groups: impl IntoIterator<Item = &'a Split<'a>>) -> Numbers
         ("missions", "1"),
         ("starts", "1"),
         ("success", "%"),
-        ("part", ""),
+        ("component", ""),
         ("variance", "1"),
         ("share", "%"),
         ("low", "%"),
@@ -259,7 +265,7 @@ fn components_of<'a>(groups: impl IntoIterator<Item = &'a Split<'a>>) -> Numbers
                 number(100.0 * share),
                 number(interval.map_or(f64::NAN, |i| 100.0 * i.low)),
                 number(interval.map_or(f64::NAN, |i| 100.0 * i.high)),
-                text(if estimates[k] < 0.0 { "estimate below zero, taken as zero" } else { "" }),
+                text(if estimates[k] < 0.0 { "negative estimate, set to zero" } else { "" }),
             ]);
         }
     }

@@ -1,4 +1,4 @@
-//! Published figures beside ours, where the release holds the groups of a paper.
+//! Published results compared with ours, where the release has the groups of a paper.
 
 use super::Question;
 use super::clusters::{BAND, Clusters, Pairing, in_words, stream};
@@ -17,8 +17,8 @@ use sastrugi_statistics::{BoxPlot, Interval};
 /// Registry entry.
 pub const QUESTION: Question = Question {
     id: "published",
-    name: "Published figures",
-    title: "How does this compare with published figures?",
+    name: "Published results",
+    title: "How does this compare with published results?",
     answer,
 };
 
@@ -27,29 +27,28 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let pairing = Pairing::of(data);
     let rows = rows(data, &paper, &pairing);
     let paired = if pairing.is_common() {
-        " Our groups share their random draws, so our changes scatter less than those of groups drawn apart."
+        " Our groups share their random draws, so our changes scatter less than those of independent groups."
     } else {
         ""
     };
     let introduction = format!(
-        "Every figure that {} ({}) print for their groups, beside ours for groups of the same fractal dimension, whether they \
-         agree or not; nothing was tuned to them. The band holds 5 to 95 % of what our own study gives when whole {} are \
-         drawn anew; a printed figure is inside when it, give or take its rounding, lies in the band. The paper's figures \
-         scatter too, so one just outside is no contradiction; and changes from one group to the next share the group in \
-         between, so they are not independent.{paired} The paper prints changes of medians, absolute and relative; its medians \
-         follow from both.",
+        "The table has every value that {} ({}) print for their groups, and ours for groups of the same fractal dimension, \
+         whether they agree or not; nothing was tuned to them. The band holds 5 to 95 % of the values of our own study when whole \
+         {} are resampled; a published value is inside if it lies in the band within its rounding. The paper's values scatter \
+         too, so one just outside is not a contradiction. Changes from one group to the next share a group, so they are not \
+         independent.{paired} The paper prints changes of medians, absolute and relative; its medians follow from both.",
         paper.authors,
         paper.title,
         in_words(&pairing)
     );
-    let mut blocks = vec![Block::Text(introduction)];
+    let mut blocks: Vec<Block> = verdict(&rows).map(Block::Text).into_iter().collect();
     blocks.extend(difference(data, &paper).map(Block::Warning));
-    blocks.extend(verdict(&rows).map(Block::Text));
+    blocks.push(Block::Text(introduction));
     blocks.push(Block::Table(table(&paper, &rows)));
     Ok(blocks)
 }
 
-/// How the counts differ from the paper's, as a sentence; `None` when they do not.
+/// How the numbers of terrains and missions differ from the paper's, in a sentence; `None` if they do not.
 fn difference(data: &Data, paper: &Paper) -> Option<String> {
     let groups = shared(data.terrain_groups(), paper);
     let terrains: Vec<usize> = groups.iter().map(|g| g.rows.len()).collect();
@@ -59,8 +58,8 @@ fn difference(data: &Data, paper: &Paper) -> Option<String> {
         && per_terrain.iter().all(|n| *n == paper.missions_per_terrain);
     (!same).then(|| {
         format!(
-            "Settings differ: this release holds {} terrains a group and {} missions a terrain, the paper {} and {}. \
-             Differences below are therefore no verdict.",
+            "Settings differ: this release has {} terrains per group and {} missions per terrain, the paper {} and {}. \
+             The differences below are therefore not a verdict on the paper.",
             span(&terrains),
             span(&per_terrain),
             paper.terrains_per_group,
@@ -83,7 +82,7 @@ fn shared<'a, R>(groups: Vec<Group<'a, R>>, paper: &Paper) -> Vec<Group<'a, R>> 
     groups.into_iter().filter(|own| paper.groups.iter().any(|g| papers::same(&own.name, *g))).collect()
 }
 
-/// A printed figure and ours.
+/// A published value and ours.
 struct Row<'a> {
     published: &'a Published,
     /// Group, or groups from and to.
@@ -95,7 +94,7 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Whether the printed figure lies in the band, give or take its rounding; `None` without a band.
+    /// Whether the published value lies in the band within its rounding; `None` without a band.
     fn inside(&self) -> Option<bool> {
         self.band.map(|b| self.value + self.rounding >= b.low && self.value - self.rounding <= b.high)
     }
@@ -135,7 +134,7 @@ fn rows<'a>(data: &Data, paper: &'a Paper, pairing: &Pairing) -> Vec<Row<'a>> {
 /// Name of a group, and its values with the clusters that they belong to.
 type Items<'a> = (String, Vec<(&'a str, f64)>);
 
-/// Our figure of one or two groups, and its sampling band.
+/// Our value for one or two groups, and its sampling band.
 fn ours(
     data: &Data,
     item: &str,
@@ -149,13 +148,13 @@ fn ours(
     (statistic(&all), band)
 }
 
-/// The values that a figure is made of, by group, and the statistic over those of a group.
+/// The values behind a published number, by group, and the statistic over those of a group.
 struct Sample<'a> {
     groups: Vec<Items<'a>>,
     statistic: fn(&[f64]) -> f64,
 }
 
-/// What a figure is of each group.
+/// Values and statistic of a published number.
 fn sample<'a>(data: &'a Data, paper: &Paper, pairing: &Pairing<'a>, figure: &str) -> Sample<'a> {
     let terrains = || shared(data.terrain_groups(), paper);
     let of_terrain = |t: &&'a TerrainRow| (t.terrain_id.as_str(), 100.0 * share(t, figure));
@@ -171,7 +170,7 @@ fn sample<'a>(data: &'a Data, paper: &Paper, pairing: &Pairing<'a>, figure: &str
     let clustered = |(name, items): Items<'a>| {
         let known = items.into_iter().filter(|v| v.1.is_finite());
         let mut known: Vec<(&str, f64)> = known.map(|v| (pairing.cluster(v.0), v.1)).collect();
-        // Redraws keep the order, and medians and quartiles of sorted values are quick.
+        // Resampling keeps the order, and medians and quartiles of sorted values are fast.
         known.sort_by(|a, b| a.1.total_cmp(&b.1));
         (name, known)
     };
@@ -183,7 +182,7 @@ fn sample<'a>(data: &'a Data, paper: &Paper, pairing: &Pairing<'a>, figure: &str
     Sample { groups: values.into_iter().map(clustered).collect(), statistic }
 }
 
-/// 100 for a successful mission of a group, else 0, with its terrain.
+/// 100 for a successful mission of a group, otherwise 0, with its terrain.
 fn percents<'a>(group: &Group<'a, MissionRow>) -> Vec<(&'a str, f64)> {
     let percent = |m: &&'a MissionRow| (m.terrain_id.as_str(), if reached(m) { 100.0 } else { 0.0 });
     group.rows.iter().map(percent).collect()
@@ -203,23 +202,21 @@ fn outliers(values: &[f64]) -> f64 {
     BoxPlot::of(values).map_or(f64::NAN, |b| b.outliers.len() as f64)
 }
 
-/// How many of the printed figures are inside, in a sentence; `None` without a band.
+/// How many of the published values are inside, in a sentence; `None` without a band.
 fn verdict(rows: &[Row]) -> Option<String> {
     let known: Vec<bool> = rows.iter().filter_map(Row::inside).collect();
     let inside = known.iter().filter(|i| **i).count();
-    (!known.is_empty()).then(|| {
-        format!(
-            "{} of {} printed figures lie inside of our sampling band, {} outside.",
-            set::count(inside),
-            set::count(known.len()),
-            set::count(known.len() - inside)
-        )
+    let all = set::count(known.len());
+    (!known.is_empty()).then(|| match inside {
+        0 => format!("None of {all} published values lies inside our sampling band."),
+        1 => format!("1 of {all} published values lies inside our sampling band."),
+        n => format!("{} of {all} published values lie inside our sampling band.", set::count(n)),
     })
 }
 
 fn table(paper: &Paper, rows: &[Row]) -> TableBlock {
     let columns = [
-        ("figure", ""),
+        ("quantity", ""),
         ("unit", ""),
         ("group", ""),
         ("paper", ""),
@@ -245,6 +242,6 @@ fn table(paper: &Paper, rows: &[Row]) -> TableBlock {
             text(&row.published.origin),
         ]);
     }
-    let caption = format!("Published figures: {} and this release", paper.authors);
+    let caption = format!("Published values: {} and this release", paper.authors);
     TableBlock { id: "published".into(), caption, numbers }
 }

@@ -1,4 +1,4 @@
-//! Whether a release differs from another one, figure by figure.
+//! Does a release differ from another? Compared quantity by quantity.
 
 use super::Question;
 use super::clusters::LEVEL;
@@ -18,14 +18,14 @@ pub const QUESTION: Question =
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let Some(other) = &data.against else { return Ok(Vec::new()) };
-    // Those of the verb `compare`, so that both say the same.
+    // The same streams as in the verb `compare`, so that both give the same answer.
     let streams = Streams::for_seed(0, releases::STREAMS);
     let settings = Settings { margin: MARGIN, alpha: ALPHA };
     let (quantities, alone) = releases::compare(&figures(&other.data), &figures(data), settings, &streams);
     let mut blocks = vec![Block::Text(introduction(other))];
     let only: Vec<String> = alone.concat();
     if !only.is_empty() {
-        blocks.push(Block::Warning(format!("Groups in one release alone are not compared: {}.", only.join("; "))));
+        blocks.push(Block::Warning(format!("Not compared, because only one release has them: {}.", only.join("; "))));
     }
     if quantities.is_empty() {
         blocks.push(Block::Warning("The releases have no group in common.".into()));
@@ -45,7 +45,7 @@ fn figures(data: &Data) -> Figures {
     figures
 }
 
-/// What is computed from, in each of the releases.
+/// Query for the rows from which the comparison is computed, in each of the releases.
 const IN_EACH: &str =
     "select * from 'tables/terrains/*.parquet' left join 'tables/missions/*.parquet' using (terrain_id)";
 
@@ -66,25 +66,27 @@ fn verdict(q: &Quantity) -> &'static str {
 }
 
 fn in_words(quantities: &[Quantity], other: &str) -> String {
-    let part = |word: &&str| {
-        let n = quantities.iter().filter(|q| verdict(q) == *word).count();
-        (n > 0).then(|| format!("{} {word}", set::count(n)))
+    let adjectives =
+        ["identical", "equivalent within the margin", "different by less than the margin", "different", "undecided"];
+    let part = |(word, adjective): (&str, &str)| {
+        let n = quantities.iter().filter(|q| verdict(q) == word).count();
+        (n > 0).then(|| format!("{} {} {adjective}", set::count(n), if n == 1 { "is" } else { "are" }))
     };
-    let parts: Vec<String> = VERDICTS.iter().filter_map(part).collect();
-    format!("{} of groups beside those of {other}: {}.", set::counted(quantities.len(), "figure"), parts.join(", "))
+    let parts: Vec<String> = VERDICTS.into_iter().zip(adjectives).filter_map(part).collect();
+    format!("Of {} with {other}, {}.", set::counted(quantities.len(), "comparison"), parts.join(", "))
 }
 
 fn introduction(other: &Against) -> String {
     let theirs = &other.data;
     format!(
-        "The other release is {} (study {}, {}, hash of the study {}). Differences are this release less the other. Every terrain counts \
-         once, by the mean of its missions (success: of all; other figures: of the successful ones). Terrains are paired where both \
-         releases have the same heights (by the hash of their content) or the same random draws under the same id, if all of the smaller group \
-         do: signed-rank tests; elsewhere they are independent: rank-sum tests. The shift is Hodges and Lehmann's; its {} % \
-         interval holds the shifts that the test would not reject if there were no ties. p by permutation, Holm over all tests of this section. \
-         Equivalent means: within a margin of {} points of success and of the shares of classes, {} % of the other's mean for other \
-         figures, at {} % (two one-sided t tests of means, not adjusted). sastrugi compare gives the same figures; what differs by less than the margin it calls the same. Exploratory, unless both were set \
-         before the runs.",
+        "The other release is {} (study {}, {}, hash of the study {}). Differences are this release minus the other. Every terrain counts \
+         once, with the mean over its missions (success: all missions; other metrics: successful missions only). Terrains are compared in \
+         pairs (signed-rank tests) if every terrain of the smaller group has the same heights in both releases, by the hash of its content, \
+         or the same random draws under the same id; otherwise as independent samples (rank-sum tests). The shift is Hodges and Lehmann's; its \
+         {} % interval holds the shifts that the test would not reject if there were no ties. p values are from permutations, with Holm's \
+         adjustment over all tests of this section. The equivalence margin is {} percentage points for success and class shares, and {} % of \
+         the other release's mean for everything else, at {} % (two one-sided t tests of means, not adjusted). sastrugi compare gives the same \
+         numbers, but counts differences below the margin as the same. Exploratory, unless both were set before the runs.",
         other.name,
         theirs.study.name,
         theirs.version,
@@ -96,7 +98,7 @@ fn introduction(other: &Against) -> String {
     )
 }
 
-/// Words of a figure: those of the page for missions, the column for terrains.
+/// Name and unit of a quantity: as on the page for missions, the column for terrains.
 fn name(q: &Quantity) -> (&'static str, &'static str) {
     let of_missions = Statistic::ALL.into_iter().find(|s| q.table == "missions" && s.column() == q.figure);
     of_missions.map_or((q.figure, if q.unit == "1" { "" } else { q.unit }), words)
@@ -104,7 +106,7 @@ fn name(q: &Quantity) -> (&'static str, &'static str) {
 
 fn table(quantities: &[Quantity]) -> TableBlock {
     let columns = [
-        ("figure", ""),
+        ("quantity", ""),
         ("group", ""),
         ("verdict", ""),
         ("unit", ""),
@@ -135,5 +137,5 @@ fn table(quantities: &[Quantity]) -> TableBlock {
         };
         numbers.row(head.into_iter().chain(values.chain(tail).map(number)).chain([text(of)]));
     }
-    TableBlock { id: "releases".into(), caption: "This release against the other".into(), numbers }
+    TableBlock { id: "releases".into(), caption: "This release compared with the other".into(), numbers }
 }

@@ -1,4 +1,4 @@
-//! Values of every pair by group, a lane for each method: ratios of cost and of effort, shares of vertices.
+//! Values of every pair by group, with a lane for each method: ratios of cost and of effort, shares of vertices.
 
 use super::methods::{Method, found, geometric_mean, groups, vertex_share};
 use super::ratios::{Pair, Ratio};
@@ -45,12 +45,13 @@ struct Strip<'a> {
 
 /// The figures that have values.
 pub fn figures(data: &Data, methods: &[Method], ratios: &[Ratio]) -> Vec<Figure> {
-    let beside = "Marks are pairs of start and goal, the tick their geometric mean, the bar below its interval where there are terrains enough.";
+    let beside = "Marks are pairs of start and goal; the tick is their geometric mean, and the bar below it the interval of the mean where there \
+                  are enough terrains.";
     let query = "select \"group\", terrain_id, pair_id, stage_id, variant, smoothed_cost_m, expansions from 'tables/routes/*.parquet' where outcome = 'found'";
     let cost = Strip {
         id: "route-cost-ratios",
-        title: "Smoothed cost beside the reference.",
-        axis: "smoothed cost over that of the reference",
+        title: "Smoothed cost relative to the reference.",
+        axis: "smoothed cost / reference",
         column: "cost_ratio",
         caption: beside,
         query,
@@ -58,20 +59,20 @@ pub fn figures(data: &Data, methods: &[Method], ratios: &[Ratio]) -> Vec<Figure>
     };
     let effort = Strip {
         id: "route-expansion-ratios",
-        title: "Search effort beside the reference.",
-        axis: "expansions over those of the reference",
+        title: "Search effort relative to the reference.",
+        axis: "expansions / reference",
         column: "expansion_ratio",
         ..cost
     };
     let banded = if bayrak::applicable(data).is_some() {
-        " Grey bands: shares that Bayrak (2008) prints for roadmaps without threshold on maps of the same kind, all sizes."
+        " Grey bands: shares in Bayrak (2008) for roadmaps without threshold on maps of the same kind, of all sizes."
     } else {
         ""
     };
-    let caption = format!("Marks are routes, the tick their geometric mean.{banded}");
+    let caption = format!("Marks are routes; the tick is their geometric mean.{banded}");
     let shares = Strip {
         id: "vertex-shares",
-        title: "Vertices of the search.",
+        title: "Vertices of the search graph.",
         axis: "vertices, % of the cells that may be entered",
         column: "vertex_share_percent",
         caption: &caption,
@@ -97,7 +98,7 @@ pub fn figures(data: &Data, methods: &[Method], ratios: &[Ratio]) -> Vec<Figure>
     .collect()
 }
 
-/// Shares of vertices of the methods that choose them: a grid has them all.
+/// Shares of vertices of the roadmap methods; a grid uses all cells.
 fn share_rows(data: &Data, methods: &[Method]) -> Vec<Row> {
     let paper = bayrak::applicable(data);
     let row = |(group, routes): (String, Vec<&sastrugi_schemas::tables::RouteRow>)| {
@@ -175,7 +176,7 @@ fn draw_lane(drawn: &mut Rows, y: f64, lane: &Lane) {
     }
 }
 
-/// Mark of a method, told apart without colour.
+/// Mark of a method, which distinguishes it without colour.
 fn symbol(method: usize) -> Symbol {
     let all =
         [Symbol::Disc, Symbol::Square, Symbol::Triangle, Symbol::Diamond, Symbol::Ring, Symbol::Cross, Symbol::Frame];

@@ -1,4 +1,4 @@
-//! Routes of all methods between one start and goal of each group, on the relief.
+//! Routes of all methods between one start and goal of each group, over the relief.
 
 use super::methods::{Method, found, groups};
 use crate::ReportError;
@@ -15,15 +15,15 @@ use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::{RoutePointRow, RouteRow};
 
-/// Largest number of groups that are drawn.
+/// Largest number of groups drawn.
 const GROUPS_MAX: usize = 12;
 /// Largest number of rows or columns of a relief.
 const PIXELS: usize = 420;
 /// Marks on maps do not follow the theme.
 pub const DARK: Paint = Paint::Fixed([0x1b, 0x20, 0x26]);
-/// What sets them apart from the ground.
+/// Halo that sets marks off from the ground.
 pub const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
-/// Dashes by number, so that colour alone never tells.
+/// Dashes by number, so that nothing depends on colour alone.
 const DASHES: [&str; 6] = ["", "7 3", "2 3", "9 3 2 3", "5 2 1 2 1 2", "1 4"];
 
 /// Line by number on a picture.
@@ -36,16 +36,16 @@ pub fn legend_track(index: usize) -> Stroke {
     Stroke { paint: Paint::Series(index), ..track(index) }
 }
 
-/// What is drawn, and how many.
+/// What is drawn, and how many maps there are.
 pub fn words(maps: usize) -> String {
     format!(
-        "{}, one for each group up to {GROUPS_MAX}: of the pairs that most methods connect, the one whose first route has the middle \
+        "{}, one for each group (at most {GROUPS_MAX}): of the pairs that most methods connect, the one whose first route has the median \
          smoothed cost (the lower middle of an even number, the first of equals). Lines are smoothed routes.",
         set::counted(maps, "map")
     )
 }
 
-/// A map for each group with a route whose relief the release holds.
+/// A map for each group with a route whose relief is in the release.
 pub fn figures(data: &Data, methods: &[Method]) -> Result<Vec<Figure>, ReportError> {
     let points = data.files.route_points()?;
     let mut figures = Vec::new();
@@ -56,7 +56,7 @@ pub fn figures(data: &Data, methods: &[Method]) -> Result<Vec<Figure>, ReportErr
     Ok(figures)
 }
 
-/// Routes of the pair with the middle cost among those that most methods connect.
+/// Routes of the pair with the median cost among those that most methods connect.
 fn middle<'a>(routes: &[&'a RouteRow]) -> Vec<&'a RouteRow> {
     let mut pairs: std::collections::BTreeMap<(&str, &str), Vec<&RouteRow>> = Default::default();
     for route in routes.iter().filter(|r| found(r) && r.variant.is_none()) {
@@ -106,14 +106,14 @@ fn figure(
     Ok(Some(Figure {
         id,
         title: format!("Routes, group {group}."),
-        caption: format!("{}, costs in metres of level ground.{}", terrain.terrain_id, exaggeration_words(factor)),
+        caption: format!("{}. Costs are in metres of level ground.{}", terrain.terrain_id, exaggeration_words(factor)),
         description: format!("Map of routes, {}; smoothed costs: {}.", extent(&grid), costs.join(", ")),
         svg: map.svg,
         numbers: Numbers::select(&condition, routes.iter().copied(), &columns),
     }))
 }
 
-/// Heights of a terrain, without those of the cells that a route's obstacles block. `None` where the release has no such file.
+/// Heights of a terrain without the cells that a route's obstacles block. `None` where the release has no such file.
 pub fn ground(data: &Data, path: &str, route: &RouteRow) -> Result<Option<Grid>, ReportError> {
     let Some(mut heights) = data.files.grid(path)? else { return Ok(None) };
     let blocked = format!("route/{}/{}.blocked.tif", route.terrain_id, route.stage_id);
@@ -128,13 +128,13 @@ pub fn ground(data: &Data, path: &str, route: &RouteRow) -> Result<Option<Grid>,
     Ok(Some(heights))
 }
 
-/// What the legend says of cells without data, where there are any.
+/// Legend entry of cells without data; `None` if there are none.
 pub fn closed(grid: &Grid) -> Option<Entry> {
     let any = grid.finite_count() < grid.values.len();
     any.then(|| (Mark::Fill(Paint::Fixed(NO_DATA)), "cannot be entered".to_owned()))
 }
 
-/// The smoothed path of a route; the nothing where its points are not held.
+/// The smoothed path of a route; empty if the release does not have its points.
 fn line_of(points: &[RoutePointRow], route: &RouteRow) -> Vec<(f64, f64)> {
     let of_terrain = of_key(points, |p| &p.terrain_id, &route.terrain_id);
     let own = of_key(of_terrain, |p| &p.route_id, &route.route_id);

@@ -1,4 +1,4 @@
-//! Methods that a release searched routes with, and routes by group of terrains.
+//! Methods of the route searches of a release, and routes by group of terrains.
 
 use crate::data::{Data, Natural, natural};
 use crate::render::number as set;
@@ -16,7 +16,7 @@ pub struct Method {
     variant: Option<String>,
     grid: bool,
     neighbours: i64,
-    /// What must agree so that costs compare: cost, vehicle, limits, width.
+    /// Terms that must agree for costs to be comparable: cost, vehicle, limits, width.
     terms: String,
 }
 
@@ -43,7 +43,7 @@ impl Method {
     }
 }
 
-/// As `roadmap without threshold, 4 neighbours`.
+/// The search in words, for example `roadmap without threshold, 4 neighbours`.
 fn search(route: &RouteRow) -> String {
     let method = match route.method.as_str() {
         "roadmap" if route.threshold_m.is_finite() => {
@@ -57,7 +57,7 @@ fn search(route: &RouteRow) -> String {
     format!("{method}, {} neighbours", route.neighbours)
 }
 
-/// The methods of a release in natural order of their names, the plain ones of a stage before its variants.
+/// The methods of a release in natural order of their names; a stage's plain method precedes its variants.
 pub fn methods(routes: &[RouteRow]) -> Vec<Method> {
     let mut methods: BTreeMap<(Natural, Option<Natural>), Method> = BTreeMap::new();
     for route in routes {
@@ -67,8 +67,8 @@ pub fn methods(routes: &[RouteRow]) -> Vec<Method> {
     methods.into_values().collect()
 }
 
-/// The method that another is compared with: the grid search on the same terms, first the one with as many neighbours; without a grid the
-/// first method on these terms. `None` for a reference itself.
+/// The reference of a method: the grid search on the same terms, preferably with the same number of neighbours; without a grid search, the
+/// first method on these terms. `None` for the reference itself.
 pub fn reference(methods: &[Method], method: usize) -> Option<usize> {
     let own = methods.get(method)?;
     let comparable = methods.iter().enumerate().filter(|(_, m)| m.terms == own.terms && m.variant == own.variant);
@@ -86,7 +86,7 @@ pub fn vertex_share(route: &RouteRow) -> f64 {
     route.vertices as f64 / route.free_cells as f64
 }
 
-/// Routes by label of their terrain, in natural order; `all` where there is none.
+/// Routes by label of their terrain, in natural order; `all` for those without a label.
 pub fn groups(data: &Data) -> Vec<(String, Vec<&RouteRow>)> {
     let mut groups: BTreeMap<Natural, Vec<&RouteRow>> = BTreeMap::new();
     for route in &data.routes {

@@ -1,4 +1,4 @@
-//! How good the routes are: vertices, costs and effort by group of terrains and method, ratios to a reference over common pairs, maps.
+//! How good the routes are: vertices, cost and effort by group of terrains and method, ratios to a reference over common pairs, maps.
 
 mod lanes;
 pub mod maps;
@@ -18,7 +18,7 @@ use sastrugi_schemas::tables::RouteRow;
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "routes", name: "Routes", title: "How good are the routes?", answer };
 
-/// Fewest terrains for a bootstrap interval: six give 462 different redraws, three only ten.
+/// Fewest terrains for a bootstrap interval: six give 462 different bootstrap samples, three only ten.
 pub const TERRAINS_MIN: usize = 6;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
@@ -48,7 +48,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// One sentence for each reference: the cheapest and the dearest method beside it.
+/// One sentence for each method, which compares it with its reference.
 fn verdict(methods: &[Method], ratios: &[ratios::Ratio]) -> Option<String> {
     let pooled = |method: usize| {
         let values: Vec<&ratios::Pair> = ratios.iter().filter(|r| r.method == method).flat_map(|r| &r.pairs).collect();
@@ -58,7 +58,7 @@ fn verdict(methods: &[Method], ratios: &[ratios::Ratio]) -> Option<String> {
     };
     let sentence = |(method, reference, pairs, cost, expansions): (usize, usize, usize, f64, f64)| {
         format!(
-            "{} costs {} times the route of {} and expands {} times the vertices ({}).",
+            "Smoothed routes of {} cost {} times those of {}, and the search expands {} times as many vertices ({}).",
             methods[method].name,
             set::plain(cost, 3),
             methods[reference].name,
@@ -67,32 +67,35 @@ fn verdict(methods: &[Method], ratios: &[ratios::Ratio]) -> Option<String> {
         )
     };
     let words: Vec<String> = (0..methods.len()).filter_map(pooled).map(sentence).collect();
-    (!words.is_empty()).then(|| format!("Geometric means over all groups, smoothed routes: {}", words.join(" ")))
+    (!words.is_empty()).then(|| format!("{} Factors are geometric means over all groups.", words.join(" ")))
 }
 
-/// How many routes were not found, and how.
+/// How many searches found no route, and why.
 fn missing(data: &Data) -> Option<String> {
     let of = |outcome: &str| data.routes.iter().filter(|r| r.outcome == outcome).count();
     let (none, budget) = (of("no_path"), of("budget"));
     let missing = data.routes.len() - data.routes.iter().filter(|r| found(r)).count();
+    let causes =
+        [(none, "because none exists within the limits"), (budget, "because the search ran out of expansions")];
+    let causes: Vec<String> =
+        causes.iter().filter(|(n, _)| *n > 0).map(|(n, why)| format!("{} {why}", set::count(*n))).collect();
     (missing > 0).then(|| {
         format!(
-            "{} of {} searches found no route: {} because none exists within the limits, {} because the search used up its \
-             expansions. Medians and ratios are of the routes found, and a method that fails on the hard pairs looks better by them.",
+            "{} of {} found no route{}. Medians and ratios cover only the routes found, so a method that fails on the hard pairs looks \
+             better than it is.",
             set::count(missing),
-            set::count(data.routes.len()),
-            set::count(none),
-            set::count(budget)
+            if data.routes.len() == 1 { "1 search".into() } else { format!("{} searches", set::count(data.routes.len())) },
+            if causes.is_empty() { String::new() } else { format!(": {}", causes.join(", ")) }
         )
     })
 }
 
 fn ratio_words() -> String {
     format!(
-        "A ratio compares two methods between the same start and goal, by the cost of the smoothed path along quarter cells. Reference is the \
-         grid search with the same limits and cost where there is one, else the first such method. Means are geometric. The {} % interval draws \
-         whole terrains anew, because pairs on one terrain resemble each other; with fewer than {TERRAINS_MIN} terrains such redraws are too coarse for \
-         an interval, and the smallest and largest ratio stand alone.",
+        "A ratio compares two methods between the same start and goal, by the cost of the smoothed path in steps of a quarter cell. The reference \
+         is the grid search with the same limits and cost if there is one, otherwise the first such method. Means are geometric. The {} % \
+         interval resamples whole terrains, because pairs on one terrain are correlated; fewer than {TERRAINS_MIN} terrains give too few different \
+         samples for an interval, and only the smallest and largest ratio are given.",
         set::fixed(100.0 * LEVEL, 0)
     )
 }
@@ -144,7 +147,7 @@ fn summary(data: &Data, methods: &[Method]) -> TableBlock {
     }
     TableBlock {
         id: "routes-by-method".into(),
-        caption: "Routes by group and method, medians of those found".into(),
+        caption: "Routes by group and method, medians over the routes found".into(),
         numbers,
     }
 }

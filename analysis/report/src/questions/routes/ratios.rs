@@ -1,4 +1,4 @@
-//! Cost and effort of a method over those of its reference between the same starts and goals.
+//! Ratios of cost and effort of a method to those of its reference, between the same starts and goals.
 
 use super::TERRAINS_MIN;
 use super::methods::{Method, found, geometric_mean, groups, reference};
@@ -20,7 +20,7 @@ pub struct Pair {
     pub expansions: f64,
 }
 
-/// A method beside its reference on the terrains of a group.
+/// A method compared with its reference on the terrains of a group.
 #[derive(Clone, Debug)]
 pub struct Ratio {
     /// Label of the terrains.
@@ -33,14 +33,14 @@ pub struct Ratio {
     pub names: [String; 2],
     /// Pairs that both found.
     pub pairs: Vec<Pair>,
-    /// Interval of the geometric mean of the cost, where there are terrains enough.
+    /// Interval of the geometric mean of the cost ratio, where there are enough terrains.
     pub cost: Option<Interval>,
-    /// The same of the expansions.
+    /// The same for the expansions.
     pub expansions: Option<Interval>,
 }
 
 impl Ratio {
-    /// Terrains of the pairs.
+    /// Number of terrains of the pairs.
     pub fn terrains(&self) -> usize {
         self.pairs.iter().map(|p| p.terrain_id.as_str()).collect::<BTreeSet<_>>().len()
     }
@@ -53,7 +53,7 @@ impl Ratio {
     }
 }
 
-/// Every method beside its reference in every group in which both found a route between the same ends.
+/// Every method with its reference, in every group in which both found a route between the same ends.
 pub fn ratios(data: &Data, methods: &[Method]) -> Vec<Ratio> {
     let mut ratios = Vec::new();
     for (group, routes) in groups(data) {
@@ -87,12 +87,12 @@ fn pairs(routes: &[&RouteRow], method: &Method, reference: &Method) -> Vec<Pair>
     routes.iter().filter(|r| found(r) && method.holds(r)).filter_map(pair).filter(usable).collect()
 }
 
-/// Means, intervals and ends of both ratios.
+/// Means, intervals and extremes of both ratios.
 pub fn table(ratios: &[Ratio]) -> TableBlock {
     let columns = [
         ("group", ""),
         ("method", ""),
-        ("beside", ""),
+        ("reference", ""),
         ("pairs", "1"),
         ("terrains", "1"),
         ("smoothed cost", "1"),

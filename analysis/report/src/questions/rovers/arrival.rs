@@ -1,4 +1,4 @@
-//! Distance driven to arrival: the share that has arrived by a distance, and the distance that a share needs.
+//! Distance to arrival: the share of rovers that has arrived by a distance, and the distance that a share needs.
 
 use super::sets::{Set, reached};
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, slug, text};
@@ -13,7 +13,7 @@ use sastrugi_schemas::tables::RoverRow;
 use sastrugi_statistics::Ending;
 use sastrugi_statistics::incidence::clustered::{Clustered, Step};
 
-/// Shares whose distance is asked for.
+/// Shares whose distance is tabulated.
 const SHARES: [f64; 4] = [0.5, 0.8, 0.9, 0.95];
 /// Curves in one frame.
 const CURVES_MAX: usize = 6;
@@ -23,7 +23,7 @@ const STEPS_MAX: usize = 300;
 const LOG_FROM: f64 = 5.0;
 const HEIGHT: f64 = 300.0;
 const DASHES: [&str; 6] = ["", "7 3", "2 3", "9 3 2 3", "5 2 1 2 1 2", "1 4"];
-/// What curves are computed from.
+/// Query for the rows from which curves are computed.
 const QUERY: &str = "select terrain_id, rover_id, \"group\", stage_id, variant, outcome, distance_m, straight_m from 'tables/rovers/*.parquet'";
 
 /// A set and its curve.
@@ -32,17 +32,17 @@ struct Curve<'a> {
     arrived: Clustered,
 }
 
-/// Words, figures and the table of budgets.
+/// Text, figures and the table of budgets.
 pub fn blocks(sets: &[Set]) -> Vec<Block> {
     let curves: Vec<Curve> = sets.iter().map(curve).collect();
     let mut stages: Vec<&[Curve]> = curves.chunk_by(|a, b| a.set.stage == b.set.stage).collect();
     stages.retain(|s| s.iter().any(|c| !c.arrived.steps.is_empty()));
     let figures: Vec<Figure> = stages.iter().map(|s| figure(&s[..s.len().min(CURVES_MAX)])).collect();
     let words = format!(
-        "A rover that stops at a limit, or at the end of the known ground, would have driven on: its distance is censored. One that is lost or knows of no way never \
-         arrives. Curves are those of Aalen and Johansen (1978), which without lost rovers are one minus Kaplan and Meier's (1958). Bands are {} % at each \
-         distance, with the scatter between worlds by the jackknife and the interval of Korn and Graubard (1998). A distance budget is read off the curve; its \
-         interval holds the distances at which the band does (Brookmeyer and Crowley, 1982).",
+        "A distance budget is the distance within which a given share of the rovers arrives. A rover that stops at a limit, or at the end of the known ground, \
+         would have driven on, so its distance is censored; one that is lost or knows of no path never arrives. Curves are Aalen and Johansen's (1978), which \
+         without lost rovers are one minus Kaplan and Meier's (1958). Bands are pointwise {} % intervals by Korn and Graubard (1998), with the jackknife variance \
+         between worlds. The interval of a budget holds the distances at which the band reaches the share (Brookmeyer and Crowley, 1982).",
         set_number::fixed(100.0 * LEVEL, 0)
     );
     let mut blocks = vec![Block::Heading("Distance budget".into()), Block::Text(words)];
@@ -53,7 +53,7 @@ pub fn blocks(sets: &[Set]) -> Vec<Block> {
     blocks
 }
 
-/// What a rover's row says of its arrival.
+/// How a rover's drive ended, for the estimate of arrival.
 fn ending(rover: &RoverRow) -> Ending {
     let cause = match rover.outcome.as_str() {
         _ if reached(rover) => Some(0),
@@ -90,7 +90,7 @@ fn figure(curves: &[Curve]) -> Figure {
     Figure {
         id,
         title: format!("Arrival of {} rovers.", first.navigator()),
-        caption: format!("Straight lines are {} m.", set_number::plain(straight, 3)),
+        caption: format!("The straight distance is {} m.", set_number::plain(straight, 3)),
         description: describe(curves),
         svg: plot.svg,
         numbers: numbers(curves),
@@ -101,7 +101,7 @@ fn stroke(number: usize, set: &Set) -> Stroke {
     Stroke::new(Paint::Series(set.index), 2.0).dashed(DASHES[number % DASHES.len()])
 }
 
-/// Steps that are drawn: the last of them is always there.
+/// Steps that are drawn, always including the last one.
 fn drawn(curve: &Curve) -> Vec<Step> {
     thin::every(&curve.arrived.steps, STEPS_MAX)
 }
@@ -179,7 +179,7 @@ fn budgets(curves: &[Curve]) -> TableBlock {
             let known = |v: Option<f64>| number(v.unwrap_or(f64::NAN));
             let note = match (budget.estimate, budget.high) {
                 (None, _) => format!("not reached within {}", set_number::with_unit(limit, 4, "m")),
-                (Some(_), None) if curve.set.worlds.len() > 1 => "upper end not reached".into(),
+                (Some(_), None) if curve.set.worlds.len() > 1 => "no upper limit".into(),
                 _ => String::new(),
             };
             numbers.row([

@@ -8,25 +8,25 @@ use crate::render::number as set_number;
 use sastrugi_schemas::Cell;
 use std::collections::BTreeSet;
 
-/// Rows or columns of a block at most; all combinations are in the list.
+/// Largest number of rows or columns of a block; the list has all combinations.
 const VALUES_MAX: usize = 12;
-/// The parameter that stands in the rows where it is swept.
+/// The parameter that forms the rows if it is swept.
 const SIZE: &str = "scale";
 
-/// A combination: parameters and values in the order of the variant, and the set that it drove.
+/// A combination: parameters and values in the order of the variant, and its set of rovers.
 struct Design<'a> {
     values: Vec<(String, String)>,
     set: Set<'a>,
 }
 
-/// What is swept together: stages that vary the same parameters with one navigator.
+/// Designs that are swept together: stages that vary the same parameters with one navigator.
 struct Family<'a> {
     name: String,
     parameters: Vec<String>,
     designs: Vec<Design<'a>>,
 }
 
-/// Words and tables; nothing without variants.
+/// Text and tables; empty without variants.
 pub fn blocks(data: &Data) -> Vec<Block> {
     let families = families(data);
     if families.is_empty() {
@@ -40,8 +40,8 @@ pub fn blocks(data: &Data) -> Vec<Block> {
     blocks
 }
 
-const WORDS: &str = "Each cell holds the mean efficiency with its 95 % interval over worlds, then the share of rovers that reach the goal and the mean efficiency of those. Designs drive on the same \
-worlds from the same starts, so cells of a block differ by less chance than their intervals alone would say.";
+const WORDS: &str = "Each cell gives the mean efficiency with its 95 % interval over worlds, then the share of rovers that reach the goal and their mean efficiency. All designs drive on \
+the same worlds from the same starts, so differences between the cells of a block are less uncertain than their intervals suggest.";
 
 /// Parameters and values of a variant: `clearance_m = 0.1, scale = 0.75`.
 fn parse(variant: &str) -> Vec<(String, String)> {
@@ -55,7 +55,7 @@ fn families(data: &Data) -> Vec<Family<'_>> {
     for set in variants(data) {
         let values = parse(set.variant.unwrap_or_default());
         let mut parameters: Vec<String> = values.iter().map(|v| v.0.clone()).collect();
-        // Size stands first, in the rows.
+        // Size comes first, in the rows.
         parameters.sort_by_key(|p| p != SIZE);
         let name = set.navigator();
         match families.iter_mut().find(|f| f.name == name && f.parameters == parameters) {
@@ -81,7 +81,7 @@ impl Family<'_> {
         values.into_iter().map(|v| v.1).take(VALUES_MAX).collect()
     }
 
-    /// Group and the values of all parameters but the first two: what a block is.
+    /// Group, and the values of all parameters but the first two: they identify a block.
     fn block(&self, design: &Design) -> (crate::data::Natural, String) {
         let rest: Vec<String> =
             self.parameters.iter().skip(2).map(|p| format!(", {p} = {}", design.value(p))).collect();
@@ -137,7 +137,7 @@ fn words(set: &Set) -> String {
     )
 }
 
-/// The rows of the table `rovers` that designs are computed from.
+/// Query for the rows of the table `rovers` from which designs are computed.
 fn query<'a>(designs: impl IntoIterator<Item = &'a Design<'a>>) -> String {
     let stages: BTreeSet<String> = designs.into_iter().map(|d| crate::questions::sql::quoted(d.set.stage)).collect();
     format!(

@@ -1,4 +1,4 @@
-//! Which design number moves the rovers: elementary effects of the perturbed parameters, as a stage computed them.
+//! Which design parameters matter: elementary effects of the perturbed parameters, as a stage computed them.
 
 use crate::content::{Block, Figure, Numbers, TableBlock, slug};
 use crate::data::Data;
@@ -11,27 +11,27 @@ use sastrugi_schemas::tables::RoverEffectRow;
 
 /// Parameters in a figure; all are in the table.
 const DRAWN_MAX: usize = 14;
-/// Perturbed trials that are drawn.
+/// Perturbed trials drawn.
 const TRIALS_MAX: usize = 4;
-/// Measures, what their axes say, and the factor on their effects.
+/// Measures, titles of their axes, and the factor on their effects.
 const MEASURES: [(&str, &str, f64); 3] = [
-    ("efficiency", "change of the efficiency", 1.0),
+    ("efficiency", "change of efficiency", 1.0),
     ("arrival", "change of arrival, points", 100.0),
-    ("distance_m", "change of the distance, m", 1.0),
+    ("distance_m", "change of distance, m", 1.0),
 ];
 
-/// Words, figures, table; nothing where nothing was perturbed.
+/// Text, figures and table; empty where nothing was perturbed.
 pub fn blocks(data: &Data) -> Vec<Block> {
     let rows = &data.rover_effects;
     let Some(first) = rows.first() else { return Vec::new() };
     let figures = trials(rows).into_iter().take(TRIALS_MAX).flat_map(figures_of).collect();
-    let mut blocks = vec![Block::Heading("Which design number moves it?".into())];
+    let mut blocks = vec![Block::Heading("Which design parameters matter?".into())];
     blocks.extend(verdict(rows).map(Block::Text));
     blocks.push(Block::Text(format!(
-        "Parameters are changed one after the other along random trajectories, by up to {} of their value to either side (Morris, 1991). A bar is the mean size of the change that a \
-         parameter makes when it changes by {} of its value; its line is the 95 % interval over worlds and trajectories. The tick is the size that mere reshuffling of the rovers' ways \
-         would show: a bar that does not stand out from it says nothing. Colours tell the way: a larger parameter raises the measure, lowers it, or cannot be told (the interval of the \
-         mean effect holds 0).",
+        "Parameters are changed one at a time along random trajectories, by up to {} of their value in either direction (Morris, 1991). A bar is the mean absolute effect of changing a \
+         parameter by {} of its value; its line is the 95 % interval over worlds and trajectories. The tick is the effect that a mere reshuffling of the rovers' paths would show; a bar \
+         that does not clearly exceed it is not evidence of an effect. Colours show the direction: a larger parameter raises the measure, lowers it, or has an unclear sign (the interval \
+         of the mean effect includes 0).",
         set_number::percent(first.share, 0),
         set_number::percent(first.share, 0)
     )));
@@ -45,20 +45,21 @@ fn trials(rows: &[RoverEffectRow]) -> Vec<&[RoverEffectRow]> {
     rows.chunk_by(|a, b| (&a.stage_id, &a.group, &a.variant) == (&b.stage_id, &b.group, &b.variant)).collect()
 }
 
-/// The parameter that moves each measure most, of every trial.
+/// The most influential parameter for each measure of every trial.
 fn verdict(rows: &[RoverEffectRow]) -> Option<String> {
     let sentence = |trial: &[RoverEffectRow]| {
         let first = trial.first()?;
         let part = |(measure, ..): &(&str, &str, f64)| {
             let strongest = trial.iter().filter(|r| r.measure == *measure && r.mu_star > 0.0).min_by_key(|r| r.rank)?;
             let words = measure.trim_end_matches("_m");
-            Some(format!("{words} most by {}", strongest.parameter))
+            Some(format!("{} for {words}", strongest.parameter))
         };
         let parts: Vec<String> = MEASURES.iter().filter_map(part).collect();
-        (!parts.is_empty()).then(|| format!("{}, {}: {}.", first.stage_id, first.group, parts.join(", ")))
+        let strongest = || format!("the most influential parameter is {}", parts.join(", "));
+        (!parts.is_empty()).then(|| format!("{}, {}: {}.", first.stage_id, first.group, strongest()))
     };
     let words: Vec<String> = trials(rows).into_iter().take(TRIALS_MAX).filter_map(sentence).collect();
-    (!words.is_empty()).then(|| format!("What is moved, and by which parameter. {}", words.join(" ")))
+    (!words.is_empty()).then(|| words.join(" "))
 }
 
 fn figures_of(trial: &[RoverEffectRow]) -> Vec<Figure> {
@@ -76,7 +77,7 @@ fn figure(trial: &[RoverEffectRow], (measure, title, factor): (&str, &str, f64))
     let most = ends.filter(|v| v.is_finite()).fold(0.0, f64::max);
     let labels: Vec<RowLabel> = rows.iter().map(|r| label(r)).collect();
     let mut legend: Vec<Entry> = Vec::new();
-    for (paint, words) in [(RAISES, "raises"), (LOWERS, "lowers"), (UNKNOWN, "cannot be told")] {
+    for (paint, words) in [(RAISES, "raises"), (LOWERS, "lowers"), (UNKNOWN, "sign unclear")] {
         if rows.iter().any(|r| paint_of(r) == paint) {
             legend.push((Mark::Fill(paint), words.into()));
         }
@@ -172,7 +173,7 @@ fn label(row: &RoverEffectRow) -> RowLabel {
 fn describe(rows: &[&RoverEffectRow], title: &str, factor: f64) -> String {
     let part =
         |r: &&RoverEffectRow| format!("{} {}", r.parameter, set_number::significant(factor * r.share * r.mu_star, 2));
-    format!("Mean size of the {title}: {}.", rows.iter().take(6).map(part).collect::<Vec<_>>().join(", "))
+    format!("Mean absolute {title}: {}.", rows.iter().take(6).map(part).collect::<Vec<_>>().join(", "))
 }
 
 fn table(rows: &[RoverEffectRow]) -> TableBlock {

@@ -1,9 +1,9 @@
-//! Efficiency and arrival of each set: worlds as marks, means with intervals, how alike the rovers of a world are.
+//! Efficiency and arrival of each set: worlds as marks, means with intervals, correlation of the rovers on one world.
 
 use super::outcomes;
 use super::published::trial;
 use super::sets::{Set, World, efficiency, off_ground, reached};
-use super::worlds::{ARRIVED, DISTANCE, EFFICIENCY, Figure, GREATEST, LEAST, OF_ARRIVALS, STRAIGHT, share};
+use super::worlds::{ARRIVED, DISTANCE, EFFICIENCY, GREATEST, LEAST, OF_ARRIVALS, Quantity, STRAIGHT, share};
 use crate::content::{self, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
 use crate::questions::clusters::LEVEL;
@@ -16,18 +16,18 @@ use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::RoverRow;
 use sastrugi_statistics::Intraclass;
 
-/// Sets that are drawn; all are in the tables.
+/// Sets drawn; all are in the tables.
 const DRAWN_MAX: usize = 16;
-/// Columns that the tables are computed from.
+/// Query for the rows from which the tables are computed.
 const QUERY: &str = "select terrain_id, rover_id, \"group\", stage_id, variant, navigator, outcome, straight_m, distance_m, efficiency, \
 efficiency_half_limit, oracle, oracle_m from 'tables/rovers/*.parquet'";
 
-/// Efficiency over the one that the ground allows; NaN where there is no way or nobody looked for one.
+/// Efficiency relative to the one that the ground allows; NaN where there is no path or none was searched for.
 pub fn of_oracle(rover: &RoverRow) -> f64 {
     if rover.oracle == "found" { efficiency(rover) * rover.oracle_m / rover.straight_m } else { f64::NAN }
 }
 
-/// True where the ground has no way to the goal; `None` where nobody looked for one.
+/// True where the ground has no path to the goal; `None` where none was searched for.
 pub fn without_way(rover: &RoverRow) -> Option<bool> {
     matches!(rover.oracle.as_str(), "found" | "none").then(|| rover.oracle == "none")
 }
@@ -38,10 +38,10 @@ pub fn figures(data: &Data, sets: &[Set]) -> Vec<content::Figure> {
     [EFFICIENCY, STRAIGHT, ARRIVED].iter().map(|f| strip(data, drawn, f, sets.len() - drawn.len())).collect()
 }
 
-fn strip(data: &Data, sets: &[Set], figure: &Figure, left_out: usize) -> content::Figure {
+fn strip(data: &Data, sets: &[Set], quantity: &Quantity, left_out: usize) -> content::Figure {
     let printed: Vec<Option<f64>> =
-        sets.iter().map(|s| trial(data, s)?.value(figure.id).filter(|_| figure.id != EFFICIENCY.id)).collect();
-    let bands = figure.id != ARRIVED.id;
+        sets.iter().map(|s| trial(data, s)?.value(quantity.id).filter(|_| quantity.id != EFFICIENCY.id)).collect();
+    let bands = quantity.id != ARRIVED.id;
     let labels: Vec<RowLabel> = sets.iter().map(Set::label).collect();
     let mut legend: Vec<Entry> = vec![
         (Mark::Symbol(Symbol::Ring, Paint::Muted), "one world".into()),
@@ -53,36 +53,38 @@ fn strip(data: &Data, sets: &[Set], figure: &Figure, left_out: usize) -> content
     if printed.iter().any(Option::is_some) {
         legend.push((Mark::Symbol(Symbol::Diamond, Paint::Ink), "paper, one world".into()));
     }
-    let mut rows = Rows::new(&labels, 46.0, (Axis::linear(0.0, 1.0), figure.name), &legend);
+    let mut rows = Rows::new(&labels, 46.0, (Axis::linear(0.0, 1.0), quantity.name), &legend);
     for (row, (set, printed)) in sets.iter().zip(&printed).enumerate() {
-        draw(&mut rows, row, set, figure, bands, *printed);
+        draw(&mut rows, row, set, quantity, bands, *printed);
     }
-    let more =
-        if left_out > 0 { format!(" {} more are in the table.", set_number::count(left_out)) } else { String::new() };
+    let more = match left_out {
+        0 => String::new(),
+        n => format!(" The table has {}.", set_number::counted(n, "more set")),
+    };
     content::Figure {
-        id: content::slug(&format!("rover-{}", figure.id.replace('_', "-"))),
-        title: format!("{}.", capital(figure.name)),
-        caption: format!("Numbers at the rows count rovers.{more}"),
-        description: describe(sets, figure),
+        id: content::slug(&format!("rover-{}", quantity.id.replace('_', "-"))),
+        title: format!("{}.", capital(quantity.name)),
+        caption: format!("The numbers at the rows are counts of rovers.{more}"),
+        description: describe(sets, quantity),
         svg: rows.svg,
-        numbers: numbers(sets, figure),
+        numbers: numbers(sets, quantity),
     }
 }
 
-fn draw(rows: &mut Rows, row: usize, set: &Set, figure: &Figure, bands: bool, printed: Option<f64>) {
+fn draw(rows: &mut Rows, row: usize, set: &Set, quantity: &Quantity, bands: bool, printed: Option<f64>) {
     let (y, paint) = (rows.centre(row), Paint::Series(set.index));
-    let band = figure.one_more(set).filter(|_| bands);
+    let band = quantity.one_more(set).filter(|_| bands);
     if let Some((from, to)) = band.and_then(|b| Some((rows.x.clamped(b.low)?, rows.x.clamped(b.high)?))) {
         rows.svg.rect((from, y - 13.0), ((to - from).max(1.0), 26.0), paint, 0.13);
     }
-    for (k, (_, value)) in figure.values(set).into_iter().enumerate() {
+    for (k, (_, value)) in quantity.values(set).into_iter().enumerate() {
         // Lanes keep equal values apart.
         let lane = 4.0 * ((k % 5) as f64 - 2.0) * 0.5 - 5.0;
         if let Some(x) = rows.x.clamped(value) {
             rows.svg.ring((x, y + lane), 2.6, Stroke::new(paint, 1.1).faint(0.85));
         }
     }
-    let pooled = figure.pooled(set);
+    let pooled = quantity.pooled(set);
     let [low, high] = pooled.ends();
     if let (Some(from), Some(to)) = (rows.x.clamped(low), rows.x.clamped(high)) {
         rows.svg.segment((from, y + 7.0), (to, y + 7.0), Stroke::new(Paint::Ink, 2.2));
@@ -96,27 +98,27 @@ fn draw(rows: &mut Rows, row: usize, set: &Set, figure: &Figure, bands: bool, pr
     }
 }
 
-fn describe(sets: &[Set], figure: &Figure) -> String {
+fn describe(sets: &[Set], quantity: &Quantity) -> String {
     let part = |s: &Set| {
-        let pooled = figure.pooled(s);
+        let pooled = quantity.pooled(s);
         let [low, high] = pooled.ends();
         let interval = pooled.interval.map_or_else(String::new, |_| {
             format!(" ({} to {})", set_number::significant(low, 3), set_number::significant(high, 3))
         });
         format!("{}: {}{interval}", s.name, set_number::significant(pooled.value, 3))
     };
-    format!("{} by set. {}.", capital(figure.name), sets.iter().map(part).collect::<Vec<_>>().join("; "))
+    format!("{} by set. {}.", capital(quantity.name), sets.iter().map(part).collect::<Vec<_>>().join("; "))
 }
 
-fn numbers(sets: &[Set], figure: &Figure) -> Numbers {
-    let mut numbers = Numbers::computed(QUERY, &[("set", ""), ("terrain_id", ""), (figure.id, figure.unit)]);
+fn numbers(sets: &[Set], quantity: &Quantity) -> Numbers {
+    let mut numbers = Numbers::computed(QUERY, &[("set", ""), ("terrain_id", ""), (quantity.id, quantity.unit)]);
     for set in sets {
-        figure.values(set).into_iter().for_each(|v| numbers.row([text(&set.name), text(v.0), number(v.1)]));
+        quantity.values(set).into_iter().for_each(|v| numbers.row([text(&set.name), text(v.0), number(v.1)]));
     }
     numbers
 }
 
-/// Both efficiencies, the limit's part in them, and the ground's.
+/// Both efficiencies, and how much of them is due to the distance limit and to the ground.
 pub fn table(sets: &[Set]) -> TableBlock {
     let columns = [
         ("set", ""),
@@ -134,7 +136,7 @@ pub fn table(sets: &[Set]) -> TableBlock {
         ("high", "1"),
         ("efficiency at half the limit", "1"),
         ("efficiency over the ground's", "1"),
-        ("no way exists", "%"),
+        ("no path exists", "%"),
     ];
     let mut numbers = Numbers::computed(QUERY, &columns);
     for set in sets {
@@ -168,22 +170,22 @@ pub fn table(sets: &[Set]) -> TableBlock {
     }
 }
 
-/// What rovers of one world may have alike: its name and value.
+/// A quantity in which the rovers on one world may resemble each other: name and value.
 struct Alike(&'static str, fn(&RoverRow) -> f64);
 const ALIKE: [Alike; 2] = [Alike("efficiency", efficiency), Alike("reached", |r| f64::from(u8::from(reached(r))))];
 
-/// How alike the rovers of one world are.
+/// Intraclass correlation of the rovers on one world.
 pub fn intraclass(sets: &[Set]) -> TableBlock {
     let columns = [
         ("set", ""),
-        ("of", ""),
+        ("quantity", ""),
         ("worlds", "1"),
         ("rovers", "1"),
         ("intraclass correlation", "1"),
         ("low", "1"),
         ("high", "1"),
         ("design effect", "1"),
-        ("worth of independent rovers", "1"),
+        ("effective number of rovers", "1"),
     ];
     let mut numbers = Numbers::computed(QUERY, &columns).with_mixed_units();
     for set in sets {
@@ -203,10 +205,10 @@ pub fn intraclass(sets: &[Set]) -> TableBlock {
             ]);
         }
     }
-    TableBlock { id: "rover-intraclass".into(), caption: "How alike the rovers of one world are".into(), numbers }
+    TableBlock { id: "rover-intraclass".into(), caption: "Correlation of the rovers on one world".into(), numbers }
 }
 
-/// Every world alone.
+/// Every world separately.
 pub fn worlds(sets: &[Set]) -> TableBlock {
     let columns = [
         ("set", ""),

@@ -1,4 +1,4 @@
-//! How far rovers get that know only what they see: efficiency and arrival by set of worlds, published trials beside ours, distance budgets,
+//! How far rovers with limited sensing get: efficiency and arrival by set of worlds, comparison with published trials, distance budgets,
 //! effort, tracks, designs.
 
 mod arrival;
@@ -22,9 +22,9 @@ use worlds::{ARRIVED, EFFICIENCY, OF_ARRIVALS};
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "rovers", name: "Rovers", title: "How far do the rovers get?", answer };
 
-/// Fewest worlds that intervals should stand on.
+/// Fewest worlds for reliable intervals.
 const WORLDS_MIN: usize = 20;
-/// Sets of which the first paragraph speaks.
+/// Sets described in the first paragraph.
 const SPOKEN_MAX: usize = 6;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
@@ -49,7 +49,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     blocks.extend(arrival::blocks(&sets));
     blocks.extend([
-        Block::Heading("Ends, effort and contacts".into()),
+        Block::Heading("Outcomes, effort and contacts".into()),
         Block::Text(EFFORT.into()),
         Block::Figures(vec![outcomes::figure(&sets)]),
         Block::Table(efficiency::effort(&sets)),
@@ -64,16 +64,16 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-const EFFICIENCIES: &str = "Efficiency of a rover is the straight distance over what it drove and what was left in the end. Its mean over rovers and the straight distance over \
-the mean distance are two figures: a few short ways lift the first, a few long ones lower the second. Intervals go over worlds, which are the independent trials: those of \
-means and ratios are Student's for the linearised ratio of world totals (Cochran, 1977), on the logarithm; those of shares are Korn and Graubard's (1998), where all or no \
-rovers arrive with worlds as single trials. Intervals and bands end at what a straight drive would have: an efficiency of 1; straight over mean distance may be slightly \
-more, because rovers stop within a tolerance of their goal. At half the limit: each rover as if stopped after half of its distance limit. Over the ground's: over the efficiency of \
-the shortest way on the whole map, for rovers that have one; the others stay in all figures.";
-const ALIKE: &str = "Rovers of one world share its rocks and often a goal. The intraclass correlation is the share of the variance between worlds (analysis of variance, Searle's \
-interval, exact for normal values); the design effect is the factor on the variance of a mean that it makes (Kish, 1965).";
-const EFFORT: &str = "Contacts are rocks higher than the clearance that came under the rover, centre contacts those under its centre line. Means are over all rovers, those that \
-were stopped included.";
+const EFFICIENCIES: &str = "The efficiency of a rover is the straight distance over the sum of the distance driven and the distance left at the end. Its mean over rovers differs from \
+the straight distance over the mean distance: a few short drives raise the first, a few long ones lower the second. Intervals are over worlds, which are the independent trials. For \
+means and ratios they are Student's, for the linearised ratio of world totals (Cochran, 1977), on the logarithm; for shares they are Korn and Graubard's (1998), with worlds as single \
+trials if all or no rovers arrive. Intervals and bands end at the value of a straight drive: an efficiency of 1; straight over mean distance may be slightly larger, because rovers stop \
+within a tolerance of their goal. At half the limit: each rover as if stopped after half of its distance limit. Over the ground's: relative to the efficiency of the shortest path on \
+the complete map, for rovers that have one; the other rovers are included in all other columns.";
+const ALIKE: &str = "Rovers on one world share its rocks and often a goal. The intraclass correlation is the share of the variance that lies between worlds (analysis of variance, \
+Searle's interval, exact for normal values). The design effect is the factor by which it increases the variance of a mean (Kish, 1965).";
+const EFFORT: &str = "Contacts are rocks higher than the clearance that passed under the rover; centre contacts are those under its centre line. Means are over all rovers, including \
+those that were stopped.";
 
 /// How far the rovers got; `None` without rovers.
 pub(super) fn in_words(data: &Data) -> Option<String> {
@@ -81,7 +81,7 @@ pub(super) fn in_words(data: &Data) -> Option<String> {
     (!sets.is_empty()).then(|| verdict(&sets))
 }
 
-/// What the sets say, in a sentence each.
+/// Arrival and efficiency of the sets, in a sentence each.
 fn verdict(sets: &[Set]) -> String {
     let sentence = |set: &Set| {
         let (arrived, efficiency, of_arrivals) = (ARRIVED.pooled(set), EFFICIENCY.pooled(set), OF_ARRIVALS.pooled(set));
@@ -91,11 +91,11 @@ fn verdict(sets: &[Set]) -> String {
             None => String::new(),
         };
         let arrivals = match of_arrivals.value.is_finite() {
-            true => format!(", {} of those that arrive", set_number::significant(of_arrivals.value, 2)),
+            true => format!(" and {} over those that arrive", set_number::significant(of_arrivals.value, 2)),
             false => String::new(),
         };
         format!(
-            "{}: {}{interval} of the rovers reach their goal. The mean efficiency is {} of all rovers{arrivals}.",
+            "{}: {}{interval} of the rovers reach their goal. The mean efficiency is {} over all rovers{arrivals}.",
             set.name,
             set_number::percent(arrived.value, 0),
             set_number::significant(efficiency.value, 2)
@@ -106,52 +106,57 @@ fn verdict(sets: &[Set]) -> String {
         ranked.sort_by(|a, b| EFFICIENCY.pooled(b).value.total_cmp(&EFFICIENCY.pooled(a).value));
         ranked = [ranked.first(), ranked.last()].into_iter().flatten().copied().collect();
         let words: Vec<String> = ranked.iter().map(|s| sentence(s)).collect();
-        return format!("The best and the worst of {} sets. {}", set_number::count(sets.len()), words.join(" "));
+        let sets = set_number::count(sets.len());
+        return format!("The most and the least efficient of {sets} sets. {}", words.join(" "));
     }
     ranked.iter().map(|s| sentence(s)).collect::<Vec<_>>().join(" ")
 }
 
-/// Sets on too few worlds.
+/// Sets with too few worlds.
 fn few_worlds(sets: &[Set]) -> Option<String> {
     let few: Vec<&Set> = sets.iter().filter(|s| s.worlds.len() < WORLDS_MIN).collect();
     let least = few.iter().map(|s| s.worlds.len()).min()?;
-    let all =
-        if few.len() == sets.len() { "Every set".to_owned() } else { format!("{} of {} sets", few.len(), sets.len()) };
+    let all = match few.len() {
+        n if n == sets.len() => "Every set has".to_owned(),
+        1 => format!("1 of {} sets has", sets.len()),
+        n => format!("{n} of {} sets have", sets.len()),
+    };
     let ends = if least < 2 {
-        "One world alone has no interval at all."
+        "A single world gives no interval."
     } else {
-        "Intervals over so few are wide, and only as good as their assumptions."
+        "Intervals over so few worlds are wide, and only as good as their assumptions."
     };
     Some(format!(
-        "{all} stands on fewer than {WORLDS_MIN} worlds (the least: {}). Rovers of one world are not independent, so worlds count, not rovers. {ends}",
+        "{all} fewer than {WORLDS_MIN} worlds (the smallest number is {}). Rovers on one world are not independent, so the sample size is the number of worlds, not of \
+         rovers. {ends}",
         set_number::count(least)
     ))
 }
 
-/// Rovers that ended off the ground.
+/// Rovers that ended off the known ground.
 fn off_ground(sets: &[Set]) -> Option<String> {
     let all = || sets.iter().flat_map(Set::rovers);
     let off = all().filter(|r| sets::off_ground(r)).count();
     (off > 0).then(|| {
         format!(
-            "{} of {} ended off the known ground. They have shown no efficiency: in its means they count as 0, and the greatest and the least of a world leave \
-             them out.",
+            "{} of {} ended off the known ground. Such a rover counts as 0 in mean efficiencies and is left out of the greatest and the least efficiency of its \
+             world.",
             set_number::count(off),
             set_number::counted(all().count(), "rover")
         )
     })
 }
 
-/// Rovers for which the ground has no way.
+/// Rovers for which the ground has no path.
 fn no_way(sets: &[Set]) -> Option<String> {
     let of = |is: bool| sets.iter().flat_map(Set::rovers).filter(|r| efficiency::without_way(r) == Some(is)).count();
     let (none, found) = (of(true), of(false));
     (none > 0).then(|| {
         format!(
-            "For {} of {} rovers the ground has no way that keeps the wheels clear of rocks above the clearance and off steep sand. They stay in all \
-             figures but the efficiency over the ground's.",
+            "For {} of {}, the ground has no path that keeps the wheels clear of rocks above the clearance and off steep sand. Only the efficiency over the \
+             ground's leaves such rovers out.",
             set_number::count(none),
-            set_number::count(none + found)
+            set_number::counted(none + found, "rover")
         )
     })
 }

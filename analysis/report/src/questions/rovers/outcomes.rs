@@ -1,4 +1,4 @@
-//! How rovers end, and how each end is drawn; bars with counts.
+//! Outcomes of rovers, and how each is drawn; bars with counts.
 
 use super::sets::Set;
 use crate::content::{Figure, Numbers, count, text};
@@ -14,35 +14,35 @@ const fn outcome(word: &'static str, name: &'static str, symbol: Symbol, dash: &
     Outcome { word, name, symbol, dash }
 }
 
-/// All ends, the last for words that a newer program may write.
+/// All outcomes; the last is for values that a newer program may write.
 pub const ALL: [Outcome; 7] = [
     outcome("reached", "reached", Symbol::Disc, ""),
     outcome("distance_limit", "distance limit", Symbol::Diamond, "5 2 1 2 1 2"),
     outcome("cycle_limit", "cycle limit", Symbol::Square, "2 3"),
     outcome("lost", "lost", Symbol::Triangle, "7 3"),
-    outcome("no_way", "no way known", Symbol::Cross, "9 3 2 3"),
+    outcome("no_way", "no path known", Symbol::Cross, "9 3 2 3"),
     outcome("off_ground", "off the ground", Symbol::Ring, "4 4"),
     outcome("", "other", Symbol::Frame, "1 3"),
 ];
-/// Colour of each end.
+/// Colour of each outcome.
 const PAINTS: [usize; 7] = [0, 4, 1, 2, 3, 5, 5];
 
-/// Number of a rover's end in [`ALL`].
+/// Number of a rover's outcome in [`ALL`].
 pub fn index(rover: &RoverRow) -> usize {
     ALL.iter().position(|o| o.word == rover.outcome).unwrap_or(ALL.len() - 1)
 }
 
-/// Colour of an end.
+/// Colour of an outcome.
 pub fn paint(index: usize) -> Paint {
     Paint::Outcome(PAINTS[index])
 }
 
-/// Track of an end on a picture, whose colours do not follow the theme.
+/// Track of an outcome on a picture, whose colours do not follow the theme.
 pub fn track(index: usize) -> Stroke {
     Stroke::new(Paint::Fixed(crate::render::svg::OUTCOMES[PAINTS[index]]), 1.3).dashed(ALL[index].dash)
 }
 
-/// Rovers by end.
+/// Rovers by outcome.
 pub fn counts(set: &Set) -> [usize; ALL.len()] {
     let mut counts = [0; ALL.len()];
     set.rovers().for_each(|r| counts[index(r)] += 1);
@@ -68,8 +68,8 @@ pub fn figure(sets: &[Set]) -> Figure {
     }
     Figure {
         id: "rover-outcomes".into(),
-        title: "How rovers end.".into(),
-        caption: "Numbers count rovers.".into(),
+        title: "Outcomes of the rovers.".into(),
+        caption: "Numbers in the bars are counts of rovers.".into(),
         description: describe(sets, &all),
         svg: rows.svg,
         numbers,
@@ -97,5 +97,5 @@ fn describe(sets: &[Set], all: &[[usize; ALL.len()]]) -> String {
         let parts = ALL.iter().zip(c).filter(|(_, n)| **n > 0).map(|(o, n)| format!("{n} {}", o.name));
         format!("{}: {}", s.name, parts.collect::<Vec<_>>().join(", "))
     };
-    format!("Rovers by their end. {}.", sets.iter().zip(all).map(set).collect::<Vec<_>>().join("; "))
+    format!("Rovers by outcome. {}.", sets.iter().zip(all).map(set).collect::<Vec<_>>().join("; "))
 }

@@ -1,7 +1,7 @@
-//! The paper's trials beside ours: one world of the paper in the band of one world of ours.
+//! Comparison with the paper's trials: does its one world lie in the prediction band for one world of ours?
 
 use super::sets::{Estimate, Set};
-use super::worlds::{Figure, PRINTED};
+use super::worlds::{PRINTED, Quantity};
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
 use crate::papers::jpl::{self, PublishedTrial, PublishedValue};
@@ -10,10 +10,10 @@ use crate::render::number as set_number;
 use sastrugi_statistics::Interval;
 use serde_json::Value;
 
-/// A printed figure and ours.
+/// A published value and ours.
 struct Row<'a> {
     trial: String,
-    figure: Figure,
+    quantity: Quantity,
     printed: PublishedValue,
     set: &'a Set<'a>,
     ours: Estimate,
@@ -21,14 +21,14 @@ struct Row<'a> {
 }
 
 impl Row<'_> {
-    /// Whether the printed figure, give or take its rounding, lies in the band of one world; `None` without a band.
+    /// Whether the published value lies in the band of one world within its rounding; `None` without a band.
     fn inside(&self) -> Option<bool> {
         let (low, high) = (self.printed.value - self.printed.rounding, self.printed.value + self.printed.rounding);
         self.one_more.map(|band| high >= band.low && low <= band.high)
     }
 }
 
-/// Share of the ground under rocks of the worlds of a set, as the study asks for it; `None` where it does not or worlds differ.
+/// Share of the ground under rocks on the worlds of a set, as set in the study; `None` if the study does not set it or worlds differ.
 fn coverage(data: &Data, set: &Set) -> Option<f64> {
     let of_world = |terrain_id: &str| {
         let params: Value = serde_json::from_str(&data.terrain(terrain_id)?.params).ok()?;
@@ -50,7 +50,7 @@ pub fn trial(data: &Data, set: &Set) -> Option<PublishedTrial> {
     found.cloned()
 }
 
-/// Words, warnings and a table; nothing where no set repeats a trial of the paper.
+/// Text, warnings and a table; empty where no set repeats a trial of the paper.
 pub fn blocks(data: &Data, sets: &[Set]) -> Vec<Block> {
     let known: Vec<(&Set, PublishedTrial)> = sets.iter().filter_map(|s| Some((s, trial(data, s)?))).collect();
     let rows: Vec<Row> = known.iter().flat_map(|(set, trial)| rows(set, trial)).collect();
@@ -58,14 +58,14 @@ pub fn blocks(data: &Data, sets: &[Set]) -> Vec<Block> {
         return Vec::new();
     }
     let title = jpl::trials().map_or_else(String::new, |t| t.title);
-    let mut blocks = vec![Block::Heading("Published figures".into())];
+    let mut blocks = vec![Block::Heading("Published trials".into())];
     blocks.extend(verdict(&rows).map(Block::Text));
     blocks.extend(known.iter().filter_map(|(set, trial)| difference(set, trial)).map(Block::Warning));
     blocks.push(Block::Text(format!(
-        "The paper ({title}) drove its rovers on one world. Worlds differ, so the figure to compare it with is that of one world of ours: the band holds it \
-         with {} % probability (Student's prediction interval of the worlds' logarithms). The interval beside our own figure is that of the mean over worlds, \
-         which is narrower. The flight code was not available: agreement shows that such a rover behaves so, not that it is the same one. Nothing was \
-         tuned to these figures.",
+        "The paper ({title}) drove its rovers on one world. Worlds differ, so its values are compared with those of one world of ours: the band holds the value of one \
+         more world with {} % probability (Student's prediction interval of the worlds' logarithms). The interval of our own value is that of the mean over worlds, \
+         which is narrower. The flight code was not available: agreement shows that such a rover behaves alike, not that it is the same one. Nothing was \
+         tuned to these values.",
         set_number::fixed(100.0 * LEVEL, 0)
     )));
     blocks.push(Block::Table(table(&rows)));
@@ -74,34 +74,34 @@ pub fn blocks(data: &Data, sets: &[Set]) -> Vec<Block> {
 
 fn rows<'a>(set: &'a Set<'a>, trial: &PublishedTrial) -> Vec<Row<'a>> {
     let row = |printed: &PublishedValue| {
-        let figure = PRINTED.into_iter().find(|f| f.id == printed.figure)?;
-        let (ours, one_more) = (figure.pooled(set), figure.one_more(set));
-        Some(Row { trial: trial.name.clone(), figure, printed: printed.clone(), set, ours, one_more })
+        let quantity = PRINTED.into_iter().find(|f| f.id == printed.figure)?;
+        let (ours, one_more) = (quantity.pooled(set), quantity.one_more(set));
+        Some(Row { trial: trial.name.clone(), quantity, printed: printed.clone(), set, ours, one_more })
     };
     trial.values.iter().filter_map(row).collect()
 }
 
-/// How many of the printed figures are inside.
+/// How many of the published values are inside, in a sentence; `None` without a band.
 fn verdict(rows: &[Row]) -> Option<String> {
     let known: Vec<bool> = rows.iter().filter_map(Row::inside).collect();
     let inside = known.iter().filter(|i| **i).count();
     (!known.is_empty()).then(|| {
         format!(
-            "{} of {} printed figures lie in the band of one world of ours, {} outside.",
-            set_number::count(inside),
+            "{} of {} published values lie{} in the band of one world of ours.",
+            if inside == 0 { "None".into() } else { set_number::count(inside) },
             set_number::count(known.len()),
-            set_number::count(known.len() - inside)
+            if inside < 2 { "s" } else { "" }
         )
     })
 }
 
-/// Other numbers of rovers than the paper's make other scatter.
+/// A warning where our worlds have another number of rovers than the paper's, and hence another scatter.
 fn difference(set: &Set, trial: &PublishedTrial) -> Option<String> {
     let other = set.worlds.iter().filter(|w| w.rovers.len() != trial.rovers).count();
     (other > 0).then(|| {
         format!(
-            "{}: the paper has {} rovers on its world, {} of ours {} another number. With fewer rovers worlds scatter more and the extremes \
-             are less far out, so its figures are no test here.",
+            "{}: the paper has {} rovers on its world, but {} of our worlds {} another number. With fewer rovers, worlds scatter more and their \
+             extremes are less extreme, so this comparison is not a test.",
             set.name,
             set_number::count(trial.rovers),
             set_number::count(other),
@@ -113,7 +113,7 @@ fn difference(set: &Set, trial: &PublishedTrial) -> Option<String> {
 fn table(rows: &[Row]) -> TableBlock {
     let columns = [
         ("trial", ""),
-        ("figure", ""),
+        ("quantity", ""),
         ("unit", ""),
         ("paper", ""),
         ("ours", ""),
@@ -134,8 +134,8 @@ fn table(rows: &[Row]) -> TableBlock {
         let [low, high] = row.ours.ends();
         numbers.row([
             text(&row.trial),
-            text(row.figure.name),
-            text(row.figure.unit),
+            text(row.quantity.name),
+            text(row.quantity.unit),
             number(row.printed.value),
             number(row.ours.value),
             number(low),

@@ -1,4 +1,4 @@
-//! Rovers that are alike: one group of worlds, one navigator, one variant.
+//! Sets of comparable rovers: one group of worlds, one navigator, one variant.
 
 use crate::data::{Data, Natural, label, natural};
 use crate::questions::sql::quoted;
@@ -15,13 +15,13 @@ pub struct Set<'a> {
     pub name: String,
     /// Label of the group.
     pub group: String,
-    /// Navigator or stage where there are several; empty else.
+    /// Navigator or stage where there are several; otherwise empty.
     pub trial: String,
     /// Number of the group among all: its colour.
     pub index: usize,
     /// Stage that drove them.
     pub stage: &'a str,
-    /// What differs from the plain trial.
+    /// Difference from the plain trial.
     pub variant: Option<&'a str>,
     /// Rovers of each world, worlds in the order of their ids.
     pub worlds: Vec<World<'a>>,
@@ -36,7 +36,7 @@ pub struct World<'a> {
     pub rovers: Vec<&'a RoverRow>,
 }
 
-/// Words for a navigator.
+/// Name of a navigator on the page.
 pub fn navigator(name: &str) -> String {
     match name {
         "sojourner_like" => "Sojourner-like".into(),
@@ -55,8 +55,8 @@ pub fn off_ground(rover: &RoverRow) -> bool {
     rover.outcome == "off_ground"
 }
 
-/// Efficiency of a rover in means: 0 for one that ended off the ground, as `sastrugi rover` counts it. It has shown none, and the 1 of a rover that
-/// never drove must not lift a mean.
+/// Efficiency of a rover in means: 0 for one that ended off the ground, as `sastrugi rover` counts it. Its efficiency was not observed, and the 1 of
+/// a rover that never drove must not raise a mean.
 pub fn efficiency(rover: &RoverRow) -> f64 {
     if off_ground(rover) { 0.0 } else { rover.efficiency }
 }
@@ -66,7 +66,7 @@ pub fn shown(rover: &RoverRow) -> f64 {
     if off_ground(rover) { f64::NAN } else { rover.efficiency }
 }
 
-/// Sets of the plain trials; of all rovers where every one belongs to a variant.
+/// Sets of the plain trials; of all rovers if every one belongs to a variant.
 pub fn plain(data: &Data) -> Vec<Set<'_>> {
     let any = data.rovers.iter().any(|r| r.variant.is_none());
     sets(data, data.rovers.iter().filter(|r| !any || r.variant.is_none()).collect())
@@ -153,7 +153,7 @@ impl<'a> Set<'a> {
         RowLabel { name: self.group.clone(), detail: detail.join(", ") }
     }
 
-    /// Navigator in words.
+    /// Name of the navigator.
     pub fn navigator(&self) -> String {
         self.rovers().next().map_or_else(String::new, |r| navigator(&r.navigator))
     }
@@ -169,7 +169,7 @@ impl<'a> Set<'a> {
         Estimate { value: ratio::of_totals(&totals), interval: ratio::interval(&totals, level) }
     }
 
-    /// The condition on the rows of the set in the table `rovers`.
+    /// SQL condition for the rows of the set in the table `rovers`.
     pub fn condition(&self) -> String {
         let variant = self.variant.map_or_else(|| "variant is null".into(), |v| format!("variant = {}", quoted(v)));
         let group = self.rovers().next().and_then(|r| r.group.as_deref());
@@ -181,9 +181,9 @@ impl<'a> Set<'a> {
 /// A number with its interval over worlds, where there is one.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Estimate {
-    /// NaN where nothing is known.
+    /// NaN if unknown.
     pub value: f64,
-    /// `None` for one world, or where every value is 0.
+    /// `None` for one world, or if every value is 0.
     pub interval: Option<Interval>,
 }
 

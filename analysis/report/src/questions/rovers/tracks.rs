@@ -1,4 +1,4 @@
-//! Tracks on the relief with its rocks: one world of each set.
+//! Tracks over the relief with its rocks: one world of each set.
 
 use super::outcomes::{ALL, index, track};
 use super::sets::{Set, World};
@@ -17,22 +17,22 @@ use crate::render::{number as set_number, picture, thin};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::{RoverRow, RoverSampleRow, TerrainRow};
 
-/// Sets that are drawn.
+/// Sets drawn.
 const SETS_MAX: usize = 6;
 /// Tracks on one map.
 const TRACKS_MAX: usize = 25;
 /// Largest number of rows or columns of a picture.
 const PIXELS: usize = 560;
-/// Ground around tracks over their extent.
+/// Margin around the tracks, as a share of their extent.
 const MARGIN: f64 = 0.06;
-/// A point is drawn when it is that far from the one before, px.
+/// Least distance between points drawn, px.
 const STEP_PX: f64 = 1.6;
 /// Sand and rock.
 const GROUND: [(u8, Rgb); 2] = [(0, [0xee, 0xdf, 0xc0]), (1, [0x6d, 0x5f, 0x55])];
 
 /// What is drawn, in words.
-pub const WORDS: &str = "One world of each set: the one whose mean efficiency is in the middle (the lower middle of an even number). Of many \
-rovers every so-many-th is drawn.";
+pub const WORDS: &str = "One world of each set: the one with the median mean efficiency (the lower middle of an even number). If a world has \
+many rovers, only some of them, evenly chosen, are drawn.";
 
 /// A map for each set whose world has samples and heights in the release.
 pub fn figures(data: &Data, sets: &[Set]) -> Result<Vec<Figure>, ReportError> {
@@ -105,7 +105,7 @@ fn path(samples: &[RoverSampleRow], rover: &RoverRow) -> Vec<(f64, f64)> {
     own.iter().map(|s| (s.x_m, s.y_m)).filter(|p| p.0.is_finite() && p.1.is_finite()).collect()
 }
 
-/// Codes of sand and rock beside the heights, where the generator wrote them.
+/// Codes of sand and rock, if the generator wrote them.
 fn rocks(data: &Data, terrain: &TerrainRow) -> Result<Option<Grid<u8>>, ReportError> {
     let Some(stem) = terrain.path.strip_suffix(".tif") else { return Ok(None) };
     let map = data.files.grid(&format!("{stem}.class.tif"))?;
@@ -129,7 +129,7 @@ impl Window {
     }
 }
 
-/// The part that holds starts, goals and tracks, as far as the raster reaches.
+/// The part of the raster that contains starts, goals and tracks.
 fn window(grid: &Grid, rovers: &[&RoverRow], paths: &[Vec<(f64, f64)>]) -> Window {
     let ends = rovers.iter().flat_map(|r| [(r.start_x_m, r.start_y_m), (r.goal_x_m, r.goal_y_m)]);
     let points = || ends.clone().chain(paths.iter().flatten().copied());
@@ -146,7 +146,7 @@ fn window(grid: &Grid, rovers: &[&RoverRow], paths: &[Vec<(f64, f64)>]) -> Windo
 }
 
 fn draw(map: &mut Map, rovers: &[&RoverRow], paths: &[Vec<(f64, f64)>]) {
-    // Those that arrive last, so that the others do not cover them.
+    // Rovers that arrive are drawn last, so that the others do not cover them.
     let mut order: Vec<usize> = (0..rovers.len()).collect();
     order.sort_by_key(|&k| (std::cmp::Reverse(index(rovers[k])), k));
     let placed: Vec<Vec<(f64, f64)>> =
@@ -176,7 +176,7 @@ fn draw(map: &mut Map, rovers: &[&RoverRow], paths: &[Vec<(f64, f64)>]) {
     }
 }
 
-/// Points that are [`STEP_PX`] apart, and the last.
+/// Points at least [`STEP_PX`] apart, and the last one.
 fn apart(points: impl Iterator<Item = (f64, f64)>) -> Vec<(f64, f64)> {
     let mut kept: Vec<(f64, f64)> = Vec::new();
     let mut last = None;

@@ -1,4 +1,4 @@
-//! Figures of one world, as a paper would print them of its only one: the mean over worlds, and the band of one world more.
+//! Quantities of one world, as a paper with a single world would print them: the mean over worlds, and the prediction band for one more world.
 
 use super::sets::{Estimate, Set, World, efficiency, off_ground, reached, shown};
 use crate::questions::clusters::LEVEL;
@@ -6,75 +6,79 @@ use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::RoverRow;
 use sastrugi_statistics::{Interval, prediction};
 
-/// A figure of a world.
+/// A quantity of a world.
 #[derive(Clone, Copy, Debug)]
-pub struct Figure {
-    /// Name, as the data of papers have it.
+pub struct Quantity {
+    /// Name in the data of papers.
     pub id: &'static str,
-    /// Words.
+    /// Name on the page.
     pub name: &'static str,
     /// Unit; `1` for pure numbers.
     pub unit: &'static str,
-    /// What it is the ratio of, in a world.
+    /// Numerator and denominator for a world.
     pub totals: fn(&World) -> (f64, f64),
 }
 
 /// Mean of the rovers' efficiencies.
-pub const EFFICIENCY: Figure =
-    Figure { id: "mean_efficiency", name: "mean efficiency", unit: "1", totals: |w| w.total(efficiency) };
-/// Mean of the efficiencies of those that arrive.
-pub const OF_ARRIVALS: Figure = Figure {
+pub const EFFICIENCY: Quantity =
+    Quantity { id: "mean_efficiency", name: "mean efficiency", unit: "1", totals: |w| w.total(efficiency) };
+/// Mean efficiency of the rovers that arrive.
+pub const OF_ARRIVALS: Quantity = Quantity {
     id: "efficiency_of_arrivals",
     name: "mean efficiency of arrivals",
     unit: "1",
     totals: |w| w.total(|r| if reached(r) { efficiency(r) } else { f64::NAN }),
 };
-/// Straight metres over metres driven.
-pub const STRAIGHT: Figure = Figure {
+/// Straight distance over distance driven.
+pub const STRAIGHT: Quantity = Quantity {
     id: "straight_over_mean_distance",
     name: "straight over mean distance",
     unit: "1",
     totals: |w| (w.total(|r| stayed(r, r.straight_m)).0, w.total(|r| stayed(r, r.distance_m)).0),
 };
 /// Mean distance driven.
-pub const DISTANCE: Figure = Figure {
+pub const DISTANCE: Quantity = Quantity {
     id: "mean_distance_m",
     name: "mean distance",
     unit: "m",
     totals: |w| w.total(|r| stayed(r, r.distance_m)),
 };
-/// Greatest efficiency of a world's rovers.
-pub const GREATEST: Figure = Figure {
+/// Largest efficiency among a world's rovers.
+pub const GREATEST: Quantity = Quantity {
     id: "greatest_efficiency",
     name: "greatest efficiency of a world",
     unit: "1",
     totals: |w| extreme(w, f64::max),
 };
-/// Least efficiency of a world's rovers.
-pub const LEAST: Figure =
-    Figure { id: "least_efficiency", name: "least efficiency of a world", unit: "1", totals: |w| extreme(w, f64::min) };
+/// Smallest efficiency among a world's rovers.
+pub const LEAST: Quantity = Quantity {
+    id: "least_efficiency",
+    name: "least efficiency of a world",
+    unit: "1",
+    totals: |w| extreme(w, f64::min),
+};
 /// Share of the rovers that arrive.
-pub const ARRIVED: Figure = Figure {
+pub const ARRIVED: Quantity = Quantity {
     id: "reached",
     name: "rovers that reach the goal",
     unit: "1",
     totals: |w| w.total(|r| f64::from(u8::from(reached(r)))),
 };
-/// All figures that papers print.
-pub const PRINTED: [Figure; 5] = [STRAIGHT, EFFICIENCY, DISTANCE, GREATEST, LEAST];
+/// All quantities that papers print.
+pub const PRINTED: [Quantity; 5] = [STRAIGHT, EFFICIENCY, DISTANCE, GREATEST, LEAST];
 
-/// A value of a rover that stayed on the ground; NaN for others, whose drive ended too soon to tell.
+/// A value of a rover that stayed on the ground; NaN for the others, whose drive was cut short.
 fn stayed(rover: &RoverRow, value: f64) -> f64 {
     if off_ground(rover) { f64::NAN } else { value }
 }
 
-/// The greatest or least efficiency of a world, as a ratio to 1; to 0 where no rover stayed on the ground.
+/// The largest or smallest efficiency of a world, as a ratio to 1; 0 to 0 if no rover stayed on the ground.
 fn extreme(world: &World, pick: fn(f64, f64) -> f64) -> (f64, f64) {
     world.values(shown).into_iter().reduce(pick).map_or((0.0, 0.0), |value| (value, 1.0))
 }
 
-impl Figure {
-    /// Value of a world; NaN where it is not known.
+impl Quantity {
+    /// Value of a world; NaN if unknown.
     pub fn of(&self, world: &World) -> f64 {
         let (a, b) = (self.totals)(world);
         a / b
@@ -85,7 +89,7 @@ impl Figure {
         set.worlds.iter().map(|w| (w.terrain_id, self.of(w))).filter(|v| v.1.is_finite()).collect()
     }
 
-    /// Of all rovers of a set, with the interval over worlds.
+    /// Value over all rovers of a set, with the interval over worlds.
     pub fn pooled(&self, set: &Set) -> Estimate {
         if self.id == ARRIVED.id {
             return arrived(set);
@@ -94,22 +98,22 @@ impl Figure {
         Estimate { interval: estimate.interval.map(|i| self.within(set, i)), ..estimate }
     }
 
-    /// Band in which one more world falls; `None` for a single world.
+    /// Prediction band for one more world; `None` for a single world.
     pub fn one_more(&self, set: &Set) -> Option<Interval> {
         let values: Vec<f64> = self.values(set).into_iter().map(|v| v.1).collect();
         let band = prediction::one_more_positive(&values, LEVEL)?;
         Some(self.within(set, band))
     }
 
-    /// An interval on a logarithmic scale, ended where the figure must end.
+    /// An interval on a logarithmic scale, clipped to the possible values.
     fn within(&self, set: &Set, interval: Interval) -> Interval {
         let [least, most] = self.bounds(set);
         let (least, most) = (least.min(interval.estimate), most.max(interval.estimate));
         Interval { high: interval.high.clamp(least, most), low: interval.low.clamp(least, most), ..interval }
     }
 
-    /// The least and the greatest value that the figure can have. Efficiencies end at 1. A rover drives at least the straight line less what was left in the
-    /// end, so that straight over mean distance may be a little above 1.
+    /// Smallest and largest possible value. Efficiencies end at 1. A rover drives at least the straight distance minus what was left at the end, so straight
+    /// over mean distance may be slightly above 1.
     fn bounds(&self, set: &Set) -> [f64; 2] {
         let mean = |of: fn(&RoverRow) -> f64| {
             sums::mean(&sums::finite(&set.rovers().map(|r| stayed(r, of(r))).collect::<Vec<_>>()))
@@ -131,7 +135,7 @@ pub fn arrived(set: &Set) -> Estimate {
     share(set, |r| Some(reached(r)))
 }
 
-/// Share of the rovers of which that is true among those of which it is known.
+/// Share of rovers for which the predicate is true, among those for which it is known.
 pub fn share(set: &Set, is: impl Fn(&RoverRow) -> Option<bool>) -> Estimate {
     let of = |r: &RoverRow| is(r).map_or(f64::NAN, |yes| f64::from(u8::from(yes)));
     let totals: Vec<(f64, f64)> = set.worlds.iter().map(|w| w.total(of)).filter(|t| t.1 > 0.0).collect();

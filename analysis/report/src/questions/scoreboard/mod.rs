@@ -1,4 +1,4 @@
-//! Which synthesis method to use: all of them on one fit, their covariances beside the one that was asked for.
+//! Which synthesis method to use: all of them on one fit, with their covariances and the target.
 
 use super::Question;
 use super::curves::HEIGHT;
@@ -17,11 +17,11 @@ use std::collections::BTreeSet;
 pub const QUESTION: Question = Question {
     id: "scoreboard",
     name: "Methods",
-    title: "Which synthesis method makes the covariance that was asked for?",
+    title: "Which synthesis method reproduces the target covariance?",
     answer,
 };
 
-/// The figure ends where the covariance asked for has fallen to this share.
+/// The figure ends where the target covariance has fallen to this share.
 const DRAWN_SHARE: f64 = 0.005;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
@@ -30,12 +30,24 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     for texture in textures {
         let scores: Vec<&ScoreRow> = data.scoreboard.iter().filter(|s| s.texture_id == texture).collect();
         blocks.push(Block::Heading(format!("Texture {texture}")));
+        blocks.extend(best(&scores).map(Block::Text));
         blocks.push(Block::Figures(figures(data, texture, &scores)));
         blocks.push(Block::Table(table(texture, &scores)));
         let refused = scores.iter().filter(|s| !s.refused.is_empty());
         blocks.extend(refused.map(|s| Block::Text(format!("{} was not used: {}.", s.method, s.refused))));
     }
     Ok(blocks)
+}
+
+/// The method with the smallest error, in a sentence; `None` where no error is known.
+fn best(scores: &[&ScoreRow]) -> Option<String> {
+    let known = scores.iter().filter(|s| s.refused.is_empty() && s.covariance_error_max.is_finite());
+    let best = known.min_by(|a, b| a.covariance_error_max.total_cmp(&b.covariance_error_max))?;
+    Some(format!(
+        "{} comes closest to the target covariance: its largest error is {} % of the variance.",
+        best.method,
+        set::significant(100.0 * best.covariance_error_max, 2)
+    ))
 }
 
 fn curve<'a>(data: &'a Data, texture: &str, method: &str) -> Vec<&'a ScoreCovarianceRow> {
@@ -62,9 +74,9 @@ fn figure(texture: &str, score: &ScoreRow, curve: &[&ScoreCovarianceRow], x: Axi
     let achieved = Stroke::new(Paint::Series(1), 2.0);
     let measured = Stroke::new(Paint::Series(0), 1.8).dashed("4 3");
     let legend = [
-        (Mark::Line(wanted), "asked for".to_owned()),
-        (Mark::Line(achieved), "on average".to_owned()),
-        (Mark::Line(measured), format!("mean of {} made", score.realisations)),
+        (Mark::Line(wanted), "target".to_owned()),
+        (Mark::Line(achieved), "expected".to_owned()),
+        (Mark::Line(measured), format!("mean, n = {}", score.realisations)),
     ];
     let mut plot = Plot::new((WIDTH, HEIGHT + 20.0), (x, "lag, m"), (y, "covariance, m²"), &legend);
     plot.line([(0.0, 0.0), (x.range().1, 0.0)], Stroke::new(Paint::Muted, 1.0));
@@ -79,7 +91,7 @@ fn figure(texture: &str, score: &ScoreRow, curve: &[&ScoreCovarianceRow], x: Axi
     Figure {
         id,
         title: format!("{}.", score.method),
-        caption: "Covariance along rows: asked for, given by the method on average, and found in the realisations."
+        caption: "Covariance along rows: the target, the expectation of the method, and the mean over n realisations."
             .into(),
         description: format!(
             "Covariance of method {} against lag; its largest error is {} of the variance.",
@@ -108,8 +120,8 @@ fn table(texture: &str, scores: &[&ScoreRow]) -> TableBlock {
     TableBlock {
         id: slug(&format!("scoreboard-{texture}")),
         caption: format!(
-            "Methods of texture {texture}. Errors, variances and their spread are shares of the variance asked for; a seam jump of 1 is \
-             no seam; operations and bytes are predicted."
+            "Methods for texture {texture}. Errors, variances and their spread are shares of the target variance; a seam jump of 1 \
+             means no seam; operations and bytes are predictions."
         ),
         numbers: Numbers::select(&query, scores.iter().copied(), &names),
     }

@@ -1,4 +1,4 @@
-//! What changes when a parameter does: every variant of the study beside its plain run.
+//! How sensitive results are to parameters: every variant of the study compared with its plain run.
 
 use super::Question;
 use super::clusters::{Clusters, LEVEL, block, stream};
@@ -18,17 +18,21 @@ use sastrugi_statistics::Interval;
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Registry entry.
-pub const QUESTION: Question =
-    Question { id: "sensitivity", name: "Sensitivity", title: "What do the assumed parameters move?", answer };
+pub const QUESTION: Question = Question {
+    id: "sensitivity",
+    name: "Sensitivity",
+    title: "How sensitive are the results to the parameters?",
+    answer,
+};
 
-/// Variants that are drawn; all are in the table.
+/// Variants drawn; all are in the table.
 const DRAWN_MAX: usize = 24;
-/// Figures whose medians are compared: the three root mean squares.
+/// Number of metrics whose medians are compared: the three RMS values.
 const RMS: usize = 3;
 
-/// Variants that drive the plain run again, from more starts.
+/// Variants that repeat the plain run from more starts.
 const MORE_STARTS: &str = "replicates = ";
-/// Words at the end of a parameter's name that are its unit.
+/// Unit suffixes of parameter names.
 const UNITS: [&str; 9] = ["n", "m", "s", "px", "rad", "percent", "deg", "hz", "kg"];
 
 /// A variant in one group.
@@ -38,17 +42,17 @@ struct Effect {
     index: usize,
     missions: usize,
     successes: usize,
-    /// Missions that both runs drove; `None` where they share none and the runs are compared whole.
+    /// Missions that both runs drove; `None` if they share none, so that all missions of both runs are compared.
     pairs: Option<usize>,
     /// Change of the share of successes from the plain run, points, and its interval.
     change: f64,
     interval: Option<Interval>,
-    /// Medians of [`RMS`] figures and their changes, %.
+    /// Medians of the [`RMS`] metrics and their changes, %.
     medians: Vec<(f64, f64)>,
 }
 
 impl Effect {
-    /// What variants are sorted by: the largest change in points or per cent.
+    /// Sort key of variants: the largest change, in points or per cent.
     fn size(&self) -> f64 {
         self.medians.iter().map(|m| m.1.abs()).chain([self.change.abs()]).filter(|v| v.is_finite()).fold(0.0, f64::max)
     }
@@ -63,16 +67,29 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         return Ok(Vec::new());
     }
     let introduction = format!(
-        "One parameter is changed at a time; all else is the plain run of the same group. The change of success counts points of \
-         the missions that both runs drove between the same points, and of all missions where there are none; {} % intervals \
-         draw whole blocks of paired terrains (or terrains) anew. Changes of medians are over the successful missions of \
-         either run. The largest changes, in points or per cent, stand first.",
+        "{} One parameter is changed at a time; everything else is as in the plain run of the same group. The change of success is \
+         in percentage points, over the missions that both runs drove between the same points, or over all missions if there are \
+         none; {} % intervals resample whole blocks of paired terrains (or terrains). Changes of medians are over the successful \
+         missions of each run. The largest changes, in points or per cent, come first.",
+        strongest(&effects),
         set::fixed(100.0 * LEVEL, 0)
     );
     Ok(vec![Block::Text(introduction), Block::Figures(vec![figure(&effects)]), Block::Table(table(data, &effects))])
 }
 
-/// Every variant in every group that has a plain run, the variant of the largest effect first.
+/// The largest effect, in a sentence.
+fn strongest(effects: &[Effect]) -> String {
+    let largest = effects.iter().max_by(|a, b| a.size().total_cmp(&b.size())).filter(|e| e.size() > 0.0);
+    let Some(effect) = largest else { return "No variant changes success or a median.".to_owned() };
+    let median = METRICS.iter().zip(&effect.medians).find(|(_, m)| m.1.is_finite() && m.1.abs() >= effect.size());
+    let change = match median.filter(|_| effect.change.abs() < effect.size()) {
+        Some((metric, m)) => format!("the median {} by {} %", metric.name, set::fixed(m.1, 1)),
+        None => format!("success by {} points", set::fixed(effect.change, 1)),
+    };
+    format!("The largest effect is that of {} in group {}, which changes {change}.", effect.variant, effect.group)
+}
+
+/// Every variant in every group that has a plain run, the variant with the largest effect first.
 fn effects(data: &Data) -> Vec<Effect> {
     let differs = |v: &&str| !v.starts_with(MORE_STARTS);
     let names: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).filter(differs).collect();
@@ -175,22 +192,21 @@ fn figure(effects: &[Effect]) -> Figure {
         let row = variants.iter().position(|v| *v == effect.variant).unwrap_or(0);
         draw(&mut rows, row, 9.0 * (place - 0.5 * (groups.len() - 1) as f64), effect);
     }
-    let more = if left_out > 0 {
-        format!(" {left_out} variants of smaller effect are in the table only.")
-    } else {
-        String::new()
+    let more = match left_out {
+        0 => String::new(),
+        n => format!(" The table has {} with smaller effects.", set::counted(n, "more variant")),
     };
     Figure {
         id: "sensitivity-of-success".into(),
         title: "Change of success.".into(),
-        caption: format!("Marks are changes from the plain run, lines their 95 % intervals.{more}"),
+        caption: format!("Marks are changes from the plain run; lines are their 95 % intervals.{more}"),
         description: describe(effects),
         svg: rows.svg,
         numbers: numbers(effects),
     }
 }
 
-/// A variant as two lines: the parameter without its unit, and the table it stands in with its value.
+/// A variant in two lines: the parameter without its unit, and its table with the value.
 fn label(variant: &str) -> RowLabel {
     let (path, value) = variant.split_once(" = ").unwrap_or((variant, ""));
     let mut parts = path.rsplit('.');
@@ -276,7 +292,7 @@ fn table(data: &Data, effects: &[Effect]) -> TableBlock {
     for group in data.mission_groups() {
         numbers.rows.push(plain(&group));
     }
-    TableBlock { id: "sensitivity".into(), caption: "Variants beside the plain run (last)".into(), numbers }
+    TableBlock { id: "sensitivity".into(), caption: "Variants, then the plain run".into(), numbers }
 }
 
 /// The row of a group's plain run.

@@ -12,8 +12,8 @@ use std::collections::BTreeSet;
 pub const QUESTION: Question = Question { id: "summary", name: "Summary", title: "What are the results?", answer };
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let driven = [failures::in_words(data), missions(data), formations::in_words(data), rovers::in_words(data)];
-    let judged = [comparison::claims(data), texture::in_words(data)];
+    let driven = [missions(data), formations::in_words(data), rovers::in_words(data)];
+    let judged = [comparison::claims(data), texture::in_words(data), failures::in_words(data)];
     let mut blocks: Vec<Block> = driven.into_iter().chain(judged).flatten().map(Block::Text).collect();
     if !blocks.is_empty() {
         blocks.push(Block::Figures(picture(data)?));
@@ -37,15 +37,15 @@ fn missions(data: &Data) -> Option<String> {
     let failed = if others.is_empty() { "none failed".to_owned() } else { others.join(", ") };
     (!all.is_empty()).then(|| {
         format!(
-            "Of {} on {}, {} reached their goal; {failed}.",
+            "{} of {} on {} reached the goal; {failed}.",
+            set::count(ends[0]),
             set::counted(all.len(), "mission"),
-            set::counted(terrains, "terrain"),
-            set::count(ends[0])
+            set::counted(terrains, "terrain")
         )
     })
 }
 
-/// One picture: how the missions ended, or else a texture beside what it was fitted to.
+/// One picture: the outcomes of the missions, or else a texture next to the surface that it was fitted to.
 fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
     let groups = data.mission_groups();
     let mut figures = match groups.is_empty() {

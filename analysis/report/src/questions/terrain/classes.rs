@@ -23,7 +23,7 @@ const PIXELS: usize = 420;
 const DARK: Paint = Paint::Fixed([0x1b, 0x20, 0x26]);
 const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
 
-/// Shares, then one map per group.
+/// Class shares, then one map per group.
 pub fn figures(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Figure>, ReportError> {
     let mut figures: Vec<Figure> = shares(data, groups).into_iter().collect();
     for group in groups {
@@ -40,7 +40,7 @@ fn share(terrain: &TerrainRow, class: RoughnessClass) -> f64 {
     }
 }
 
-/// A bar for each class and group (the median) with its sampling band and the paper's mark, and a ring for each terrain.
+/// A bar for each class and group (the median), with its sampling band and the published value, and a ring for each terrain.
 fn shares(data: &Data, groups: &[Group<TerrainRow>]) -> Option<Figure> {
     let known: Vec<&Group<TerrainRow>> =
         groups.iter().filter(|g| median(&g.rows, |t| t.share_low).is_finite()).collect();
@@ -53,7 +53,7 @@ fn shares(data: &Data, groups: &[Group<TerrainRow>]) -> Option<Figure> {
     let bars = bars(data, &known);
     let mut rows = Rows::new(&labels, 84.0, (Axis::linear(0.0, 100.0), "share of the area, %"), &legend(data, &bars));
     bars.iter().for_each(|bar| share_bar(&mut rows, bar));
-    (known.len()..labels.len()).for_each(|row| say_too_small(&mut rows, row));
+    (known.len()..labels.len()).for_each(|row| note_too_small(&mut rows, row));
     Some(shares_figure(data, rows, &known, &bars))
 }
 
@@ -61,15 +61,15 @@ fn all_too_small(group: &Group<TerrainRow>) -> bool {
     group.rows.iter().all(|t| too_small(t))
 }
 
-/// The words in place of bars.
-fn say_too_small(rows: &mut Rows, row: usize) {
+/// The note in place of bars.
+fn note_too_small(rows: &mut Rows, row: usize) {
     if let Some(x) = rows.x.clamped(0.0) {
         let at = (x + 6.0, rows.centre(row) + 4.3);
-        rows.svg.text(at, Anchor::Start, Paint::Muted, "surface too small: nothing within the border");
+        rows.svg.text(at, Anchor::Start, Paint::Muted, "surface too small: all cells lie in the border");
     }
 }
 
-/// Median share of a class in a group, per cent, and what stands beside it.
+/// Median share of a class in a group, per cent, with its band, published value and terrains.
 struct Bar {
     row: usize,
     class: RoughnessClass,
@@ -137,7 +137,7 @@ fn share_bar(rows: &mut Rows, bar: &Bar) {
     }
     let value = format!("{} %", set::fixed(bar.median, 1));
     let width = text_width(&value, 11.5);
-    // Behind the last mark; where there is no room, on the bar; where that is short, at the edge.
+    // After the last mark; if there is no room, on the bar; if the bar is short, at the edge.
     let (x, anchor, paint) = match (last + 8.0 + width <= WIDTH, end - zero > width + 12.0) {
         (true, _) => (last + 8.0, Anchor::Start, Paint::Ink),
         (false, true) => (zero + 6.0, Anchor::Start, label_on(bar.class)),
@@ -160,8 +160,9 @@ fn shares_figure(data: &Data, rows: Rows, groups: &[&Group<TerrainRow>], bars: &
     Figure {
         id: "class-shares".into(),
         title: papers::title(data, "class-shares", "Shares of the roughness classes."),
-        caption: "Bars and figures are medians over terrains, circles the terrains. Medians need not add up to 100 %."
-            .into(),
+        caption:
+            "Bars and numbers are medians over terrains; circles are the terrains. Medians need not add up to 100 %."
+                .into(),
         description: format!("Median shares. {}.", groups.iter().map(in_words).collect::<Vec<_>>().join("; ")),
         svg: rows.svg,
         numbers: share_numbers(groups, bars),
@@ -197,7 +198,7 @@ fn class_entries() -> Vec<Entry> {
     RoughnessClass::ALL.map(|c| (Mark::Fill(Paint::Fixed(c.colour())), c.name().to_owned())).into()
 }
 
-/// The class map of the group's representative; of groups with missions, maps are drawn where these are shown.
+/// The class map of the group's representative; `None` for groups with missions, whose class maps are drawn with the missions.
 fn map(data: &Data, group: &Group<TerrainRow>) -> Result<Option<Figure>, ReportError> {
     let driven = |t: &&TerrainRow| !data.missions_on(&t.terrain_id).is_empty();
     let Some(terrain) = representative(group).filter(|_| !group.rows.iter().any(driven)) else { return Ok(None) };

@@ -1,4 +1,4 @@
-//! Maps that generators wrote beside the heights: one picture of each kind.
+//! Maps that generators wrote with the heights: one picture of each kind.
 
 use super::representative;
 use crate::ReportError;
@@ -9,17 +9,17 @@ use crate::render::colour::NO_DATA;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::TerrainRow;
 
-/// The map that holds codes.
+/// The map of codes.
 const CLASS: &str = "class";
-/// Those codes.
+/// Its codes.
 const GROUND: [Code; 3] =
     [(0, [0xe8, 0xd3, 0xa2], "sand"), (1, [0x5d, 0x52, 0x4a], "rock"), (NOTHING, NO_DATA, "no data")];
-/// Where there is no code.
+/// Code of cells without data.
 const NOTHING: u8 = 255;
 
-/// A kind of map: its name in the name of its files, a title, and what its colours show, with the unit that generators state.
+/// A kind of map: its name in file names, its title, and the quantity that its colours show, with the unit that generators state.
 const KINDS: [[&str; 3]; 6] = [
-    [CLASS, "Sand and rock.", "what the ground is"],
+    [CLASS, "Sand and rock.", "ground type"],
     ["albedo", "Albedo.", "albedo"],
     ["rock-potential", "Rock potential.", "rock potential"],
     ["rms-measured", "Measured roughness.", "RMS in the band, m"],
@@ -27,7 +27,7 @@ const KINDS: [[&str; 3]; 6] = [
     ["flux", "Flux of the cascade.", "flux, mean 1"],
 ];
 
-/// A picture of each kind: of the first group whose representative has such a map, where that is not the same everywhere.
+/// A picture of each kind, of the first group whose representative has such a map with more than one value.
 pub fn figures(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Figure>, ReportError> {
     let mut figures = Vec::new();
     for kind in KINDS {
@@ -62,7 +62,7 @@ fn figure(
     values(&grid, &path, (range, quantity), words)
 }
 
-/// Ends of the colours: percentiles, or what there is where these are one value; `None` for a map of one value.
+/// Ends of the colours: percentiles, or the full range if the percentiles are equal; `None` for a map with one value.
 fn range(grid: &Grid) -> Option<(f64, f64)> {
     [percentiles(grid), grid.range()].into_iter().flatten().find(|(low, high)| high > low)
 }

@@ -1,4 +1,4 @@
-//! Which terrains the release holds: relief, classes, spectra, heights, by group; and the figures of every surface.
+//! Which terrains the release has: relief, classes, spectra and heights by group, and the parameters of every surface.
 
 mod classes;
 mod maps;
@@ -15,7 +15,7 @@ use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::TerrainRow;
 use std::collections::BTreeSet;
 
-/// What figures of groups are computed from.
+/// Query for the rows from which values of groups are computed.
 const TERRAINS: &str = "select * from 'tables/terrains/*.parquet' where stage = 'terrain'";
 
 /// Registry entry.
@@ -25,7 +25,7 @@ pub const QUESTION: Question = Question { id: "terrain", name: "Terrain", title:
 const GROUPS_WITH_THREE: usize = 3;
 /// Largest relief over the smallest among groups that share a range of colours.
 const RELIEFS_MAX: f64 = 4.0;
-/// Groups that are drawn at all; every group is in the tables.
+/// Groups drawn; every group is in the tables.
 const GROUPS_MAX: usize = 12;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
@@ -54,7 +54,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// Groups gathered into families: each joins the first family that it is alike to.
+/// Groups gathered into families: each joins the first family that it matches.
 fn families<'a>(
     groups: &[Group<'a, TerrainRow>],
     alike: impl Fn(&[Group<TerrainRow>], &Group<TerrainRow>) -> bool,
@@ -80,13 +80,13 @@ fn shapes(rows: &[&TerrainRow]) -> BTreeSet<Shape> {
     rows.iter().map(|t| shape(t)).collect()
 }
 
-/// One raster size and cell, of every terrain: spectra over the same frequencies, on common axes.
+/// Every terrain has the same raster size and cell: spectra over the same frequencies, on common axes.
 fn alike_in_shape(family: &[Group<TerrainRow>], group: &Group<TerrainRow>) -> bool {
     family.iter().all(|g| shapes(&g.rows) == shapes(&group.rows))
 }
 
-/// Besides, heights that overlap, over ranges within a factor of each other: what one range of colours shows. A piece of measured ground
-/// hundreds of metres up would leave no colours to terrains about 0, and hills none to potholes among them.
+/// Also, heights overlap and their ranges are within a factor of each other, so that one colour range suits all. Measured ground at hundreds
+/// of metres would leave no contrast for terrains around 0, and hills would leave none for potholes.
 fn alike_in_heights(family: &[Group<TerrainRow>], group: &Group<TerrainRow>) -> bool {
     let b = heights(group);
     let alike = |other: &Group<TerrainRow>| {
@@ -104,13 +104,13 @@ fn heights(group: &Group<TerrainRow>) -> [f64; 2] {
     group.rows.iter().fold(none, |[low, high], t| [low.min(t.height_min_m), high.max(t.height_max_m)])
 }
 
-/// True when no cell is as far from the edges as the border that shares leave out.
+/// True when all cells lie in the border that shares leave out.
 fn too_small(terrain: &TerrainRow) -> bool {
     let side_m = (terrain.rows as f64 * terrain.cell_y_m).min(terrain.cols as f64 * terrain.cell_x_m);
     !terrain.share_low.is_finite() && 0.5 * side_m < terrain.share_border_m
 }
 
-/// Which terrains have no shares, and why; `None` when all that could have some do.
+/// Which terrains are too small to have shares; `None` when there are none.
 fn without_shares(groups: &[Group<TerrainRow>]) -> Option<String> {
     let small: Vec<&TerrainRow> = groups.iter().flat_map(|g| &g.rows).copied().filter(|t| too_small(t)).collect();
     let mut names: Vec<String> = small.iter().take(GROUPS_MAX).map(|t| t.terrain_id.clone()).collect();
@@ -119,7 +119,7 @@ fn without_shares(groups: &[Group<TerrainRow>]) -> Option<String> {
     }
     let border = borders(&small);
     (!small.is_empty())
-        .then(|| format!("No shares of {}: surface too small, nothing lies within {border}.", names.join(", ")))
+        .then(|| format!("No class shares for {}: surface too small, all cells lie in {border}.", names.join(", ")))
 }
 
 /// The borders that the shares of these terrains leave out, in words.
@@ -148,42 +148,42 @@ fn introduction(groups: &[Group<TerrainRow>]) -> String {
     let more = if groups.len() > GROUPS_MAX { " …" } else { "" };
     let border = borders(&groups.iter().flat_map(|g| &g.rows).copied().collect::<Vec<_>>());
     format!(
-        "{} in {}: {}{more}. Roughness classes follow the largest gradient to the eight neighbours of a cell; \
-         shares leave out {border} and are taken before the class map is closed. Reliefs are lit from the north-west; \
-         their colours end at the 1st and 99th percentile of the heights, or at the lowest and the highest where these lie far beyond.",
+        "The release has {} in {}: {}{more}. The roughness class of a cell follows from its largest gradient to its eight neighbours; \
+         shares leave out {border} and are computed before the class map is closed. Reliefs are lit from the north-west; their colours \
+         end at the 1st and 99th percentile of the heights, or at the lowest and highest height where these lie far beyond.",
         set::counted(n, "terrain"),
         set::counted(groups.len(), "group"),
         names.join(", ")
     )
 }
 
-/// The terrains of a group in order of their root mean square slope: the middle one is the group's representative.
+/// The terrains of a group in order of their RMS slope: the middle one is the group's representative.
 fn by_slope<'a>(group: &Group<'a, TerrainRow>) -> Vec<&'a TerrainRow> {
     let mut rows = group.rows.clone();
     rows.sort_by(|a, b| a.rms_slope.total_cmp(&b.rms_slope));
     rows
 }
 
-/// The terrain whose root mean square slope is in the middle of its group (the lower middle of an even number).
+/// The terrain with the median RMS slope of its group (the lower middle of an even number).
 fn representative<'a>(group: &Group<'a, TerrainRow>) -> Option<&'a TerrainRow> {
     let rows = by_slope(group);
     rows.get(rows.len().saturating_sub(1) / 2).copied()
 }
 
-/// A figure of each row whose median a group is described by.
+/// A quantity whose median describes a group: name, unit, value.
 type Column = (&'static str, &'static str, fn(&TerrainRow) -> f64);
 
 const MEDIANS: [Column; 7] = [
     ("relief", "m", |t| t.relief_m),
-    ("rms height", "m", |t| t.rms_height_m),
-    ("rms slope", "1", |t| t.rms_slope),
+    ("RMS height", "m", |t| t.rms_height_m),
+    ("RMS slope", "1", |t| t.rms_slope),
     ("low", "%", |t| 100.0 * t.share_low),
     ("semi", "%", |t| 100.0 * t.share_semi),
     ("high", "%", |t| 100.0 * t.share_high),
     ("PSD slope", "1", |t| t.psd_slope),
 ];
 
-/// Median of a figure over the rows that have it.
+/// Median of a quantity over the rows that have it.
 fn median(rows: &[&TerrainRow], figure: impl Fn(&TerrainRow) -> f64) -> f64 {
     let values: Vec<f64> = rows.iter().map(|t| figure(t)).collect();
     sums::median(&sums::finite(&values))
@@ -200,7 +200,7 @@ fn medians(groups: &[Group<TerrainRow>]) -> TableBlock {
     TableBlock { id: "terrain-medians".into(), caption: "Terrain by group (medians over terrains)".into(), numbers }
 }
 
-/// Figures of every surface of the release.
+/// Parameters of every surface of the release.
 fn surfaces(data: &Data) -> TableBlock {
     let names = [
         "surface_id",

@@ -1,5 +1,5 @@
-//! Shaded relief: the smoothest, the middle and the roughest terrain of each group, in one light and one range of colours for
-//! rasters of one size with heights alike.
+//! Shaded relief of the smoothest, the median and the roughest terrain of each group, with the same light and colour range for
+//! rasters of the same size with similar heights.
 
 use super::{GROUPS_WITH_THREE, by_slope, median, shape, shapes};
 use crate::ReportError;
@@ -10,7 +10,7 @@ use crate::render::number as set;
 use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_schemas::tables::TerrainRow;
 
-/// A terrain to draw and why.
+/// A terrain to draw, its group, and why it was chosen.
 type Choice<'a> = (&'a TerrainRow, String, &'static str);
 
 /// One figure per terrain drawn.
@@ -18,7 +18,7 @@ pub fn figures(data: &Data, families: &[Vec<Group<TerrainRow>>]) -> Result<Vec<F
     let mut figures = Vec::new();
     for family in families {
         let choices: Vec<Choice> = family.iter().flat_map(|g| choices(g, family.len())).collect();
-        // A group may hold rasters of several scales: each has its own light and colours.
+        // A group may have rasters of several scales: each has its own light and colours.
         for shape_of in shapes(&choices.iter().map(|c| c.0).collect::<Vec<_>>()) {
             let alike: Vec<&Choice> = choices.iter().filter(|c| shape(c.0) == shape_of).collect();
             figures.extend(in_one_style(data, &alike)?);
@@ -40,10 +40,10 @@ fn choices<'a>(group: &Group<'a, TerrainRow>, groups: usize) -> Vec<Choice<'a>> 
     let rows = by_slope(group);
     let Some(last) = rows.len().checked_sub(1) else { return Vec::new() };
     let places: &[(usize, &str)] = match rows.len() {
-        1 => &[(0, "the only one")],
-        _ if groups > GROUPS_WITH_THREE => &[(last / 2, "middle rms slope")],
+        1 => &[(0, "the only terrain")],
+        _ if groups > GROUPS_WITH_THREE => &[(last / 2, "median RMS slope")],
         2 => &[(0, "smoother"), (1, "rougher")],
-        _ => &[(0, "smoothest"), (last / 2, "middle rms slope"), (last, "roughest")],
+        _ => &[(0, "smoothest"), (last / 2, "median RMS slope"), (last, "roughest")],
     };
     places.iter().map(|&(i, why)| (rows[i], group.name.clone(), why)).collect()
 }
@@ -59,7 +59,7 @@ fn style(data: &Data, choices: &[&Choice]) -> Result<Option<Style>, ReportError>
 
 fn words((terrain, group, why): &Choice, style: Style) -> Words {
     let caption = format!(
-        "{}, {why}: rms slope {}, relief {}.{}",
+        "{}, {why}: RMS slope {}, relief {}.{}",
         terrain.terrain_id,
         set::significant(terrain.rms_slope, 3),
         set::with_unit(terrain.relief_m, 3, "m"),

@@ -1,7 +1,7 @@
-//! Planets under the sun: every planetary and elaborated terrain rendered from above with its albedo and cast shadows. The representative of each
-//! group is drawn large, the others are thumbnails.
+//! Every planetary and elaborated terrain rendered from above with its albedo and cast shadows. The representative of each group is drawn large;
+//! the others are thumbnails.
 //!
-//! Drawing, as the shading of reliefs is: heights and albedo are thinned to the pixels of the picture before.
+//! This is drawing, as the shading of reliefs is: heights and albedo are first thinned to the pixels of the picture.
 
 use super::representative;
 use crate::ReportError;
@@ -20,26 +20,26 @@ use sastrugi_schemas::tables::TerrainRow;
 
 /// Kinds of terrain with an albedo of their own.
 const KINDS: [&str; 2] = ["planetary", "elaborate"];
-/// Low in the north-west, so that rocks and rims throw shadows.
+/// Low in the north-west, so that rocks and rims cast shadows.
 const SUN: Sun = Sun { azimuth_deg: 315.0, elevation_deg: 25.0 };
-/// Scatter of brightness over its mean below which a picture shows nothing but paper.
+/// Standard deviation of brightness over its mean below which a picture would look blank.
 const CONTRAST_MIN: f64 = 0.1;
 /// Largest number of rows or columns of a large picture.
 const PIXELS: usize = 480;
 /// The same of a thumbnail.
 const THUMBNAIL_PIXELS: usize = 128;
-/// Thumbnails on a page: some 15 kB each.
+/// Thumbnails on a page: about 15 kB each.
 const THUMBNAILS_MAX: usize = 96;
 /// Thumbnails in a row.
 const COLUMNS: usize = 4;
-/// Between thumbnails, px.
+/// Gap between thumbnails, px.
 const GAP: f64 = 8.0;
 /// Room for the id below a thumbnail, px.
 const LABEL: f64 = 18.0;
 /// Size of the id, px.
 const LABEL_SIZE: f64 = 11.0;
 
-/// A large picture for each group, thumbnails of the other terrains, and how many are left out.
+/// A large picture for each group, thumbnails of the other terrains, and the number left out.
 pub fn blocks(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Block>, ReportError> {
     let large: Vec<&TerrainRow> = groups.iter().filter_map(representative).filter(|t| is_planet(t)).collect();
     let mut figures = Vec::new();
@@ -56,14 +56,15 @@ pub fn blocks(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Block>, R
     }
     let mut blocks = Vec::new();
     if !figures.is_empty() {
-        blocks.extend([Block::Heading("Rendered".into()), Block::Figures(figures)]);
+        blocks.extend([Block::Heading("Rendered views".into()), Block::Figures(figures)]);
     }
     if !left_out.is_empty() {
         blocks.push(Block::Text(format!(
-            "{} of {} planetary and elaborated terrains are not rendered here: a page holds the representative of each group and {THUMBNAILS_MAX} \
-             thumbnails, to stay small. An `[[image]]` renders any terrain of a study.",
+            "{} of {} planetary and elaborated terrains {} not rendered here: to stay small, a page has the representative of each group and at \
+             most {THUMBNAILS_MAX} thumbnails. An `[[image]]` renders any terrain of a study.",
             set::count(left_out.len()),
-            set::count(left_out.len() + drawn.len() + large.len())
+            set::count(left_out.len() + drawn.len() + large.len()),
+            if left_out.len() == 1 { "is" } else { "are" }
         )));
     }
     Ok(blocks)
@@ -73,7 +74,7 @@ fn is_planet(terrain: &TerrainRow) -> bool {
     KINDS.contains(&terrain.kind.as_str())
 }
 
-/// A terrain under the sun.
+/// A rendered terrain.
 struct View {
     rendering: Rendering,
     picture: Picture,
@@ -88,7 +89,7 @@ struct View {
     with_albedo: bool,
 }
 
-/// Renders a terrain with at most `most` pixels along a side; `None` without its heights, and where the sun shows nothing of them.
+/// Renders a terrain with at most `most` pixels along a side; `None` without its heights, or if the picture would look blank.
 fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, ReportError> {
     let Some(heights) = data.files.grid(&terrain.path)? else { return Ok(None) };
     let map = terrain.path.strip_suffix(".tif").map(|path| format!("{path}.albedo.tif"));
@@ -98,7 +99,7 @@ fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, 
     let albedo: Option<Grid> = albedo.map(|grid| thin::block_mean(&grid, step));
     let parameters = RenderParameters { sun: SUN, samples: 1, ..RenderParameters::default() };
     let scene = Scene { heights: &thinned, albedo: albedo.as_ref() };
-    // Without noise nothing is drawn at random.
+    // Without noise, no random numbers are drawn.
     let Ok(rendering) = render(&scene, &parameters, &Streams::for_seed(0, KINDS[0])) else { return Ok(None) };
     let image = rendering.image();
     if contrast(&image) < CONTRAST_MIN {
@@ -146,18 +147,18 @@ fn sun_words() -> String {
 
 fn figure(data: &Data, terrain: &TerrainRow) -> Result<Option<Figure>, ReportError> {
     let Some(view) = view(data, terrain, PIXELS)? else { return Ok(None) };
-    let albedo_words = if view.with_albedo { "its albedo" } else { "one albedo" };
+    let albedo_words = if view.with_albedo { "its albedo" } else { "uniform albedo" };
     let mut numbers = Numbers::of_file(terrain.path.as_str(), &COLUMN_NAMES);
     row(&mut numbers, terrain, &view);
     let step = view.step;
     Ok(Some(Figure {
         id: slug(&format!("rendered-{}", terrain.terrain_id)),
-        title: "Under the sun.".into(),
+        title: "Rendered view.".into(),
         caption: format!(
             "{} from above with {albedo_words} and cast shadows, pixels of {}{}; {}.",
             terrain.terrain_id,
             set::with_unit(view.pixel_m, 3, "m"),
-            if step > 1 { format!(" (means over {step} × {step} cells)") } else { String::new() },
+            if step > 1 { format!(" (averaged over {step} × {step} cells)") } else { String::new() },
             sun_words()
         ),
         description: format!("Rendered image of {}, {}.", terrain.path, view.extent),
@@ -166,7 +167,7 @@ fn figure(data: &Data, terrain: &TerrainRow) -> Result<Option<Figure>, ReportErr
     }))
 }
 
-/// Thumbnails of terrains of one label, each with its id below.
+/// Thumbnails of terrains with one label, each with its id below.
 fn sheet(data: &Data, terrains: &[&TerrainRow]) -> Result<Option<Figure>, ReportError> {
     let mut views = Vec::new();
     for terrain in terrains {
@@ -191,15 +192,15 @@ fn sheet(data: &Data, terrains: &[&TerrainRow]) -> Result<Option<Figure>, Report
     }
     let with_albedo = views.iter().filter(|(_, v)| v.with_albedo).count();
     let albedo = match with_albedo {
-        0 => "one albedo",
-        n if n == views.len() => "their albedo",
-        _ => "their albedo where they have a map of it",
+        0 => "uniform albedo",
+        n if n == views.len() => "mapped albedo",
+        _ => "mapped albedo where there is a map",
     };
     Ok(Some(Figure {
         id: slug(&format!("thumbnails-{name}-{}", first.terrain_id)),
-        title: format!("Group {name} under the sun."),
+        title: format!("Rendered views, group {name}."),
         caption: format!(
-            "{} from above with {albedo} and cast shadows, pixels of {}, each with a white of its own; {}.",
+            "{} from above with {albedo} and cast shadows, pixels of {}, each with its own white point; {}.",
             set::counted(views.len(), "terrain"),
             pixels(&views),
             sun_words()
@@ -210,7 +211,7 @@ fn sheet(data: &Data, terrains: &[&TerrainRow]) -> Result<Option<Figure>, Report
     }))
 }
 
-/// Size on the page of a picture in a box of that width.
+/// Size on the page of a picture in a box of a given width.
 fn shown(picture: &Picture, width: f64) -> (f64, f64) {
     let [x, y] = picture.size_m;
     let scale = width / x.max(y);

@@ -15,7 +15,7 @@ type Drawn<'a, 'b> = (&'b Group<'a, TerrainRow>, Vec<Curve>);
 
 fn drawn<'a, 'b>(groups: &'b [Group<'a, TerrainRow>], points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Drawn<'a, 'b>> {
     let curves = |g: &Group<TerrainRow>| {
-        // Many lines in one frame stay apart when they are thin.
+        // Thin lines keep many curves distinguishable.
         let opacity = (3.0 / g.rows.len() as f64).clamp(0.25, 1.0);
         let stroke = Stroke::new(Paint::Series(g.index), if g.rows.len() > 3 { 1.1 } else { 1.7 }).faint(opacity);
         let curve = |t: &&TerrainRow| Curve { name: None, stroke, points: points(&t.terrain_id) };
@@ -40,7 +40,7 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         }
         let ends = format!("{} to {}", set::significant(band[0], 2), set::with_unit(band[1], 2, "cycles/m"));
         let of_slope = match (covered, slope.is_some()) {
-            (true, true) => format!("; dashed, the median of their slopes, fitted from {ends}."),
+            (true, true) => format!("; dashed: the median of their slopes, fitted from {ends}."),
             (true, false) => ".".to_owned(),
             (false, _) => format!(
                 ". The spectrum does not cover the band in which its slope is fitted, {ends}, so the slope is not drawn."

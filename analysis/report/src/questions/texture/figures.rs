@@ -1,4 +1,4 @@
-//! Figures of the measured residual and of the texture side by side.
+//! Surface parameters of the measured residual and of the texture, side by side.
 
 use crate::content::{Numbers, TableBlock, number, slug, text};
 use crate::data::Data;
@@ -7,7 +7,7 @@ use crate::render::number as set;
 use sastrugi_schemas::Cell;
 use sastrugi_schemas::tables::{SurfaceRow, TerrainRow};
 
-/// A figure: name, unit, value.
+/// A surface parameter: name, unit, value.
 type Row = (&'static str, &'static str, fn(&SurfaceRow) -> f64);
 
 const ROWS: [Row; 15] = [
@@ -28,22 +28,22 @@ const ROWS: [Row; 15] = [
     ("standard error", "1", |s| s.hurst_standard_error),
 ];
 
-/// Id under which a texture's stage stores what the fit would see of it.
+/// Id under which a texture's stage stores its residual, after the detrending and trimming of the fit.
 pub fn residual_id(texture: &TerrainRow) -> String {
     format!("{}.residual", texture.terrain_id)
 }
 
-/// Columns: measured residual, residual of the texture, texture as it is; without rows where the release describes none.
+/// Columns: measured residual, residual of the texture, texture as synthesised; without rows if the release describes none of them.
 pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
     let residual = residual_id(texture);
     let sides = [
         ("measured", data.surface(fit)),
         ("texture residual", data.surface(&residual)),
-        ("as made", data.surface(&texture.terrain_id)),
+        ("as synthesised", data.surface(&texture.terrain_id)),
     ];
     let present: Vec<(&str, &SurfaceRow)> = sides.into_iter().filter_map(|(name, s)| Some((name, s?))).collect();
     let columns: Vec<(&str, &str)> =
-        [("figure", "")].into_iter().chain(present.iter().map(|(name, _)| (*name, ""))).collect();
+        [("parameter", "")].into_iter().chain(present.iter().map(|(name, _)| (*name, ""))).collect();
     let query = format!(
         "select * from 'tables/surfaces/*.parquet' where surface_id in ({})",
         [fit, &residual, &texture.terrain_id].map(quoted).join(", ")
@@ -56,13 +56,14 @@ pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
         numbers.row([text(label)].into_iter().chain(values));
     }
     if !present.is_empty() {
-        numbers.row([text("over lags of, m")].into_iter().chain(present.iter().map(|(_, s)| lags(s))));
+        numbers.row([text("lags of the exponent, m")].into_iter().chain(present.iter().map(|(_, s)| lags(s))));
     }
-    let caption = "Residual of the fit; texture after the same detrending and trimming; texture as made".to_owned();
+    let caption =
+        "Residual of the fit; texture after the same detrending and trimming; texture as synthesised".to_owned();
     TableBlock { id: slug(&format!("figures-of-{}", texture.terrain_id)), caption, numbers }
 }
 
-/// Lags of the Hurst exponent.
+/// Range of lags of the Hurst exponent.
 fn lags(surface: &SurfaceRow) -> Cell {
     let ends = [surface.hurst_lag_min_m, surface.hurst_lag_max_m];
     match ends.iter().all(|v| v.is_finite()) {
@@ -71,7 +72,7 @@ fn lags(surface: &SurfaceRow) -> Cell {
     }
 }
 
-/// Rows of one column have many magnitudes: each is given as text of its own digits.
+/// Values of one column differ in magnitude, so each is given as text with its own digits.
 fn rounded(value: f64, name: &str) -> Cell {
     match (value.is_finite(), name) {
         (false, _) => number(value),

@@ -1,8 +1,8 @@
-//! Whether a synthetic texture looks like what it was fitted to: residual and texture side by side at one scale and in one
-//! colour range, their spectra, height distributions and structure functions in one frame, their figures in one table.
+//! Whether a synthetic texture looks like the surface it was fitted to: residual and texture side by side at the same scale and
+//! colours, their spectra, height distributions and structure functions in one frame, their surface parameters in one table.
 //!
-//! A residual has lost what the moving average took; a texture has not. Both can be compared where the texture went through
-//! the same (`<texture>.residual`).
+//! A residual lacks what the moving average removed; a texture does not. The two are comparable if the texture went through the
+//! same detrending and trimming (`<texture>.residual`).
 
 mod figures;
 mod verdict;
@@ -30,9 +30,9 @@ pub const QUESTION: Question = Question {
     answer,
 };
 
-/// Textures that are drawn; all are in the table.
+/// Textures drawn; all are in the table.
 const TEXTURES_MAX: usize = 4;
-/// Tiles along each side of the picture that repeats a texture.
+/// Tiles along each side of the picture of a repeated texture.
 const TILES: usize = 3;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
@@ -54,24 +54,25 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         }
     }
     if textures.len() > TEXTURES_MAX {
-        blocks.push(Block::Text(format!("The first {TEXTURES_MAX} of {} textures are drawn.", textures.len())));
+        let all = textures.len();
+        blocks.push(Block::Text(format!("The first {TEXTURES_MAX} of {all} textures are drawn; the table lists all.")));
     }
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
 }
 
-/// The fit of a texture that stands alone.
+/// The fit of a texture that is not placed onto a base.
 fn alone(texture: &TerrainRow) -> Option<String> {
     data::parameter(texture, "fit").filter(|_| data::parameter(texture, "onto").is_none())
 }
 
-/// Textures that stand alone, each with its fit.
+/// Textures that are not placed onto a base, each with its fit.
 fn standing_alone(data: &Data) -> impl Iterator<Item = (&TerrainRow, String)> {
     data.of_stage("texture").filter_map(|texture| Some((texture, alone(texture)?)))
 }
 
-/// Whether the textures match the measured surfaces: how many, and the sentence on the first that does not, or else the first; `None` where
-/// none can be compared.
+/// Whether the textures match the measured surfaces: their numbers, and the sentence on the first that does not match, or else on the first
+/// one. `None` if none can be compared.
 pub(super) fn in_words(data: &Data) -> Option<String> {
     let answers: Vec<(&TerrainRow, Answer, String)> = standing_alone(data)
         .filter_map(|(texture, fit)| {
@@ -80,20 +81,28 @@ pub(super) fn in_words(data: &Data) -> Option<String> {
         .collect();
     let worst = answers.iter().find(|a| a.1 == Answer::No).or(answers.first())?;
     let quoted = format!("Does texture {} match the surface it was fitted to? {}", worst.0.terrain_id, worst.2);
-    let of = |answer: Answer| set::count(answers.iter().filter(|a| a.1 == answer).count());
+    let kinds = [
+        (Answer::Yes, "1 matches", "match"),
+        (Answer::No, "1 does not match", "do not match"),
+        (Answer::CannotTell, "1 is undecided", "are undecided"),
+    ];
+    let part = |(answer, one, many): (Answer, &str, &str)| match answers.iter().filter(|a| a.1 == answer).count() {
+        0 => None,
+        1 => Some(one.to_owned()),
+        n => Some(format!("{} {many}", set::count(n))),
+    };
+    let parts: Vec<String> = kinds.into_iter().filter_map(part).collect();
     Some(match answers.len() {
         1 => quoted,
         n => format!(
-            "Of {} textures {} match the surface they were fitted to, {} do not, and for {} the data cannot tell. {quoted}",
+            "Of {} textures compared with their measured surfaces, {}. {quoted}",
             set::count(n),
-            of(Answer::Yes),
-            of(Answer::No),
-            of(Answer::CannotTell)
+            parts.join(", ")
         ),
     })
 }
 
-/// The first texture that stands alone, beside the residual of its fit; none where the release has none.
+/// The first texture without a base, next to the residual of its fit; empty if the release has none.
 pub(super) fn side_by_side(data: &Data) -> Result<Vec<Figure>, ReportError> {
     standing_alone(data).next().map_or(Ok(Vec::new()), |(texture, fit)| patches(data, texture, &fit))
 }
@@ -105,7 +114,7 @@ fn heading(texture: &TerrainRow) -> String {
     }
 }
 
-/// Figures by row. A texture on a base is shown as relief; one that stands alone beside the residual of its fit.
+/// Figures by row. A texture on a base is shown as relief; one without a base next to the residual of its fit.
 fn figures(data: &Data, texture: &TerrainRow) -> Result<Vec<Vec<Figure>>, ReportError> {
     let fit = data::parameter(texture, "fit").unwrap_or_default();
     if let Some(base) = data::parameter(texture, "onto") {
@@ -133,14 +142,14 @@ fn on_base(data: &Data, texture: &TerrainRow, base: &str, fit: &str) -> Result<V
         caption,
     };
     let mut figures = Vec::new();
-    figures.extend(relief(data, base_path, style, words("base", "Base.", format!("{base}, as it was generated.")))?);
+    figures.extend(relief(data, base_path, style, words("base", "Base.", format!("{base}, as generated.")))?);
     let covariance = if fit.is_empty() { "of its stated covariance".into() } else { format!("of fit {fit}") };
     let caption = format!("{}: {base} with a texture {covariance}; same colours and light.", texture.terrain_id);
     figures.extend(relief(data, &texture.path, style, words("textured", "Base with texture.", caption))?);
     Ok(figures)
 }
 
-/// Measured residual and synthetic texture: the middle of each, of one size in metres, in one colour range.
+/// Measured residual and synthetic texture: the centre of each, with the same size in metres and the same colour range.
 fn patches(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Vec<Figure>, ReportError> {
     let Some(synthetic) = data.files.grid(&texture.path)? else { return Ok(Vec::new()) };
     let residual_path = format!("fit/{fit}.residual.tif");
@@ -148,7 +157,7 @@ fn patches(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Vec<Figure>, 
     let size = common_size(&synthetic, measured.as_ref());
     let (synthetic, measured) = (thin::centre(&synthetic, size), measured.map(|m| thin::centre(&m, size)));
     let limit = measured.iter().chain([&synthetic]).map(limit_m).filter(|v| *v > 0.0).fold(0.0, f64::max);
-    let ground = format!("{} × {} m from the middle", set::significant(size[0], 3), set::significant(size[1], 3));
+    let ground = format!("{} × {} m at the centre", set::significant(size[0], 3), set::significant(size[1], 3));
     let words = |what: &str, title: &str, caption: String| Words {
         id: slug(&format!("{what}-{}", texture.terrain_id)),
         title: title.into(),
@@ -166,14 +175,14 @@ fn patches(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Vec<Figure>, 
         )?);
     }
     let caption = format!(
-        "{}, {ground}; same scale, same colours. As made: the moving average has not taken its long waves.",
+        "{}, {ground}; same scale and colours. It is not detrended, so it still has its long waves.",
         texture.terrain_id
     );
     figures.extend(deviations(&synthetic, &texture.path, limit, "no data", words("synthetic", "Synthetic.", caption))?);
     Ok(figures)
 }
 
-/// The largest square that both grids hold, m.
+/// The largest square that fits into both grids, m.
 fn common_size(a: &Grid, b: Option<&Grid>) -> [f64; 2] {
     let sides = [Some(a), b].into_iter().flatten().flat_map(|g| g.geometry.size());
     [sides.fold(f64::INFINITY, f64::min); 2]
@@ -181,14 +190,14 @@ fn common_size(a: &Grid, b: Option<&Grid>) -> [f64; 2] {
 
 const MEASURED: Stroke = Stroke { paint: Paint::Ink, width: 2.4, dash: "", opacity: 0.75 };
 const RESIDUAL: Stroke = Stroke { paint: Paint::Series(1), width: 1.9, dash: "6 3", opacity: 1.0 };
-const AS_MADE: Stroke = Stroke { paint: Paint::Series(0), width: 1.4, dash: "2 3", opacity: 1.0 };
+const SYNTHESISED: Stroke = Stroke { paint: Paint::Series(0), width: 1.4, dash: "2 3", opacity: 1.0 };
 
-/// Surfaces that are drawn in one frame: name, id, line.
+/// Surfaces drawn in one frame: name, id, line.
 fn sides(fit: &str, texture: &TerrainRow) -> [(&'static str, String, Stroke); 3] {
     [
         ("measured residual", fit.to_owned(), MEASURED),
         ("synthetic, residual", figures::residual_id(texture), RESIDUAL),
-        ("synthetic, as made", texture.terrain_id.clone(), AS_MADE),
+        ("as synthesised", texture.terrain_id.clone(), SYNTHESISED),
     ]
 }
 
@@ -199,7 +208,7 @@ fn together(fit: &str, texture: &TerrainRow, points: impl Fn(&str) -> Vec<(f64, 
     sides(fit, texture).into_iter().map(curve).filter(|c| c.points.len() > 1).collect()
 }
 
-/// The ids of a frame as a list for a query.
+/// The ids of a frame, as a list for a query.
 fn ids(fit: &str, texture: &TerrainRow) -> String {
     sides(fit, texture).map(|(_, id, _)| quoted(&id)).join(", ")
 }
@@ -236,7 +245,7 @@ fn spectra(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
         what: "psd",
         title: "Spectra.",
         caption: "Radially averaged two-dimensional power spectral density.",
-        measured: "The moving average has taken the lowest frequencies out of both residuals: that of the DEM, and that of the \
+        measured: "The moving average has removed the lowest frequencies from both residuals, that of the DEM and that of the \
                    texture.",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
@@ -253,7 +262,7 @@ fn distributions(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure>
         what: "heights",
         title: "Heights.",
         caption: "Height distributions.",
-        measured: "The measured one ends where it was trimmed.",
+        measured: "The measured distribution ends at the trimming threshold.",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
@@ -269,8 +278,8 @@ fn structures(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     let chart = Chart {
         what: "structure",
         title: "Structure functions.",
-        caption: "Mean squared difference of heights against their distance, all directions together.",
-        measured: "The moving average makes it level off at its window.",
+        caption: "Mean squared height difference against lag, over all directions.",
+        measured: "Those of the residuals level off at the window of the moving average.",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
@@ -300,13 +309,13 @@ fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     let chart = Chart {
         what: "profiles",
         title: "Spectra of profiles.",
-        caption: "One-dimensional power spectral density, mean of all rows and of all columns.",
+        caption: "One-dimensional power spectral density, averaged over all rows and over all columns.",
         measured: "",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows.flatten(), &names)))
 }
 
-/// The texture laid three by three, where it repeats.
+/// The texture tiled three by three, if it is periodic.
 fn tiling(data: &Data, texture: &TerrainRow) -> Result<Option<Figure>, ReportError> {
     let repeats = serde_json::from_str::<serde_json::Value>(&texture.params)
         .is_ok_and(|p| p.get("periodic").and_then(serde_json::Value::as_bool).unwrap_or(true));
@@ -317,16 +326,16 @@ fn tiling(data: &Data, texture: &TerrainRow) -> Result<Option<Figure>, ReportErr
     let shading = exaggeration_words(style.exaggeration);
     let words = Words {
         id: slug(&format!("tiles-{}", texture.terrain_id)),
-        title: "Three by three.".into(),
+        title: "Tiled three by three.".into(),
         caption: format!(
-            "{} repeated in either direction, as shaded relief: a seam would show as a line at a third.{shading}",
+            "{} repeated in both directions, as shaded relief; a seam would show as a line at a third of the side.{shading}",
             texture.terrain_id
         ),
     };
     relief_of(&tiled, &texture.path, Some(style).filter(|s| s.range_m.0 < s.range_m.1), words)
 }
 
-/// The words, and what to mind about the measured curve where there is one.
+/// The caption, with the note on the measured curve if there is one.
 fn with_measured(words: &str, measured: &str, curves: &[Curve]) -> String {
     if curves.len() > 1 && !measured.is_empty() { format!("{words} {measured}") } else { words.to_owned() }
 }

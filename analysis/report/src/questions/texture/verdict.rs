@@ -1,16 +1,16 @@
-//! Whether a texture is like the measured surface: yes, no, or cannot tell.
+//! Does a texture match the measured surface: yes, no, or cannot tell.
 //!
-//! The residual of the DEM is compared with that of the texture, which went through the same detrending and trimming. Each figure has a
-//! margin within which two surfaces count as alike. How much a figure scatters over ground of that size follows from the covariance of the
+//! The residual of the DEM is compared with that of the texture, which went through the same detrending and trimming. Each quantity has a
+//! margin within which two surfaces count as equal. Its sampling variance over an area of this size follows from the covariance of the
 //! residual, as for a stationary normal field that is not trimmed: var(ln Sq) = I2 / 2 A, var(Ssk) = 6 I3 / A, var(Sku) = 24 I4 / A, where A
-//! is the area and Ik the integral of the k-th power of the correlation over all lags (Lomnicki, 1961). Trimming lessens the scatter of
-//! skewness and kurtosis. Slopes, and increments up to 0.4 of the window, are correlated over less ground than heights are: the scatter of
-//! Sq, which is taken for them, is more than theirs. Both lead to "cannot tell" rather than to a wrong answer.
+//! is the area and Ik the integral of the k-th power of the correlation over all lags (Lomnicki, 1961). Trimming reduces the scatter of
+//! skewness and kurtosis. Slopes, and increments up to 0.4 of the window, are correlated over shorter distances than heights, so the scatter
+//! of Sq, which is used for them, is larger than theirs. Both err towards "cannot tell" rather than towards a wrong answer.
 //!
-//! * Yes: every difference lies within its margin with its interval of 90 % (two one-sided tests at 5 %; a wrong yes has a probability
-//!   of at most 5 %, since all must pass; Berger, 1982).
-//! * No: a difference lies beyond its margin with an interval that leaves 5 % over all figures and lags together (Bonferroni).
-//! * Cannot tell: neither; or the fit found that the surface is not stationary, so that its scatter is not the one above.
+//! * Yes: the 90 % interval of every difference lies within its margin (two one-sided tests at 5 %; the probability of a wrong yes is at
+//!   most 5 %, since all must pass; Berger, 1982).
+//! * No: the interval of a difference lies beyond its margin, at 5 % over all quantities and lags together (Bonferroni).
+//! * Cannot tell: neither of these; or the fit found that the surface is not stationary, so that the scatter above does not apply.
 
 use super::figures::residual_id;
 use crate::data::Data;
@@ -21,23 +21,23 @@ use sastrugi_statistics::normal;
 use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Largest ratio, as its logarithm, of figures of length that are alike.
+/// Margin for the logarithm of the ratio of lengths and slopes.
 const RATIO_MARGIN: f64 = 0.1;
-/// Largest difference of skewnesses that are alike.
+/// Margin for the difference of skewness.
 const SKEWNESS_MARGIN: f64 = 0.25;
-/// Largest difference of kurtoses that are alike.
+/// Margin for the difference of kurtosis.
 const KURTOSIS_MARGIN: f64 = 0.5;
-/// Level of a yes, and of a no over all figures.
+/// Level of a yes, and of a no over all quantities together.
 const ALPHA: f64 = 0.05;
 /// Longest lag of the increments that are compared, over the window of the fit.
 const LAG_MAX: f64 = 0.4;
 
-/// A figure of both surfaces.
+/// A quantity of both surfaces.
 struct Compared {
     name: String,
-    /// In words: of the measured surface, then of the texture.
+    /// As text: of the measured surface, then of the texture.
     values: [String; 2],
-    /// Texture less measured.
+    /// Texture minus measured.
     difference: f64,
     /// Its standard deviation.
     scatter: f64,
@@ -47,9 +47,9 @@ struct Compared {
 /// The answer.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Answer {
-    /// Alike in every figure.
+    /// Equal within the margin in every quantity.
     Yes,
-    /// Unlike in one at least.
+    /// Different in at least one.
     No,
     /// The data cannot tell.
     CannotTell,
@@ -62,7 +62,7 @@ pub fn of_texture(data: &Data, texture: &TerrainRow, fit: &str) -> Option<(Answe
     if fit.stationarity_p < ALPHA {
         let sentence = format!(
             "Cannot tell: the measured surface is not stationary (the standard deviation of its blocks differs by a factor of {}), so its scatter \
-             is unknown. Side by side: {}.",
+             is unknown. The values are: {}.",
             set::significant(fit.block_sigma_max_over_min, 3),
             listed(compared.iter())
         );
@@ -80,11 +80,11 @@ fn judged(compared: &[Compared]) -> (Answer, String) {
     } else if open().next().is_none() {
         (Answer::Yes, format!("Yes: {}.", listed(compared.iter())))
     } else {
-        (Answer::CannotTell, format!("Cannot tell, the area is too small: {}.", listed(open())))
+        (Answer::CannotTell, format!("Cannot tell, because the area is too small: {}.", listed(open())))
     }
 }
 
-/// Figures with both values; of the increments the lag where they differ most.
+/// Quantities with both values; of the increments, only the lag with the largest difference.
 fn listed<'a>(all: impl Iterator<Item = &'a Compared>) -> String {
     let mut shown: Vec<&Compared> = Vec::new();
     for one in all {
@@ -99,16 +99,16 @@ fn listed<'a>(all: impl Iterator<Item = &'a Compared>) -> String {
     shown.iter().map(words).collect::<Vec<_>>().join("; ")
 }
 
-/// What the sentence rests on.
+/// How the verdict is reached.
 pub fn method() -> String {
     let ends = [-RATIO_MARGIN, RATIO_MARGIN].map(|end| set::fixed(libm::exp(end), 2)).join(" to ");
     format!(
         "The residual of the DEM is compared with that of the texture after the same detrending and trimming. RMS height, RMS slope and \
          increments up to {} of the window match within a ratio of {ends}, skewness within {}, kurtosis within {}. Their scatter over an area of \
-         this size follows from the covariance, as for a stationary normal field (Lomnicki, 1961). A wrong yes has a probability of at most {}, \
-         and so has a wrong no over all figures. The texture was made with the covariance of the fit, so RMS height and increments tell \
-         whether the synthesis is right; skewness and kurtosis tell whether a normal field can stand for the surface. `sastrugi compare DEM --split-half` \
-         judges a texture on ground that was not fitted.",
+         this size follows from the covariance, as for a stationary normal field (Lomnicki, 1961). The probability of a wrong yes is at most {}, \
+         and so is that of a wrong no over all quantities together. The texture was synthesised with the covariance of the fit, so RMS height and \
+         increments show whether the synthesis is correct; skewness and kurtosis show whether a normal field can represent the surface. \
+         `sastrugi compare DEM --split-half` judges a texture on ground that was not used in the fit.",
         set::plain(LAG_MAX, 2),
         set::plain(SKEWNESS_MARGIN, 2),
         set::plain(KURTOSIS_MARGIN, 2),
@@ -116,7 +116,7 @@ pub fn method() -> String {
     )
 }
 
-/// How the names of increments begin.
+/// Prefix of the names of increments.
 const INCREMENT: &str = "RMS increment";
 
 fn compared(data: &Data, texture: &TerrainRow, fit: &FitRow) -> Option<Vec<Compared>> {
@@ -145,7 +145,7 @@ fn compared(data: &Data, texture: &TerrainRow, fit: &FitRow) -> Option<Vec<Compa
         shape("skewness", surfaces.map(|s| s.ssk), of_skewness, SKEWNESS_MARGIN),
         shape("kurtosis", surfaces.map(|s| s.sku), of_kurtosis, KURTOSIS_MARGIN),
     ];
-    // Slopes are those between neighbouring cells: of other cells they are others.
+    // Slopes are those between neighbouring cells, so they depend on the cell size.
     let cells = surfaces.map(|s| [s.cell_x_m, s.cell_y_m]);
     if [0, 1].into_iter().all(|axis| (cells[0][axis] / cells[1][axis] - 1.0).abs() < SAME) {
         all.push(ratio("RMS slope".to_owned(), surfaces.map(|s| s.sdq), ""));
@@ -160,7 +160,7 @@ fn compared(data: &Data, texture: &TerrainRow, fit: &FitRow) -> Option<Vec<Compa
     all.iter().all(|c| c.difference.is_finite() && c.scatter.is_finite()).then_some(all)
 }
 
-/// Relative difference below which lengths are the same.
+/// Relative difference below which lengths count as equal.
 const SAME: f64 = 1e-6;
 
 /// Ground with data, m².
@@ -168,8 +168,8 @@ fn area_m2(surface: &SurfaceRow) -> f64 {
     surface.cells as f64 * surface.cell_x_m * surface.cell_y_m
 }
 
-/// Integral of a power of the correlation over the plane, m², by trapezoids along lags: the mean over sectors of azimuth where the fit has
-/// them, since rings smooth an axis away, else over rings. What lies beyond the last bin is uncorrelated.
+/// Integral of a power of the correlation over the plane, m², by the trapezoidal rule along lags: the mean over sectors of azimuth if the fit
+/// has them, since rings average anisotropy away, otherwise over rings. Beyond the last bin, the correlation is taken as zero.
 fn correlated_m2(bins: &[&CovarianceRow], power: i32) -> f64 {
     let rings = || bins.iter().filter(|r| r.azimuth_deg.is_none());
     let variance_m2 = rings().find(|r| r.lag_m == 0.0).map_or(f64::NAN, |r| r.covariance_m2);
@@ -188,7 +188,7 @@ fn correlated_m2(bins: &[&CovarianceRow], power: i32) -> f64 {
         true => vec![along(&rings().map(|r| (r.lag_m, r.covariance_m2)).collect::<Vec<_>>())],
         false => sectors.values().map(|curve| along(curve)).collect(),
     };
-    // Odd powers of a correlation that swings below zero may have any sign.
+    // Odd powers of a correlation that becomes negative may have any sign.
     sums::mean(&integrals).abs()
 }
 
@@ -219,8 +219,8 @@ mod tests {
         }
     }
 
-    /// Of exp(-h / b), the integral of the k-th power is 2 pi (b / k)²; of an axis twice as long as the other, half of that in the mean
-    /// over sectors where rings would smooth it.
+    /// For exp(-h / b), the integral of the k-th power is 2 pi (b / k)². For two sectors with ranges of 1 and 2 m, it is the mean of both,
+    /// which rings would average away.
     #[test]
     fn val_integrals_of_an_exponential_correlation() {
         let lags = || (0..4000).map(|k| 0.01 * f64::from(k));
@@ -250,7 +250,7 @@ mod tests {
     }
 
     #[test]
-    fn val_three_answers() {
+    fn val_answers_follow_from_margin_and_scatter() {
         let answer = |difference: f64, scatter: f64| {
             judged(&[figure("RMS height", difference, scatter), figure("kurtosis", 0.0, 0.001)])
         };

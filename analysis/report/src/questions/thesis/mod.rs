@@ -1,4 +1,4 @@
-//! Printed routes and formations of Bayrak (2008) beside ours, as ratios.
+//! Published routes and formations of Bayrak (2008) compared with ours, as ratios.
 
 use super::Question;
 use super::missions::boxes::capital;
@@ -22,12 +22,12 @@ pub const QUESTION: Question = Question {
     answer,
 };
 
-/// Fewest values of ours for a verdict: the next one falls between the smallest and the largest of six with a probability of 5/7.
+/// Fewest values of ours for a verdict: the next value falls between the smallest and the largest of six with a probability of 5/7.
 const VALUES_MIN: usize = 6;
-/// Members of the thesis' teams.
+/// Members of the teams in the thesis.
 const MEMBERS: i64 = 4;
 
-/// What is compared.
+/// A quantity that is compared.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct Quantity {
     id: &'static str,
@@ -35,12 +35,12 @@ struct Quantity {
     unit: &'static str,
 }
 
-const SHARE: Quantity = Quantity { id: "share", name: "vertices over cells", unit: "%" };
-const SEARCHED: Quantity = Quantity { id: "searched", name: "A* cost over the grid's", unit: "1" };
-const SMOOTHED: Quantity = Quantity { id: "smoothed", name: "smoothed cost over the grid's", unit: "1" };
-const GAIN: Quantity = Quantity { id: "gain", name: "smoothed cost over A* cost", unit: "1" };
-const DEPTH: Quantity = Quantity { id: "depth", name: "depth error over spacing", unit: "%" };
-const WIDTH: Quantity = Quantity { id: "width", name: "width error over spacing", unit: "%" };
+const SHARE: Quantity = Quantity { id: "share", name: "vertices relative to cells", unit: "%" };
+const SEARCHED: Quantity = Quantity { id: "searched", name: "A* cost relative to the grid", unit: "1" };
+const SMOOTHED: Quantity = Quantity { id: "smoothed", name: "smoothed cost relative to the grid", unit: "1" };
+const GAIN: Quantity = Quantity { id: "gain", name: "smoothed cost relative to A* cost", unit: "1" };
+const DEPTH: Quantity = Quantity { id: "depth", name: "depth error relative to spacing", unit: "%" };
+const WIDTH: Quantity = Quantity { id: "width", name: "width error relative to spacing", unit: "%" };
 
 impl Quantity {
     fn of_teams(self) -> bool {
@@ -48,7 +48,7 @@ impl Quantity {
     }
 }
 
-/// A printed figure and ours.
+/// A published value and ours.
 struct Row {
     quantity: Quantity,
     group: String,
@@ -69,7 +69,7 @@ impl Row {
         self.ours.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), v| (l.min(v.1), h.max(v.1)))
     }
 
-    /// Whether the printed figure lies between our smallest and largest; `None` for too few.
+    /// Whether the published value lies between our smallest and largest value; `None` if we have too few.
     fn inside(&self) -> Option<bool> {
         let (low, high) = self.ends();
         (self.ours.len() >= VALUES_MIN).then_some(low <= self.paper && self.paper <= high)
@@ -94,24 +94,27 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
 fn verdict(rows: &[Row]) -> Option<String> {
     let known: Vec<bool> = rows.iter().filter_map(Row::inside).collect();
     let inside = known.iter().filter(|i| **i).count();
+    let open = match rows.len() - known.len() {
+        0 => String::new(),
+        n => format!("; for {} more, we have too few values for a verdict", set::count(n)),
+    };
     (!known.is_empty()).then(|| {
         format!(
-            "{} of {} printed ratios lie between our smallest and largest, {} outside; {} more have too few of ours for a verdict.",
-            set::count(inside),
+            "{} of {} published ratios lie{} between our smallest and largest value{open}.",
+            if inside == 0 { "None".into() } else { set::count(inside) },
             set::count(known.len()),
-            set::count(known.len() - inside),
-            set::count(rows.len() - known.len())
+            if inside < 2 { "s" } else { "" }
         )
     })
 }
 
 fn introduction(thesis: &Thesis) -> String {
     format!(
-        "{} ({}, {}) tested one map of each kind and size, and one pair of opposite corners with a margin that the thesis does not state, so costs \
-         compare as ratios only. Heights and number of the hills are not printed either: our maps share the kind and the size. The band is our smallest to \
-         largest value over pairs and terrains: of n exchangeable values the next falls inside with a probability of (n − 1)/(n + 1), and below {} values \
-         there is no verdict. Means are geometric. Our A* costs are scored again along quarter cells. Errors of formations compare with the \
-         teams on the 2000 × 2000 map of the same kind, means over followers.",
+        "{} ({}, {}) tested one map of each kind and size, with one pair of opposite corners whose margin the thesis does not state, so costs can only be \
+         compared as ratios. Heights and number of hills are not printed either; our maps share only the kind and the size. The band spans our smallest to \
+         largest value over pairs and terrains: of n exchangeable values, the next falls inside with a probability of (n − 1)/(n + 1); below {} values there \
+         is no verdict. Means are geometric. Our A* costs are evaluated again in steps of a quarter cell. Errors of formations are compared with the teams on \
+         the 2000 × 2000 map of the same kind, as means over followers.",
         thesis.author,
         thesis.year,
         thesis.title,
@@ -155,7 +158,7 @@ fn route_rows(data: &Data, thesis: &Thesis) -> Vec<Row> {
     rows
 }
 
-/// Costs over those of the grid between the same ends.
+/// Costs relative to those of the grid between the same ends.
 fn over_grid(routes: &[&RouteRow], own: &[&RouteRow], of: fn(&RouteRow) -> f64) -> Vec<(String, f64)> {
     let key = |r: &RouteRow| (r.terrain_id.clone(), r.pair_id.clone());
     let grid: BTreeMap<_, f64> =
@@ -173,10 +176,10 @@ fn method_name(method: &str) -> &str {
     }
 }
 
-/// A figure of a run.
+/// A metric of a run.
 type Metric = fn(&FormationRow) -> f64;
 
-/// Teams of four without losses on maps of a kind of the thesis.
+/// Teams of four without losses on maps of a kind that the thesis has.
 fn formation_rows(data: &Data, thesis: &Thesis) -> Vec<Row> {
     let mut groups: BTreeMap<(Natural, &str), Vec<&FormationRow>> = BTreeMap::new();
     let alike =
@@ -202,7 +205,7 @@ fn formation_rows(data: &Data, thesis: &Thesis) -> Vec<Row> {
     rows
 }
 
-/// Ours as a band with its mean, the printed figure as a diamond, a lane for each method or formation.
+/// Our values as a band with its mean and the published value as a diamond, with a lane for each method or formation.
 fn figure(rows: &[Row], quantity: Quantity) -> Option<Figure> {
     let rows: Vec<&Row> = rows.iter().filter(|r| r.quantity == quantity).collect();
     let values = || rows.iter().flat_map(|r| [r.paper, r.ends().0, r.ends().1]);
@@ -220,7 +223,7 @@ fn figure(rows: &[Row], quantity: Quantity) -> Option<Figure> {
     let line = |i: usize| Stroke::new(Paint::Series(i), 3.0);
     let mut entries: Vec<Entry> =
         names.iter().enumerate().map(|(i, n)| (Mark::Line(line(i)), (*n).to_owned())).collect();
-    entries.push((Mark::Symbol(Symbol::Diamond, Paint::Ink), "printed".into()));
+    entries.push((Mark::Symbol(Symbol::Diamond, Paint::Ink), "published".into()));
     let height = 15.0 * names.len() as f64 + 16.0;
     let unit = if quantity.unit == "1" { String::new() } else { format!(", {}", quantity.unit) };
     let title = format!("{}{unit}", quantity.name);
@@ -237,8 +240,9 @@ fn figure(rows: &[Row], quantity: Quantity) -> Option<Figure> {
     }
     Some(Figure {
         id: slug(&format!("bayrak-{}", quantity.id)),
-        title: format!("{}: printed and ours.", capital(quantity.name)),
-        caption: "Lines span our smallest to largest value, ticks are geometric means, diamonds the printed figures. n counts ours.".into(),
+        title: format!("{}: published and ours.", capital(quantity.name)),
+        caption: "Lines span our smallest to largest value; ticks are geometric means; diamonds are the published values. n is the number of our values."
+            .into(),
         description: describe(&rows, &title),
         svg: drawn.svg,
         numbers: numbers(&rows),
@@ -262,16 +266,16 @@ fn draw(drawn: &mut Rows, y: f64, row: &Row, stroke: Stroke) {
 
 fn describe(rows: &[&Row], title: &str) -> String {
     let row = |r: &&Row| {
-        format!("{} {}: printed {}, ours {}", r.group, r.of, set::plain(r.paper, 3), set::plain(r.mean(), 3))
+        format!("{} {}: published {}, ours {}", r.group, r.of, set::plain(r.paper, 3), set::plain(r.mean(), 3))
     };
     format!("{title}. {}.", rows.iter().map(row).collect::<Vec<_>>().join("; "))
 }
 
-/// A table of the routes and one of the formations, as far as there are rows.
+/// A table of the routes and one of the formations, where there are rows.
 fn tables(rows: &[Row]) -> Vec<Block> {
     let (teams, routes): (Vec<&Row>, Vec<&Row>) = rows.iter().partition(|r| r.quantity.of_teams());
     let table = |id: &str, what: &str, rows: Vec<&Row>| {
-        let caption = format!("{what} of Bayrak (2008) and ours");
+        let caption = format!("{what}: Bayrak (2008) and this release");
         Block::Table(TableBlock { id: id.into(), caption, numbers: numbers(&rows) })
     };
     let tables = [("bayrak-routes", "Routes", routes), ("bayrak-formations", "Formations", teams)];
@@ -283,14 +287,14 @@ fn numbers(rows: &[&Row]) -> Numbers {
         ("ratio", ""),
         ("unit", ""),
         ("group", ""),
-        ("of", ""),
-        ("printed", ""),
+        ("method or formation", ""),
+        ("published", ""),
         ("ours", ""),
         ("smallest", ""),
         ("largest", ""),
         ("values", ""),
         ("terrains", ""),
-        ("printed is", ""),
+        ("published is", ""),
         ("printed in", ""),
     ];
     let query = if rows.iter().any(|r| r.quantity.of_teams()) {

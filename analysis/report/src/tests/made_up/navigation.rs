@@ -1,4 +1,4 @@
-//! Routes and teams on the terrains of the release that was never made.
+//! Routes and teams on the terrains of the synthetic release.
 
 use super::{Shelf, stream};
 use crate::data::Data;
@@ -13,7 +13,7 @@ const SAMPLES: i64 = 80;
 /// Distance between slots, m.
 const SPACING_M: f64 = 2.0;
 
-/// Two pairs and three methods on every generated terrain, a pair that has no path, and three teams: one of them loses a member.
+/// Two pairs and three methods on every generated terrain, a pair without a path, and three teams, one of which loses a member.
 pub fn add(data: &mut Data, shelf: &mut Shelf) {
     let plain = |t: &&TerrainRow| t.stage == "terrain" && t.variant.is_none();
     let terrains: Vec<TerrainRow> = data.terrains.iter().filter(plain).cloned().collect();
@@ -102,7 +102,7 @@ fn route(
     }
 }
 
-/// Four members; the line of run 2 loses its third at 30 s, whose fourth swings back within eight seconds.
+/// Four members; the line of run 2 loses its third member at 30 s, and the fourth swings back within eight seconds.
 fn team(data: &mut Data, shelf: &mut Shelf, terrain: &TerrainRow, formation: &str, run: i64) {
     let run_id = format!("team-0001-{run:02}");
     let loses = formation == "line";

@@ -1,4 +1,4 @@
-//! Rovers on the terrains of the release that was never made.
+//! Rovers on the terrains of the synthetic release.
 
 use super::Shelf;
 use crate::data::Data;
@@ -57,7 +57,7 @@ pub fn add(data: &mut Data, shelf: &mut Shelf) {
     }
 }
 
-/// An effect of that size on efficiency, opposite on distance.
+/// An effect of a given size on efficiency, and of the opposite sign on distance.
 pub fn effect(rank: i64, parameter: &str, measure: &str, mu: f64) -> RoverEffectRow {
     let (unit, factor) = if measure == "distance_m" { ("m", -200.0) } else { ("1", 1.0) };
     RoverEffectRow {
@@ -98,12 +98,12 @@ fn place(terrain: &TerrainRow) -> (f64, f64) {
     (group, number)
 }
 
-/// Distance driven over the straight one.
+/// Distance driven over the straight distance.
 pub fn factor(group: f64, world: f64, rover: f64) -> f64 {
     1.1 + 0.4 * group + 0.1 * world + 0.05 * rover
 }
 
-/// A rover on a circle of `of`: every fifth of the last group drives to its limit, and for the first of these there is no way.
+/// A rover on a circle of `of`: every fifth of the last group drives to its limit, and the first of these has no path.
 fn rover(terrain: &TerrainRow, stage: &str, of: usize, number: usize) -> RoverRow {
     let (group, world) = place(terrain);
     let stopped = group == 2.0 && number % 5 == 4;
@@ -153,7 +153,7 @@ fn rover(terrain: &TerrainRow, stage: &str, of: usize, number: usize) -> RoverRo
     }
 }
 
-/// A bent way to where the rover ended.
+/// A curved path to where the rover ended.
 fn samples(shelf: &mut Shelf, rover: &RoverRow) {
     let reach = 1.0 - rover.residual_m / rover.straight_m;
     let (dx, dy) = (rover.goal_x_m - rover.start_x_m, rover.goal_y_m - rover.start_y_m);

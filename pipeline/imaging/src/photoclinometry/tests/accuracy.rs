@@ -1,4 +1,4 @@
-//! What comes back from images of a known world.
+//! Accuracy of surfaces recovered from images of a known world.
 
 use super::scene::{Scene, height_rms, noisy, rms, slope_rms};
 use crate::camera::{Camera, PinholeCamera};
@@ -30,7 +30,7 @@ pub fn recovered(images: &[Image], scene: &Scene, settings: &Settings) -> Recove
 /// Acceptance: three suns at zenith distance 45 deg, no noise, 64 x 64 cells of 2 m, truth on facets four times finer. Bounds: slopes and albedo
 /// 1e-3, heights 0.2 cells (rms).
 #[test]
-fn val_images_without_noise_give_the_surface_back() {
+fn val_images_without_noise_recover_the_surface() {
     let scene = Scene::hills(64, 2.0);
     let truth = scene.truth();
     let found = recovered(&scene.nadir_images(&THREE, 45.0), &scene, &quick());
@@ -47,8 +47,8 @@ fn val_images_without_noise_give_the_surface_back() {
 }
 
 /// Acceptance: 1 % noise, the same suns: slopes within 0.03 (rms), and the table of other suns (section 11 of the specification: 0.016, 0.060, 0.50,
-/// 0.047). 4096 cells: rms values scatter by 1 to 2 % of themselves, so that the bands below (25 %; for the third, where the equations
-/// hardly determine the slopes and the law is curved, a factor of 2) are ten standard errors wide: false alarm below 1e-6.
+/// 0.047). With 4096 cells, rms values have a relative scatter of 1 to 2 %, so the bands below (25 %; a factor of 2 for the third, where the equations
+/// hardly determine the slopes and the photometric function is curved) are ten standard errors wide: false alarm below 1e-6.
 #[test]
 fn stat_noise_of_one_percent_by_sun() {
     let scene = Scene::hills(64, 2.0);
@@ -86,8 +86,8 @@ fn stat_noise_of_one_percent_by_sun() {
 
 /// Null: errors of slopes, albedo and heights are normal with the standard deviations given. 48 x 48 cells, 1 % noise, three suns; slopes and
 /// albedo of inner cells (40 x 40, independent: standard error of a share near 68 % is 1.2 points, of one near 95 % 0.5); heights over 40 worlds
-/// of noise, whose errors are correlated within a world: about 20 independent values a world, standard error 1.7 and 0.8 points. Bands of 5 points:
-/// false alarm below 0.3 % for heights if 20 were 8; they would catch standard deviations wrong by 12 %.
+/// of noise, whose errors are correlated within a world: about 20 independent values per world, standard error 1.7 and 0.8 points. Bands of 5 points:
+/// false alarm below 0.3 % for heights even with 8 instead of 20; they would detect standard deviations wrong by 12 %.
 fn covered(worlds: u64, samples: usize) {
     let scene = Scene::hills(48, 1.0);
     let truth = scene.truth();
@@ -133,7 +133,7 @@ fn stat_uncertainties_cover_the_errors_of_many_worlds() {
     covered(200, 64);
 }
 
-/// Four images with twice the noise that was assumed: 3 600 inner degrees of freedom tell the scale within 1.2 % (standard error); band
+/// Four images with twice the assumed noise: 3 600 inner degrees of freedom determine the scale within 1.2 % (standard error); band
 /// +-7 %, false alarm below 1e-6.
 #[test]
 fn stat_noise_is_estimated_from_residuals() {
@@ -148,15 +148,15 @@ fn stat_noise_is_estimated_from_residuals() {
     assert!((ratio - found.noise_scale * found.noise_scale).abs() < 1e-9);
 }
 
-/// Oblique cameras see a hill displaced: one round from level ground is wrong, re-projection puts it right.
+/// Oblique cameras see a hill displaced: one round from level ground is wrong, and re-projection corrects it.
 #[test]
-fn val_reprojection_brings_oblique_images_together() {
+fn val_reprojection_registers_oblique_images() {
     let scene = Scene::hills(64, 1.0);
     let truth = scene.truth();
     let views = [[0.0, 90.0], [90.0, 65.0], [200.0, 70.0], [310.0, 65.0]];
     let suns = [[10.0, 45.0], [100.0, 45.0], [190.0, 50.0], [280.0, 45.0]];
     let images: Vec<Image> = views.iter().zip(suns).map(|(v, s)| scene.image(scene.camera(*v), s)).collect();
-    // Borders leave the images: cells of the inner 48 x 48.
+    // The borders leave the images, so compare the inner 48 x 48 cells.
     let inner = |values: &[f64]| -> Vec<f64> {
         (0..64 * 64).filter(|k| [k / 64, k % 64].iter().all(|v| (8..56).contains(v))).map(|k| values[k]).collect()
     };
@@ -174,10 +174,10 @@ fn val_reprojection_brings_oblique_images_together() {
     assert!(rounds.windows(2).all(|w| w[1].change_m < 0.2 * w[0].change_m), "{rounds:?}");
 }
 
-/// Pinholes 150 m above the ground, each beside its middle: views differ from cell to cell, and heights come back as from parallel cameras. (Pixels of
-/// 0.75 m, read between their centres, blur cells of 1 m: slopes to 0.01, heights to 0.05 cells.)
+/// Pinholes 150 m above the ground, each off its centre: views differ from cell to cell, and heights are recovered as from parallel cameras. (Pixels
+/// of 0.75 m, interpolated between their centres, blur cells of 1 m: slopes to 0.01, heights to 0.05 cells.)
 #[test]
-fn val_pinhole_images_give_the_surface_back() {
+fn val_pinhole_images_recover_the_surface() {
     let scene = Scene::hills(48, 1.0);
     let truth = scene.truth();
     let places = [[24.0, 24.0], [70.0, 30.0], [-10.0, 50.0], [20.0, -30.0]];
@@ -194,9 +194,9 @@ fn val_pinhole_images_give_the_surface_back() {
     assert!(found.converged && slopes < 0.01 && heights < 0.05);
 }
 
-/// Slopes of one surface with known albedo: two unknowns, three images; the noise of slopes falls below that with free albedo.
+/// With known albedo there are two unknowns and three images: the noise of slopes is lower than with free albedo.
 #[test]
-fn val_known_albedo_steadies_slopes() {
+fn val_known_albedo_reduces_slope_noise() {
     let scene = Scene { albedo: Box::new(|_, _| 0.25), ..Scene::hills(48, 1.0) };
     let truth = scene.truth();
     let images = noisy(&scene.nadir_images(&[0.0, 45.0, 90.0], 45.0), 0.01, 3);
@@ -208,7 +208,7 @@ fn val_known_albedo_steadies_slopes() {
     assert!(found.albedo.values.iter().all(|a| *a == 0.25));
 }
 
-/// Every thread count gives the same bits.
+/// Any number of threads gives the same bits.
 #[test]
 fn prop_threads_change_no_bit() {
     let scene = Scene::hills(40, 1.0);
@@ -223,8 +223,8 @@ fn prop_threads_change_no_bit() {
     assert!(run(1) == run(3));
 }
 
-/// A window of the map gives the slopes and albedo of the whole bit for bit (a nadir camera needs no heights), and its heights, less the mean
-/// difference, within 0.02 cells away from a margin of 8 cells.
+/// A window of the map gives the slopes and albedo of the complete map bit for bit (a nadir camera needs no heights), and its heights within 0.02 cells
+/// outside a margin of 8 cells, after removing the mean difference.
 #[test]
 fn prop_tiles_with_overlap_equal_the_whole() {
     let scene = Scene::hills(64, 1.0);
@@ -243,22 +243,24 @@ fn prop_tiles_with_overlap_equal_the_whole() {
     assert!(difference < 0.02);
 }
 
-/// The figures of a surface against itself, and against one that is shifted.
+/// The evaluation of a surface against itself, and against a shifted one.
 #[test]
-fn val_evaluation_knows_good_from_bad() {
+fn val_evaluation_distinguishes_good_from_bad() {
     let scene = Scene::hills(64, 1.0);
     let truth = scene.truth().heights;
     let (light, view) = (direction(40.0, 35.0), [0.0, 0.0, 1.0]);
     let of = |recovered: &Grid| evaluation::evaluate(&truth, recovered, &Photometry::default(), light, view).unwrap();
     let same = of(&truth);
     assert!((same.shaded_correlation - 1.0).abs() < 1e-12 && same.slope_error_rms < 1e-12);
-    assert!((same.shaded_correlation_ceiling - 1.0).abs() < 1e-12);
-    // A tilt and a shift in height: heights are off, slopes by the tilt alone.
+    assert!((same.shaded_correlation_ceiling - 1.0).abs() < 1e-12 && same.slope_error_rms_ceiling < 1e-12);
+    assert!(same.cells == 4096 && same.height_error_rms_m < 1e-12);
+    assert!((same.height_rms_m - sastrugi_numeric::sums::variance(&truth.values).sqrt()).abs() < 1e-12);
+    // A tilt and a shift in height: heights are off by both, slopes only by the tilt.
     let tilted = Grid::new(truth.geometry, (0..4096).map(|k| truth.values[k] + 5.0 + 0.02 * (k % 64) as f64).collect());
     let tilted = of(&tilted);
     assert!((tilted.slope_error_rms - 0.02).abs() < 1e-9 && tilted.height_error_rms_detrended_m < 1e-9);
     assert!((tilted.height_error_rms_m - 0.02 * ((64.0f64 * 64.0 - 1.0) / 12.0).sqrt()).abs() < 1e-9);
-    // Four cells to the side: shading does not correlate as it did.
+    // Shifted sideways by four cells: the shading correlates less.
     let moved = Grid::new(truth.geometry, (0..4096).map(|k| truth.values[k / 64 * 64 + (k + 4) % 64]).collect());
     let moved = of(&moved);
     assert!(moved.shaded_correlation < 0.8, "{moved:?}");
@@ -276,7 +278,7 @@ fn val_evaluation_knows_good_from_bad() {
 }
 
 /// By wavelength: a copy is coherent in every band, noise of the same strength in none (rms over 40 or more modes: squared coherence below 0.5
-/// unless by a chance of 1e-6), half the truth has half the rms and coherence 1; variances of all bands add up to that of the windowed field.
+/// except with a probability of 1e-6), half the truth has half the rms and coherence 1; variances of all bands add up to that of the windowed field.
 #[test]
 fn val_bands_split_the_variance() {
     let scene = Scene::hills(64, 1.0);
@@ -284,13 +286,22 @@ fn val_bands_split_the_variance() {
     let noise =
         |stream: &mut sastrugi_numeric::Stream| Grid::new(scene.map, (0..4096).map(|_| stream.normal()).collect());
     let (a, b) = (noise(&mut stream), noise(&mut stream));
-    for band in evaluation::bands(&a, &a) {
+    // Five octaves, from two cells to the side of the map.
+    let same = evaluation::bands(&a, &a);
+    let limits: Vec<[f64; 2]> = same.iter().map(|b| [b.wavelength_min_m, b.wavelength_max_m]).collect();
+    assert_eq!(limits, [[2.0, 4.0], [4.0, 8.0], [8.0, 16.0], [16.0, 32.0], [32.0, 64.0]]);
+    for band in same {
         assert!((band.coherence - 1.0).abs() < 1e-12 && (band.truth_rms_m - band.recovered_rms_m).abs() < 1e-15);
     }
-    for band in evaluation::bands(&a, &b).iter().filter(|b| b.modes >= 40) {
+    let other = evaluation::bands(&a, &b);
+    let many: Vec<_> = other.iter().filter(|b| b.modes >= 40).collect();
+    assert_eq!(many.len(), 3, "{other:?}");
+    for band in many {
         assert!(band.coherence < 0.5, "{band:?}");
     }
-    for band in evaluation::bands(&a, &a.map(|v| 0.5 * v)) {
+    let halved = evaluation::bands(&a, &a.map(|v| 0.5 * v));
+    assert_eq!(halved.len(), 5);
+    for band in halved {
         assert!((band.recovered_rms_m / band.truth_rms_m - 0.5).abs() < 1e-12 && (band.coherence - 1.0).abs() < 1e-12);
     }
     // White noise: the variance outside the band beyond two cells' wavelength (corner modes) is 1 - pi/4.
@@ -300,8 +311,8 @@ fn val_bands_split_the_variance() {
 
 /// A sine of 18 by 14 waves on 64 x 48 cells, against half of it on a plane. Its modes under a Hann window have 2/3 of the variance on the wave number
 /// itself and 1/6 one higher and one lower along each axis, so that the mean square of a wave number `k` is `k^2 + 1/3`: rms slope
-/// `A / sqrt(2) * 2 pi sqrt((18^2 + 1/3) / 64^2 + (14^2 + 1/3) / 48^2)` a metre, all of it in the first octave. Even about the middle, the sine
-/// has no plane of its own.
+/// `A / sqrt(2) * 2 pi sqrt((18^2 + 1/3) / 64^2 + (14^2 + 1/3) / 48^2)` per metre, all of it in the first octave. Since it is even about the middle,
+/// the sine has no mean plane.
 #[test]
 fn val_the_slope_of_a_sine_is_in_its_band() {
     use std::f64::consts::PI;

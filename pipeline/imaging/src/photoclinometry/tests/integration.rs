@@ -1,4 +1,4 @@
-//! Slopes to heights.
+//! Integration of slopes to heights.
 
 use super::accuracy::streams;
 use super::scene::{Scene, height_rms};
@@ -6,7 +6,7 @@ use crate::photoclinometry::integration::{Constraint, HeightPoint, Stop, System}
 use crate::photoclinometry::paths::integrate_along_paths;
 use sastrugi_numeric::{Geometry, Grid, sums};
 
-/// Heights from the dense normal equations: the sum of the header, term by term, solved by elimination with one height held.
+/// Heights from the dense normal equations: the sum in the module header, term by term, solved by elimination with one height held.
 fn dense(g: &Geometry, information: &[[f64; 3]], slopes: &[[f64; 2]], constraints: &[Constraint]) -> Vec<f64> {
     let n = g.len();
     let mut matrix = vec![vec![0.0; n + 1]; n];
@@ -86,7 +86,7 @@ fn val_heights_are_those_of_the_dense_equations() {
     ];
     for constraints in [vec![], points.iter().map(|p| Constraint::point(&g, p).unwrap()).collect()] {
         let system = System::new(g, &information, constraints.clone());
-        // With a hole every 11 cells and no line of four good cells left out of the correction, compare without correction.
+        // The dense equations have no slope correction: compare without it, with a hole every 11 cells.
         let plain = system.uncorrected(&slopes, &system.constraint_heights());
         let solved = system.solve(&plain, None, Stop::FINE);
         let expected = dense(&g, system.weights(), &slopes, &constraints);
@@ -117,8 +117,8 @@ fn means(scene: &Scene) -> (Vec<[f64; 2]>, Vec<f64>) {
     (0..g.len()).map(cell).unzip()
 }
 
-/// Halving the cells of one landscape lowers the error of heights by 2^3 or more where slopes are moved to edges (fourth order, third at borders), by
-/// 2^2 where they are not.
+/// Halving the cells of one landscape reduces the error of heights by 2^3 or more if slopes are interpolated to edges (fourth order, third at borders),
+/// and by 2^2 if they are not.
 #[test]
 fn conv_heights_are_of_high_order() {
     let error = |side: usize, corrected: bool| {
@@ -135,9 +135,9 @@ fn conv_heights_are_of_high_order() {
     assert!(order(corrected) > 2.7 && corrected[0] < 0.1 * plain[0], "{corrected:?}");
 }
 
-/// A checkerboard of heights has no central differences, but a sum far from 0 here: it is neither kept nor made.
+/// A checkerboard of heights has zero central differences, but its sum here is far from 0: the solver neither preserves nor creates it.
 #[test]
-fn val_checkerboards_are_seen() {
+fn val_checkerboards_are_penalised() {
     let scene = Scene::hills(32, 1.0);
     let (system, slopes, truth) = exact(&scene);
     let board: Vec<f64> = (0..32 * 32).map(|k| if (k / 32 + k % 32) % 2 == 0 { 1.0 } else { -1.0 }).collect();
@@ -151,7 +151,7 @@ fn val_checkerboards_are_seen() {
     assert!(left.abs() < 1e-3, "{left}");
 }
 
-/// Noise of slopes of 0.02: least squares carries less of it into heights than 450 published paths, and these less than 8.
+/// Slope noise of 0.02: least squares propagates less of it to heights than 450 published paths, and these less than 8.
 #[test]
 fn val_least_squares_beats_paths_and_many_paths_few() {
     let scene = Scene::hills(64, 1.0);
@@ -170,7 +170,7 @@ fn val_least_squares_beats_paths_and_many_paths_few() {
     assert!(poisson < paths[3] && paths[3] < 0.9 * paths[1] && paths[1] < paths[0]);
 }
 
-/// Paths go around a hole where they can, and leave what they cannot reach.
+/// Paths go around a hole where they can; cells that they cannot reach have no height.
 #[test]
 fn val_paths_go_around_holes() {
     let scene = Scene::hills(33, 1.0);
@@ -184,7 +184,7 @@ fn val_paths_go_around_holes() {
     assert!(height_rms(&heights, &truth) < 0.1);
 }
 
-/// A hole is bridged: the heights on both sides of a band without slopes keep their ends, and cells around it are right.
+/// A hole is bridged: the heights on both sides of a band without slopes are right, and so are the cells around it.
 #[test]
 fn val_holes_and_masks_leave_the_rest_right() {
     let scene = Scene::hills(48, 1.0);
@@ -204,9 +204,9 @@ fn val_holes_and_masks_leave_the_rest_right() {
     assert!(error < 0.05 && solved.residual <= 1e-10);
 }
 
-/// A coarse DEM holds a tilt that slopes have wrong, and leaves the detail.
+/// A coarse DEM corrects a tilt that is wrong in the slopes, and preserves the detail.
 #[test]
-fn val_a_coarse_dem_holds_long_wavelengths() {
+fn val_a_coarse_dem_controls_long_wavelengths() {
     let scene = Scene::hills(64, 1.0);
     let truth = scene.truth();
     let coarse: Grid = sastrugi_numeric::resample::block_means(&truth.heights, 16);

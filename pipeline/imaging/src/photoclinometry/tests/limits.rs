@@ -1,4 +1,4 @@
-//! What is refused, left out, marked, or found on the way.
+//! Refused input, ignored pixels, marked cells, and estimated calibrations.
 
 use super::accuracy::{THREE, level, quick, recovered, streams};
 use super::scene::{Scene, height_rms, noisy, slope_rms};
@@ -24,7 +24,7 @@ fn val_refusals_say_what_is_wrong() {
     assert!(of(&coplanar).starts_with("the suns lie in one plane"));
     let mut short = images.clone();
     short[1].brightness.pop();
-    assert_eq!(of(&short), "image 2 has 255 pixels, its camera 256");
+    assert_eq!(of(&short), "image 2 has 255 pixels, its camera 256; they must be equal");
     let mut infinite = images.clone();
     infinite[2].brightness[7] = f64::INFINITY;
     assert_eq!(of(&infinite), "brightness of image 3 is not finite");
@@ -53,8 +53,8 @@ fn val_refusals_say_what_is_wrong() {
     }
 }
 
-/// Pixels in shadow (cast here by hand) leave two images: the cells are marked, have the albedo of their neighbours within its spread, larger
-/// uncertainty, and a slope that two images tell; all other cells are as before, bit for bit.
+/// Pixels in shadow (set by hand here) leave two images: the cells are marked, have the albedo of their neighbours within its spread, larger
+/// uncertainty, and slopes determined by two images; all other cells are unchanged, bit for bit.
 #[test]
 fn val_shadows_leave_a_marked_cell_with_a_stated_prior() {
     let scene = Scene::hills(48, 1.0);
@@ -82,11 +82,12 @@ fn val_shadows_leave_a_marked_cell_with_a_stated_prior() {
             assert!(found.slopes[k] == plain.slopes[k]);
         }
     }
-    assert!(found.warnings.iter().any(|w| w.starts_with("1.0 % of the cells lean")), "{:?}", found.warnings);
+    let marked = "1.0 % of the cells take their albedo from their neighbours";
+    assert!(found.warnings.iter().any(|w| w == marked), "{:?}", found.warnings);
     assert!(height_rms(&found.heights.values, &truth.heights.values) < 0.1);
 }
 
-/// Missing pixels are no data, one image that sees nothing of a cell leaves it out, and a cell that no image shows has no height.
+/// Missing pixels are no data, an image that does not see a cell is ignored there, and a cell that no image shows has no height.
 #[test]
 fn val_cells_that_no_image_shows_have_no_height() {
     let scene = Scene::hills(32, 1.0);
@@ -104,13 +105,14 @@ fn val_cells_that_no_image_shows_have_no_height() {
     assert_eq!(found.lit.values[20 * 32 + 9], 2);
 }
 
-/// Six images with exposures wrong by up to 6 %, level on the whole: found within 0.5 %, and slopes are better than with exposures held.
+/// Six images with exposures wrong by up to 6 %, of ground that is level on average: the exposures are estimated within 0.5 %, and slopes are
+/// better than with exposures held.
 #[test]
 fn val_exposures_are_found() {
     let scene = Scene { map: sastrugi_numeric::Geometry::square(64, 64, 1.0), ..Scene::hills(64, 1.0) };
     let truth = scene.truth();
     let plane = calibration::plane(&scene.map, &truth.heights.values);
-    // The start has the true mean plane: exposures cannot tell it from themselves.
+    // The start has the true mean plane, which the images cannot separate from the exposures.
     let start = Grid::new(
         scene.map,
         (0..4096).map(|k| plane[0] * scene.map.x(k % 64) + plane[1] * scene.map.y(k / 64)).collect(),
@@ -138,7 +140,7 @@ fn val_exposures_are_found() {
     assert!(worst < 5e-3 && with < 0.7 * without);
 }
 
-/// Haze of 2, 6 and 10 % of the brightness in three of six images, found beside a coarse DEM, which tells relief from haze.
+/// Haze of 2, 6 and 10 % of the brightness in three of six images is estimated with the help of a coarse DEM, which separates relief from haze.
 #[test]
 fn val_haze_is_found_where_heights_are_known_coarsely() {
     let scene = Scene::hills(64, 1.0);
@@ -162,7 +164,7 @@ fn val_haze_is_found_where_heights_are_known_coarsely() {
     assert!(worst < 0.005 && with < 0.7 * without);
 }
 
-/// Twice and half the pixels of a cell: fine pixels are averaged, with less noise; the surface comes back.
+/// Pixels of half and twice the size of a cell: fine pixels are averaged, with less noise, and the surface is recovered.
 #[test]
 fn val_cells_take_the_mean_of_their_pixels() {
     let fine = Scene::hills(64, 1.0);
@@ -178,15 +180,16 @@ fn val_cells_take_the_mean_of_their_pixels() {
     assert!((ratio - 4.0).abs() < 0.1, "four pixels have a quarter of the variance: {ratio}");
 }
 
-/// Suns at azimuths 0, 60 and 61 are not coplanar, yet hardly tell slopes from albedo: no cell is conditioned well enough, or, with the limit at the
-/// condition of the best tenth, nine tenths would take their albedo from it. Refused, unless that is allowed or the albedo is known.
+/// Suns at azimuths 0, 60 and 61 are not coplanar, yet hardly separate slopes from albedo: no cell is conditioned well enough, or, with the limit at
+/// the condition number of the best tenth, nine tenths of the cells would take their albedo from it. Refused, unless that is allowed or the albedo
+/// is known.
 #[test]
 fn val_a_surface_that_rests_on_a_few_albedos_is_refused() {
     let scene = Scene { albedo: Box::new(|_, _| 0.2), ..Scene::hills(32, 1.0) };
     let images = scene.nadir_images(&[0.0, 60.0, 61.0], 45.0);
     let run = |settings: Settings| recover(&images, &level(&scene), &Known::default(), &settings, &streams());
     let none = run(quick()).unwrap_err().to_string();
-    assert!(none.starts_with("no cell has a condition number below 300 (the least is "), "{none}");
+    assert!(none.starts_with("no cell has a condition number below 300 (the smallest is "), "{none}");
     let mut conditions = run(Settings { condition_max: 1e9, rounds: 1, ..quick() }).unwrap().condition.values;
     conditions.sort_by(f64::total_cmp);
     let few = Settings { condition_max: conditions[102], ..quick() };
@@ -198,7 +201,7 @@ fn val_a_surface_that_rests_on_a_few_albedos_is_refused() {
     let known = run(Settings { albedo: Some(0.2), ..quick() }).unwrap();
     let truth = scene.truth();
     assert!(slope_rms(&known.slopes, &truth.slopes) < 0.01, "{}", slope_rms(&known.slopes, &truth.slopes));
-    // Two of three images in shadow over six of ten columns: too dark, not badly conditioned.
+    // Two of three images in shadow over six of ten columns: too dark, not poorly conditioned.
     let mut dark = scene.nadir_images(&THREE, 45.0);
     let shaded = |k: &usize| k % 32 % 10 < 6;
     dark[1..].iter_mut().for_each(|image| (0..1024).filter(shaded).for_each(|k| image.brightness[k] = 0.0));
@@ -208,8 +211,8 @@ fn val_a_surface_that_rests_on_a_few_albedos_is_refused() {
     assert!(words.contains(&said), "{share}: {words}");
 }
 
-/// Outward paths do not come behind a hole 13 cells wide: what they do not reach has no height, in any round, and is counted in a note; the rest is
-/// right. Least squares has the heights of all cells that some image shows.
+/// Outward paths do not reach the cells behind a hole 13 cells wide: these have no height in any round, and a warning gives their number; the other
+/// heights are right. Least squares recovers the heights of all cells that some image shows.
 #[test]
 fn val_paths_leave_what_they_do_not_reach_unknown() {
     let scene = Scene::hills(33, 1.0);
@@ -232,8 +235,8 @@ fn val_paths_leave_what_they_do_not_reach_unknown() {
     assert!((0..33 * 33).all(|k| squares.heights.values[k].is_nan() == hole(k)));
 }
 
-/// The exposure of one image 4 % too high tilts the surface. Three points of an altimeter (1 cm) alone dimple it where they stand; with exposures
-/// free they tell the tilt. Points on a line tell none.
+/// The exposure of one image 4 % too high tilts the surface. Three altimeter points (1 cm) alone only dimple the surface at their positions; with free
+/// exposures they determine the tilt. Collinear points do not.
 #[test]
 fn val_three_points_settle_a_wrong_exposure() {
     let scene = Scene::hills(64, 1.0);

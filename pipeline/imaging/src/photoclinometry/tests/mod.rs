@@ -1,8 +1,9 @@
-//! Tests of heights from images.
+//! Tests of photoclinometry.
 
 mod accuracy;
 mod integration;
 mod limits;
+mod parts;
 mod scene;
 mod stereo;
 mod sweeps;

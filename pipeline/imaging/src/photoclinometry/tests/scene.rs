@@ -1,5 +1,5 @@
-//! A world of known heights and albedo, and a renderer of its own: facets between the corners of cells at least four times finer than the map's,
-//! their brightness written out, averaged over pixels. The inversion has slopes over edges between cell centres.
+//! A world of known heights and albedo, and an independent renderer: facets between the corners of cells at least four times finer than the map's,
+//! with explicit brightness formula, averaged over pixels. The inversion, in contrast, has slopes over edges between cell centres.
 
 use crate::camera::{Camera, ParallelCamera};
 use crate::direction::{Vector, direction};
@@ -7,7 +7,7 @@ use crate::photoclinometry::Image;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use std::f64::consts::PI;
 
-/// Facets along a cell of the map.
+/// Number of facets along a cell of the map.
 pub const FINER: usize = 4;
 
 pub struct Scene {
@@ -23,7 +23,7 @@ pub struct Truth {
     pub albedo: Vec<f64>,
 }
 
-/// Facet of a fine cell: place of its middle, slopes.
+/// Facet of a fine cell: height of its centre, slopes.
 fn facet(scene: &Scene, x: f64, y: f64, step: f64) -> (f64, [f64; 2]) {
     let h = 0.5 * step;
     let [sw, se, nw, ne] = [[-h, -h], [h, -h], [-h, h], [h, h]].map(|[u, v]| (scene.height)(x + u, y + v));
@@ -39,7 +39,7 @@ pub fn brightness([p, q]: [f64; 2], light: Vector, view: Vector) -> f64 {
 }
 
 impl Scene {
-    /// Hills of 13 to 40 cells, with an rms slope of about 0.15, and albedo of 0.2 +- 0.05 with waves of their own; square cells of `cell_m`.
+    /// Hills of 13 to 40 cells, with an rms slope of about 0.15, and an independent wavy albedo of 0.2 +- 0.05; square cells of `cell_m`.
     pub fn hills(side: usize, cell_m: f64) -> Self {
         let wave = move |x: f64, y: f64, cells: f64, azimuth: f64, phase: f64| {
             let k = 2.0 * PI / (cells * cell_m);
@@ -92,8 +92,8 @@ impl Scene {
         Camera::Parallel(ParallelCamera::new(at_deg, [x, y, 0.0], self.map.cell[0], [self.map.rows, self.map.cols]))
     }
 
-    /// What a camera sees under a sun at azimuth and elevation: the mean of `FINER` squared rays a pixel, facets around where each hits the surface.
-    /// No cast shadows: suns of the tests stand above the steepest slopes.
+    /// Image of a camera under a sun at azimuth and elevation: the mean of `FINER` squared rays per pixel, with the facet where each hits the surface.
+    /// There are no cast shadows: the suns of the tests are higher than the steepest slopes.
     pub fn image(&self, camera: Camera, sun_deg: [f64; 2]) -> Image {
         let light = direction(sun_deg[0], sun_deg[1]);
         let [rows, cols] = camera.shape();
@@ -123,7 +123,7 @@ impl Scene {
     }
 }
 
-/// The images with noise of a share of their brightness.
+/// The images with noise proportional to their brightness.
 pub fn noisy(images: &[Image], share: f64, seed: u64) -> Vec<Image> {
     let mut stream = Streams::for_seed(seed, "photoclinometry-test").stream("noise");
     let mut one = |image: &Image| {
@@ -145,7 +145,7 @@ pub fn slope_rms(a: &[[f64; 2]], b: &[[f64; 2]]) -> f64 {
     rms(a.iter().zip(b).map(length).filter(|v| v.is_finite()))
 }
 
-/// Rms of the difference of heights less its mean.
+/// Rms difference of heights after removing the mean difference.
 pub fn height_rms(a: &[f64], b: &[f64]) -> f64 {
     let errors: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).filter(|v| v.is_finite()).collect();
     sums::variance(&errors).sqrt()

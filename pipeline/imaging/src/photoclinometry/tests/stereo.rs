@@ -13,7 +13,7 @@ fn oblique(scene: &Scene) -> Vec<Image> {
     views.iter().zip(suns).map(|(v, s)| scene.image(scene.camera(*v), s)).collect()
 }
 
-/// A window read from an image at an offset correlates best there, to 0.05 pixels (paraboloids are no cosines).
+/// A window read from an image at an offset correlates best there, to 0.05 pixels (a paraboloid only approximates the cosine).
 #[test]
 fn val_offsets_are_found_below_a_pixel() {
     let scene = Scene::hills(48, 1.0);
@@ -30,7 +30,7 @@ fn val_offsets_are_found_below_a_pixel() {
     }
 }
 
-/// Exact offsets give the exact point; views alike or a single one give none; offsets that no point explains give none.
+/// Exact offsets give the exact point; similar views or a single view give none, nor do offsets that do not fit a common point.
 #[test]
 fn val_triangulation_finds_the_point() {
     let scene = Scene::hills(48, 1.0);
@@ -43,7 +43,7 @@ fn val_triangulation_finds_the_point() {
     let seen: Vec<(&Image, Offset)> = images.iter().map(|i| (i, offset(i, place))).collect();
     let (found, sigma) = triangulate(&seen, centre, 1.0).unwrap();
     assert!((0..3).all(|k| (found[k] - place[k]).abs() < 1e-9), "{found:?}");
-    // Columns of the two oblique images move by cos 60 deg a metre of height, those of all three by sin 60 deg or 1 a metre east:
+    // Columns of the two oblique images move by cos 60 deg per metre of height, those of all three by sin 60 deg or 1 per metre east:
     // sigma of height 0.1 / sqrt(2 cos^2 60).
     assert!((sigma - 0.1 / 0.5f64.sqrt()).abs() < 1e-9, "{sigma}");
     assert_eq!(triangulate(&seen[..1], centre, 1.0), None);
@@ -53,7 +53,7 @@ fn val_triangulation_finds_the_point() {
     assert_eq!(triangulate(&wrong, centre, 1.0), None);
 }
 
-/// A surface set 1.5 m too high is found at its height within 0.1 m (rms), a seventh of the relief.
+/// A surface placed 1.5 m too high is located at its true height within 0.1 m (rms), a seventh of the relief.
 #[test]
 fn val_points_lie_on_the_surface() {
     let scene = Scene::hills(64, 1.0);
@@ -73,9 +73,9 @@ fn val_points_lie_on_the_surface() {
     assert!(found.len() >= 30 && rms < 0.1);
 }
 
-/// Exposures wrong by 3 and -3 % tilt the surface; stereo points tell the tilt, and with it the exposures.
+/// Exposures wrong by 3 and -3 % tilt the surface; stereo points determine the tilt, and with it the exposures.
 #[test]
-fn val_stereo_points_hold_long_wavelengths() {
+fn val_stereo_points_control_long_wavelengths() {
     let scene = Scene::hills(64, 1.0);
     let truth = scene.truth();
     let mut images = oblique(&scene);

@@ -1,4 +1,4 @@
-//! How wrong suns, laws of brightness, registration, exposure and haze carry over to the surface.
+//! Propagation of errors of suns, photometric function, registration, exposure and haze to the surface.
 
 use super::accuracy::{THREE, quick, recovered};
 use super::scene::{Scene, Truth, height_rms, slope_rms};
@@ -24,8 +24,8 @@ fn errors(images: &[Image], scene: &Scene, truth: &Truth, settings: &Settings) -
     }
 }
 
-/// Each error alone, without noise, at one, two and four times a small one. Slopes: the error of slopes grows in proportion (the law is smooth),
-/// within 25 % where it is clear of the error without any (3e-4). This makes the table of `docs/imaging.md`.
+/// Each error separately, without noise, at one, two and four times a small value. The slope error grows in proportion (the photometric function is
+/// smooth), within 25 % where it exceeds the error without any disturbance (3e-4). This test prints the table of `docs/imaging.md`.
 #[test]
 fn conv_errors_grow_in_proportion() {
     let scene = Scene::hills(64, 1.0);
@@ -53,7 +53,7 @@ fn conv_errors_grow_in_proportion() {
         errors(&exact, &scene, &truth, &Settings { photometry: Some(photometry), ..quick() })
     };
     let registration = |by: f64| {
-        // One image taken by a camera that stands beside where it is said to.
+        // One image taken by a camera displaced from its stated position.
         let shifted = move |x: f64, y: f64| (x + by, y);
         let moved = Scene {
             map: scene.map,

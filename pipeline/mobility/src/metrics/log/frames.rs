@@ -1,15 +1,15 @@
-//! A body's path out of transforms between frames.
+//! The path of a body, composed from transforms between frames.
 
 use super::LogError;
 use super::series::{Rotation, between};
 use sastrugi_schemas::log::{PoseStream, TimedPose, TransformStream};
 use std::collections::BTreeMap;
 
-/// Most frames between the fixed frame and the body.
+/// Maximum number of frames between the fixed frame and the body.
 const DEPTH_MAX: usize = 32;
 
-/// Poses of `body` in `fixed` (the root of its tree when absent), at the times of the densest transform on the way; the others
-/// are interpolated to these, and those with one pose stand still.
+/// Poses of `body` in `fixed` (the root of its tree when absent), at the times of the most frequent transform in the chain. The
+/// others are interpolated to these times; a transform with a single pose is static.
 ///
 /// # Errors
 /// [`LogError::NoFrame`] when no transform leads to the body or from the fixed frame.
@@ -42,7 +42,7 @@ pub(super) fn path(transforms: &[TransformStream], body: &str, fixed: Option<&st
     Ok(PoseStream { topic: densest.topic.clone(), schema, frame: frame.to_owned(), body: body.to_owned(), poses })
 }
 
-/// The product of all transforms at a time; `None` where one is not known.
+/// The product of all transforms at a time; `None` where one is unknown.
 fn composed(chain: &[&TransformStream], time_ns: i64) -> Option<TimedPose> {
     let start =
         TimedPose { time_ns, position_m: [0.0; 3], orientation: [0.0, 0.0, 0.0, 1.0], angular_velocity_rad_s: None };
@@ -58,7 +58,7 @@ fn composed(chain: &[&TransformStream], time_ns: i64) -> Option<TimedPose> {
     })
 }
 
-/// A transform at a time; one that was sent once always holds.
+/// A transform at a time; one that was sent only once is static.
 fn at(poses: &[TimedPose], time_ns: i64) -> Option<TimedPose> {
     if let [only] = poses {
         return Some(TimedPose { time_ns, ..*only });

@@ -1,22 +1,22 @@
-//! A log's path over a measured terrain.
+//! The measured terrain under a log's path.
 
 use super::Analysis;
 use crate::missions::class_at;
 use sastrugi_numeric::{Grid, Surface, sums};
 use sastrugi_schemas::RoughnessClass;
 
-/// What the terrain is like under a path.
+/// Terrain statistics under a path.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct OnGround {
-    /// Share of the samples over ground with data.
+    /// Share of the samples over cells with data.
     pub known_share: f64,
-    /// Height of the body's frame above the ground below it, m: least, median, largest; NaN without data.
+    /// Height of the body's frame above the ground below it, m: smallest, median, largest; NaN without data.
     pub clearance_m: [f64; 3],
     /// Shares of the classes low, semi and high among the samples over a class.
     pub shares: [f64; 3],
 }
 
-/// What lies under the samples of a log; DEM and classes in the log's own frame (`offset_m` is added to its positions).
+/// Terrain under the samples of a log. DEM and classes are in the log's frame after `offset_m` is added to its positions.
 pub fn on_ground(analysis: &Analysis, offset_m: [f64; 3], dem: &Grid, classes: &Grid<u8>) -> OnGround {
     let positions = analysis
         .pieces

@@ -1,20 +1,22 @@
-//! Figures of a log of any origin: those of a simulated mission, by the same code, and what the log's noise lets one say.
+//! Metrics of a log of any origin: the metrics of a simulated mission, computed by the same code, with the noise floor of the
+//! log.
 //!
-//! A pose stream is cut at gaps (longer than five usual intervals and 0.25 s); each piece is taken as it is where its poses are
-//! even at the sampling rate, and interpolated at that rate otherwise, without any filter, as a simulation samples. Root mean
-//! squares are pooled over the pieces.
+//! A pose stream is cut at gaps (longer than five median intervals and 0.25 s). A piece whose poses are evenly spaced at the
+//! sampling rate is used unchanged; any other piece is interpolated at that rate, without a filter, as a simulation samples.
+//! Root mean squares are pooled over the pieces.
 //!
-//! Second differences of heights at 20 Hz raise noise: 1 mm of white noise gives 0.98 m/s2. A floor stands beside each root
-//! mean square: what white noise gives, of the smaller of two upper bounds of its density: the top eighth of the spectrum, and
-//! the quietest second of a vehicle at rest. Below three floors the answer is "cannot tell". Recordings of our own
-//! messages hold what was simulated, but for its rounding to 2^-20 m (2.7e-4 m/s2): their floors are 0. Our ROS 2 bags hold the same
-//! poses, but their messages do not say so: their floors are estimated as for any log.
+//! Second differences of heights at 20 Hz amplify noise: 1 mm of white noise gives 0.98 m/s2. Each root mean square therefore
+//! comes with a floor: the value that white noise alone would give, for the smaller of two upper bounds on the noise density,
+//! the top eighth of the spectrum and the quietest second of a vehicle at rest. Below three floors the answer is "cannot tell".
+//! Recordings in sastrugi's own messages hold the simulated poses, rounded to 2^-20 m (2.7e-4 m/s2), so their floors are 0.
+//! sastrugi's ROS 2 bags hold the same poses, but their messages do not identify them as simulated: their floors are estimated
+//! as for any log.
 //!
-//! Beside the second difference, the vertical acceleration in one band (0.2 to 8 Hz unless told otherwise), from the spectrum of
-//! the heights and, where there is an inertial measurement unit, from its specific force turned upright by the poses: the same
-//! band on both sides, whatever the rates. The unit's figure is the one to prefer.
+//! In addition to the second difference, the vertical acceleration is computed in one band (0.2 to 8 Hz by default), from the
+//! spectrum of the heights and, if there is an inertial measurement unit, from its specific force rotated upright by the poses.
+//! Both use the same band, whatever the rates. Prefer the value of the unit.
 //!
-//! Cost: a few passes over the poses, and 10 s of samples times the bins of a segment per half segment.
+//! Cost: a few passes over the poses, plus 10 s of samples times the bins of a segment per half segment.
 
 mod frames;
 mod ground;
@@ -33,37 +35,37 @@ use spectrum::Spectrum;
 
 /// Standard gravity, m/s2.
 const GRAVITY_M_S2: f64 = 9.80665;
-/// A figure tells something above this many floors.
+/// A metric is significant above this many noise floors.
 const FLOORS: f64 = 3.0;
-/// A vehicle rests over a second in which it moves by less than this, m.
+/// A vehicle that moves by less than this within a second is at rest, m.
 const REST_M: f64 = 0.02;
 
-/// Why a log has no figures.
+/// Why a log cannot be analysed.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum LogError {
-    /// Nothing tells where a body is.
+    /// The log holds no poses.
     #[error(
-        "no pose stream: it takes Odometry, PoseStamped or TFMessage (ROS 2), or PoseInFrame, Odometry or FrameTransform(s) \
-         (Foxglove){unread}"
+        "no pose stream: the log must contain Odometry, PoseStamped or TFMessage (ROS 2), or PoseInFrame, Odometry or \
+         FrameTransform(s) (Foxglove) messages{unread}"
     )]
     NoPoses {
-        /// Topics that could not be read, in words.
+        /// Topics that could not be read, as text.
         unread: String,
     },
     /// The named topic has no poses.
-    #[error("no poses on the topic `{topic}`; there are some on {known}")]
+    #[error("no poses on the topic `{topic}`; topics with poses: {known}")]
     NoTopic {
-        /// What was asked for.
+        /// The requested topic.
         topic: String,
-        /// What there is.
+        /// Topics with poses.
         known: String,
     },
     /// The transforms do not lead to a frame.
     #[error("no transforms lead to the frame `{frame}`; they lead to {}", known.join(", "))]
     NoFrame {
-        /// What was asked for.
+        /// The requested frame.
         frame: String,
-        /// What there is.
+        /// Frames that the transforms lead to.
         known: Vec<String>,
     },
     /// Time goes backwards.
@@ -76,8 +78,8 @@ pub enum LogError {
         /// By how much, s.
         back_s: f64,
     },
-    /// A quaternion that is no rotation.
-    #[error("on {topic}, the orientation of pose {message} has the length {length}; a quaternion has the length 1")]
+    /// A quaternion that is not a rotation.
+    #[error("on {topic}, the orientation quaternion of pose {message} has length {length}; it must have length 1")]
     Orientation {
         /// Topic.
         topic: String,
@@ -87,7 +89,7 @@ pub enum LogError {
         length: f64,
     },
     /// Fewer than three usable poses.
-    #[error("{poses} usable poses on {topic}; figures take at least 3")]
+    #[error("{poses} usable poses on {topic}; metrics need at least 3")]
     TooFew {
         /// Topic.
         topic: String,
@@ -96,14 +98,14 @@ pub enum LogError {
     },
 }
 
-/// How a log is judged.
+/// Settings of the analysis of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct LogSettings {
-    /// Topic of the poses; the best one when absent.
+    /// Topic of the poses; chosen by message type when absent.
     pub topic: Option<String>,
-    /// Frame that is followed where poses come as transforms.
+    /// Frame of the body, where poses come as transforms.
     pub body_frame: String,
-    /// Frame in which it moves; the root of the transforms when absent.
+    /// Frame in which the body moves; the root of the transforms when absent.
     pub fixed_frame: Option<String>,
     /// Sampling rate, Hz; a log with fewer poses keeps its own rate.
     pub rate_hz: f64,
@@ -126,32 +128,32 @@ impl Default for LogSettings {
     }
 }
 
-/// A root mean square with what white noise alone would give.
+/// A root mean square and its noise floor.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct AboveNoise {
     /// Root mean square.
     pub rms: f64,
-    /// Of the noise; NaN where it could not be told.
+    /// Root mean square of white noise alone; NaN where it could not be estimated.
     pub floor: f64,
 }
 
 impl AboveNoise {
-    /// True above three floors.
+    /// True when the root mean square is at least three noise floors.
     pub fn tells(&self) -> bool {
         self.rms >= FLOORS * self.floor
     }
 }
 
-/// Figures of a log.
+/// Metrics of a log.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Analysis {
     /// Topic of the poses.
     pub topic: String,
-    /// Message, or what was composed.
+    /// Type of the messages, or the chain of transforms.
     pub schema: String,
     /// Frame in which the body moves.
     pub frame: String,
-    /// Other streams of poses, in words.
+    /// Other pose streams, as text.
     pub others: Vec<String>,
     /// Poses used.
     pub poses: usize,
@@ -159,15 +161,15 @@ pub struct Analysis {
     pub start_ns: i64,
     /// From the first to the last pose, s.
     pub duration_s: f64,
-    /// Gaps: from and to, s after the first pose.
+    /// Gaps: start and end, s after the first pose.
     pub gaps_s: Vec<[f64; 2]>,
-    /// Usual rate of the poses, Hz.
+    /// Median rate of the poses, Hz.
     pub pose_rate_hz: f64,
-    /// Rate of the samples that figures are taken from, Hz.
+    /// Rate of the samples from which metrics are computed, Hz.
     pub sample_rate_hz: f64,
-    /// True when poses were interpolated to even times.
+    /// True when poses were interpolated to evenly spaced times.
     pub resampled: bool,
-    /// Figures as of a mission, pooled over the pieces.
+    /// Metrics as of a mission, pooled over the pieces.
     pub metrics: Metrics,
     /// Vertical acceleration by second differences, m/s2.
     pub acceleration: AboveNoise,
@@ -175,20 +177,47 @@ pub struct Analysis {
     pub pitch_rate: AboveNoise,
     /// Rate of the roll angle, rad/s.
     pub roll_rate: AboveNoise,
-    /// Vertical acceleration in the band from the heights, m/s2.
+    /// Vertical acceleration in the band, from the heights, m/s2.
     pub band_acceleration: Option<AboveNoise>,
     /// The same from an inertial measurement unit, and its topic.
     pub imu_acceleration: Option<(AboveNoise, String)>,
     /// Pieces without gaps.
     pub pieces: Vec<Vec<StateSample>>,
-    /// What a reader should know.
+    /// Notes for the reader.
     pub notes: Vec<String>,
 }
 
-/// Judges a log.
+/// Analyses a log.
 ///
 /// # Errors
 /// [`LogError`]
+///
+/// ```
+/// use sastrugi_mobility::metrics::log::{LogSettings, analyse};
+/// use sastrugi_schemas::log::{Log, PoseStream, TimedPose};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // Odometry at 20 Hz of a vehicle that drives east at 1 m/s for 10 s.
+/// let pose = |k: i64| TimedPose {
+///     time_ns: 50_000_000 * k,
+///     position_m: [0.05 * k as f64, 0.0, 0.0],
+///     orientation: [0.0, 0.0, 0.0, 1.0],
+///     angular_velocity_rad_s: None,
+/// };
+/// let stream = PoseStream {
+///     topic: "/odom".to_owned(),
+///     schema: "nav_msgs/msg/Odometry".to_owned(),
+///     frame: "odom".to_owned(),
+///     body: "base_link".to_owned(),
+///     poses: (0..=200).map(pose).collect(),
+/// };
+/// let log = Log { poses: vec![stream], ..Log::default() };
+/// let analysis = analyse(&log, &LogSettings::default())?;
+/// assert!((analysis.metrics.path_length_m - 10.0).abs() < 1e-9);
+/// assert!(!analysis.resampled && analysis.gaps_s.is_empty());
+/// # Ok(())
+/// # }
+/// ```
 pub fn analyse(log: &Log, settings: &LogSettings) -> Result<Analysis, LogError> {
     let (stream, others) = chosen(log, settings)?;
     let (poses, mut notes) = series::cleaned(&stream)?;
@@ -199,7 +228,7 @@ pub fn analyse(log: &Log, settings: &LogSettings) -> Result<Analysis, LogError> 
     let sample_rate_hz = rate(settings.rate_hz, pose_rate_hz);
     if sample_rate_hz < settings.rate_hz {
         notes.push(format!(
-            "poses come at {sample_rate_hz:.3} Hz, below the {} Hz of the figures: fast motion is missing from them",
+            "poses come at {sample_rate_hz:.3} Hz, below the {} Hz sampling rate of the metrics: they miss fast motion",
             settings.rate_hz
         ));
     }
@@ -229,9 +258,9 @@ pub fn analyse(log: &Log, settings: &LogSettings) -> Result<Analysis, LogError> 
         pose_rate_hz,
         sample_rate_hz,
         resampled,
-        acceleration: noise.beside(metrics.rms_vertical_acceleration_m_s2, |s| s.position_m[2], 2),
-        pitch_rate: noise.beside(metrics.rms_pitch_rate_rad_s, |s| EulerAngles::of(s.orientation).pitch, 1),
-        roll_rate: noise.beside(metrics.rms_roll_rate_rad_s, |s| EulerAngles::of(s.orientation).roll, 1),
+        acceleration: noise.with_floor(metrics.rms_vertical_acceleration_m_s2, |s| s.position_m[2], 2),
+        pitch_rate: noise.with_floor(metrics.rms_pitch_rate_rad_s, |s| EulerAngles::of(s.orientation).pitch, 1),
+        roll_rate: noise.with_floor(metrics.rms_roll_rate_rad_s, |s| EulerAngles::of(s.orientation).roll, 1),
         band_acceleration: Spectrum::of(&heights, sample_rate_hz).map(|s| in_band(&s, settings.band_hz, 2, exact)),
         imu_acceleration,
         metrics,
@@ -240,7 +269,7 @@ pub fn analyse(log: &Log, settings: &LogSettings) -> Result<Analysis, LogError> 
     })
 }
 
-/// The rate of the figures, or that of the poses where it is lower by more than their jitter.
+/// The sampling rate of the metrics: the desired rate, or that of the poses if it is lower by more than their jitter.
 fn rate(wanted_hz: f64, pose_rate_hz: f64) -> f64 {
     if pose_rate_hz > 0.95 * wanted_hz { wanted_hz } else { pose_rate_hz }
 }
@@ -251,10 +280,10 @@ fn in_band(spectrum: &Spectrum, band_hz: [f64; 2], derivative: i32, exact: bool)
     AboveNoise { rms, floor: spectrum.noise_rms(band_hz, derivative, density) }
 }
 
-/// Poses without noise.
+/// Message type of poses without noise.
 const SIMULATED: &str = "sastrugi.VehicleState";
 
-/// Messages that pose a body, the best first: those that tell which body come before those that do not.
+/// Message types with poses, in order of preference: types that identify the body come before those that do not.
 const PREFERRED: [&str; 6] = [
     SIMULATED,
     "nav_msgs/msg/Odometry",
@@ -264,7 +293,7 @@ const PREFERRED: [&str; 6] = [
     "foxglove.PoseInFrame",
 ];
 
-/// The stream to judge, and the others in words.
+/// The stream to analyse, and the others as text.
 fn chosen(log: &Log, settings: &LogSettings) -> Result<(PoseStream, Vec<String>), LogError> {
     let words = |stream: &PoseStream| format!("{} ({}, {} poses)", stream.topic, stream.schema, stream.poses.len());
     let of_transforms = frames::path(&log.transforms, &settings.body_frame, settings.fixed_frame.as_deref());
@@ -279,14 +308,14 @@ fn chosen(log: &Log, settings: &LogSettings) -> Result<(PoseStream, Vec<String>)
     let chosen = match found {
         Some(stream) => stream.clone(),
         None if by_transforms || (settings.topic.is_none() && !log.transforms.is_empty()) => of_transforms.clone()?,
-        None => return Err(nothing(log, settings, &streams)),
+        None => return Err(no_stream(log, settings, &streams)),
     };
     let all = streams.into_iter().chain(of_transforms.as_ref().ok());
     let others = all.filter(|s| s.topic != chosen.topic || s.schema != chosen.schema).map(words).collect();
     Ok((chosen, others))
 }
 
-fn nothing(log: &Log, settings: &LogSettings, streams: &[&PoseStream]) -> LogError {
+fn no_stream(log: &Log, settings: &LogSettings, streams: &[&PoseStream]) -> LogError {
     let known: Vec<&str> = streams.iter().map(|s| s.topic.as_str()).collect();
     match &settings.topic {
         Some(topic) if !known.is_empty() => LogError::NoTopic { topic: topic.clone(), known: known.join(", ") },
@@ -295,23 +324,23 @@ fn nothing(log: &Log, settings: &LogSettings, streams: &[&PoseStream]) -> LogErr
     }
 }
 
-/// Figures over all pieces: lengths add up, squares are pooled by their number of samples.
+/// Metrics over all pieces: lengths are summed, mean squares are weighted by their number of samples.
 fn pooled(pieces: &[Vec<StateSample>], rate_hz: f64, differentiator: Differentiator) -> Metrics {
     let all: Vec<(f64, Metrics)> =
         pieces.iter().map(|p| (p.len() as f64, Metrics::of(p, rate_hz, differentiator))).collect();
     if let [(_, only)] = all[..] {
         return only;
     }
-    let rms = |figure: fn(&Metrics) -> f64| {
-        let known = || all.iter().filter(|(_, m)| figure(m).is_finite());
-        let squares: f64 = known().map(|(n, m)| n * figure(m) * figure(m)).sum();
+    let rms = |metric: fn(&Metrics) -> f64| {
+        let known = || all.iter().filter(|(_, m)| metric(m).is_finite());
+        let squares: f64 = known().map(|(n, m)| n * metric(m) * metric(m)).sum();
         (squares / known().map(|(n, _)| n).sum::<f64>()).sqrt()
     };
-    let largest = |figure: fn(&Metrics) -> f64| all.iter().map(|(_, m)| figure(m)).fold(f64::NAN, f64::max);
+    let largest = |metric: fn(&Metrics) -> f64| all.iter().map(|(_, m)| metric(m)).fold(f64::NAN, f64::max);
     let path_length_m = all.iter().map(|(_, m)| m.path_length_m).sum();
     Metrics {
         path_length_m,
-        // The way through a gap is not known.
+        // The path through a gap is unknown.
         efficiency: f64::NAN,
         rms_vertical_acceleration_m_s2: rms(|m| m.rms_vertical_acceleration_m_s2),
         rms_pitch_rate_rad_s: rms(|m| m.rms_pitch_rate_rad_s),
@@ -323,22 +352,22 @@ fn pooled(pieces: &[Vec<StateSample>], rate_hz: f64, differentiator: Differentia
     }
 }
 
-/// Noise of a series of the states.
+/// Noise estimator for series of the states.
 struct Noise<'a> {
     pieces: &'a [Vec<StateSample>],
     rate_hz: f64,
     differentiator: Differentiator,
-    /// There is none.
+    /// The poses are without noise.
     exact: bool,
 }
 
 impl Noise<'_> {
-    /// A root mean square of a derivative beside its floor.
-    fn beside(&self, rms: f64, figure: fn(&StateSample) -> f64, derivative: u32) -> AboveNoise {
+    /// The root mean square of a derivative with its noise floor.
+    fn with_floor(&self, rms: f64, value: fn(&StateSample) -> f64, derivative: u32) -> AboveNoise {
         if self.exact {
             return AboveNoise { rms, floor: 0.0 };
         }
-        let series: Vec<Vec<f64>> = self.pieces.iter().map(|p| p.iter().map(figure).collect()).collect();
+        let series: Vec<Vec<f64>> = self.pieces.iter().map(|p| p.iter().map(value).collect()).collect();
         let of_spectrum = Spectrum::of(&series, self.rate_hz).map(|s| {
             // White noise of variance 1 has differences of variance 2, and second differences of variance 6.
             let gain = if derivative == 2 { 6.0f64.sqrt() * self.rate_hz } else { 2.0f64.sqrt() };
@@ -347,7 +376,7 @@ impl Noise<'_> {
         AboveNoise { rms, floor: of_spectrum.unwrap_or(f64::NAN).min(self.at_rest(&series, derivative)) }
     }
 
-    /// The quietest second at rest; NaN where there is none.
+    /// Root mean square over the quietest second at rest; NaN if the vehicle never rests.
     fn at_rest(&self, series: &[Vec<f64>], derivative: u32) -> f64 {
         let window = (self.rate_hz.round() as usize).max(4);
         let mut quietest = f64::NAN;
@@ -369,21 +398,21 @@ impl Noise<'_> {
     }
 }
 
-/// Vertical acceleration by an inertial measurement unit, even pieces.
+/// Vertical acceleration from an inertial measurement unit, in evenly sampled pieces.
 struct Upright {
     pieces: Vec<Vec<f64>>,
     rate_hz: f64,
     note: Option<String>,
 }
 
-/// The unit's specific force in the fixed frame less gravity, upwards, at the unit's usual rate.
+/// The upward component of the unit's specific force in the fixed frame, minus gravity, at the unit's median rate.
 fn upright(imu: &ImuStream, log: &Log, poses: &[TimedPose], settings: &LogSettings) -> Upright {
     let aligned = imu.frame.is_empty() || imu.frame == settings.body_frame;
     let mount = (!aligned)
         .then(|| frames::path(&log.transforms, &imu.frame, Some(&settings.body_frame)).ok()?.poses.first().copied())
         .flatten();
     let note = (!aligned && mount.is_none()).then(|| {
-        format!("no transform tells how `{}` lies in `{}`; they are taken as parallel", imu.frame, settings.body_frame)
+        format!("no transform from `{}` to `{}`; the frames are assumed to be parallel", imu.frame, settings.body_frame)
     });
     let turn = Rotation(mount.map_or([0.0, 0.0, 0.0, 1.0], |pose| pose.orientation));
     let mut last = 0;
@@ -395,7 +424,7 @@ fn upright(imu: &ImuStream, log: &Log, poses: &[TimedPose], settings: &LogSettin
         let known = before.time_ns <= sample.time_ns && sample.specific_force_m_s2.iter().all(|v| v.is_finite());
         let pose = known.then(|| series::between(before, after, sample.time_ns))?;
         let force = Rotation(pose.orientation).of(turn.of(sample.specific_force_m_s2));
-        // As a pose, so that pieces and interpolation are those of poses.
+        // Stored as a pose, so that it is cut and interpolated like poses.
         Some(TimedPose { position_m: [0.0, 0.0, force[2] - GRAVITY_M_S2], ..pose })
     });
     let mut upwards: Vec<TimedPose> = upwards.collect();

@@ -1,20 +1,20 @@
-//! Poses in time: what can be wrong with them, pieces without gaps, even sampling.
+//! Pose series: validation, pieces without gaps, even sampling.
 
 use super::LogError;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::log::{PoseStream, TimedPose};
 use sastrugi_schemas::topics::StateSample;
 
-/// A gap is longer than this many usual intervals and [`GAP_MIN_S`].
+/// A gap is longer than this many median intervals and than [`GAP_MIN_S`].
 const GAP_INTERVALS: f64 = 5.0;
 /// Shortest gap, s.
 const GAP_MIN_S: f64 = 0.25;
-/// Largest deviation of a quaternion's length from 1.
+/// Largest accepted deviation of a quaternion's length from 1.
 const LENGTH_TOLERANCE: f64 = 1e-2;
-/// Quaternions whose length is off by less are taken as they are, so that a recording in steps of 2^-20 is judged by its own
-/// bits.
+/// Quaternions whose length deviates by less are not normalised, so that a recording in steps of 2^-20 is analysed bit for bit
+/// as recorded.
 const ROUNDING: f64 = 4e-6;
-/// Intervals count as even when each is within this share of the usual one.
+/// Intervals count as even if each is within this share of the median.
 const EVEN: f64 = 1e-3;
 
 /// A rotation as unit quaternion `[x, y, z, w]`.
@@ -22,7 +22,7 @@ const EVEN: f64 = 1e-3;
 pub(super) struct Rotation(pub [f64; 4]);
 
 impl Rotation {
-    /// A vector turned: v + 2 w (q x v) + 2 q x (q x v).
+    /// A rotated vector: v + 2 w (q x v) + 2 q x (q x v).
     pub(super) fn of(self, v: [f64; 3]) -> [f64; 3] {
         let [x, y, z, w] = self.0;
         let cross = |a: [f64; 3], b: [f64; 3]| {
@@ -45,8 +45,8 @@ impl Rotation {
     }
 }
 
-/// The pose between two others: positions on the line, orientations along the shorter arc (the normalised mean of the
-/// quaternions, within 1e-4 of its angle for turns of a few degrees).
+/// Interpolates between two poses: positions linearly, orientations along the shorter arc (by the normalised mean of the
+/// quaternions, which deviates by less than 1e-4 of the angle for turns of a few degrees).
 pub(super) fn between(before: &TimedPose, after: &TimedPose, time_ns: i64) -> TimedPose {
     let share = (time_ns - before.time_ns) as f64 / (after.time_ns - before.time_ns) as f64;
     let mix = |a: f64, b: f64| a + (b - a) * share;
@@ -63,7 +63,7 @@ pub(super) fn between(before: &TimedPose, after: &TimedPose, time_ns: i64) -> Ti
     }
 }
 
-/// Poses in order of time, each usable; and what was left out, in words.
+/// Usable poses in order of time, and notes on those dropped.
 pub(super) fn cleaned(stream: &PoseStream) -> Result<(Vec<TimedPose>, Vec<String>), LogError> {
     let (mut poses, mut unusable, mut repeated): (Vec<TimedPose>, u64, u64) = (Vec::new(), 0, 0);
     for (index, pose) in stream.poses.iter().enumerate() {
@@ -91,21 +91,21 @@ pub(super) fn cleaned(stream: &PoseStream) -> Result<(Vec<TimedPose>, Vec<String
     }
     let mut notes = Vec::new();
     if unusable > 0 {
-        notes.push(format!("{unusable} poses hold numbers that are not finite; they are left out"));
+        notes.push(format!("dropped {unusable} poses with numbers that are not finite"));
     }
     if repeated > 0 {
-        notes.push(format!("{repeated} poses repeat the time of the one before; they are left out"));
+        notes.push(format!("dropped {repeated} poses with the same time as the previous one"));
     }
     Ok((poses, notes))
 }
 
-/// Usual interval of times, s: their median.
+/// Median interval between times, s.
 pub(super) fn interval_s(times_ns: &[i64]) -> f64 {
     let steps: Vec<f64> = times_ns.windows(2).map(|w| (w[1] - w[0]) as f64 * 1e-9).collect();
     sums::median(&steps)
 }
 
-/// Numbers of the first and last element of every piece without a gap.
+/// Indices of the first and last element of every piece without a gap.
 pub(super) fn pieces(times_ns: &[i64]) -> Vec<[usize; 2]> {
     let longest_s = (GAP_INTERVALS * interval_s(times_ns)).max(GAP_MIN_S);
     let mut pieces = Vec::new();
@@ -120,13 +120,13 @@ pub(super) fn pieces(times_ns: &[i64]) -> Vec<[usize; 2]> {
     pieces
 }
 
-/// True when all intervals are those of a rate.
+/// True when all intervals match a rate.
 pub(super) fn is_even(times_ns: &[i64], rate_hz: f64) -> bool {
     times_ns.windows(2).all(|w| ((w[1] - w[0]) as f64 * 1e-9 * rate_hz - 1.0).abs() < EVEN)
 }
 
-/// States at an even rate from the first pose on: the poses themselves where they are even, interpolated otherwise. Times
-/// count from `zero_ns`.
+/// Evenly sampled states from the first pose on: the poses themselves if they are evenly spaced, interpolated otherwise. Times
+/// are relative to `zero_ns`.
 pub(super) fn states(poses: &[TimedPose], rate_hz: f64, zero_ns: i64) -> Vec<StateSample> {
     let times: Vec<i64> = poses.iter().map(|pose| pose.time_ns).collect();
     let even = if is_even(&times, rate_hz) { poses.to_vec() } else { sampled(poses, &times, rate_hz) };
@@ -150,8 +150,8 @@ fn sampled(poses: &[TimedPose], times: &[i64], rate_hz: f64) -> Vec<TimedPose> {
     instants.map(at).collect()
 }
 
-/// Angular velocity in the body's frame from neighbouring orientations: twice the vector part of the turn between them,
-/// over the time between them (exact to the square of the turn).
+/// Angular velocity in the body frame from neighbouring orientations: twice the vector part of the rotation between them,
+/// divided by the time between them (second-order accurate in the rotation).
 fn rates(poses: &[TimedPose], k: usize, rate_hz: f64) -> [f64; 3] {
     let (low, high) = (k.saturating_sub(1), (k + 1).min(poses.len() - 1));
     if low == high {

@@ -1,17 +1,17 @@
-//! Spectral density of a series (Welch, 1967): the mean over Hann-windowed, half-overlapping segments without their linear
-//! trends, one-sided, and root mean squares of a band from it.
+//! One-sided power spectral density of a series (Welch, 1967), averaged over detrended, Hann-windowed, half-overlapping
+//! segments; and band RMS values from it.
 
 use std::f64::consts::TAU;
 
-/// Length of a segment, s: the lowest frequency of a band should pass twice in it.
+/// Length of a segment, s: it should hold two periods of the lowest frequency of the band.
 const SEGMENT_S: f64 = 10.0;
-/// Share of the frequencies below the Nyquist frequency, at the top, where a noise floor is read.
+/// Share of the frequencies, just below the Nyquist frequency, from which the noise floor is estimated.
 const TOP_SHARE: f64 = 0.125;
 
-/// Density of a series.
+/// Power spectral density of a series.
 #[derive(Clone, Debug)]
 pub(super) struct Spectrum {
-    /// Between neighbouring frequencies, Hz.
+    /// Spacing of the frequencies, Hz.
     step_hz: f64,
     rate_hz: f64,
     /// Density at `step_hz`, `2 step_hz` ..., in squared units per Hz.
@@ -19,7 +19,7 @@ pub(super) struct Spectrum {
 }
 
 impl Spectrum {
-    /// Of all pieces of a series; `None` when none is long enough for a segment of 2 s.
+    /// Density of all pieces of a series; `None` if no piece is long enough for a segment of 2 s.
     pub(super) fn of(pieces: &[Vec<f64>], rate_hz: f64) -> Option<Self> {
         let longest = pieces.iter().map(Vec::len).max()?;
         let n = ((SEGMENT_S * rate_hz).round() as usize).min(longest);
@@ -61,7 +61,7 @@ impl Spectrum {
         self.integral(band_hz, derivative, |bin| self.density[bin])
     }
 
-    /// The same for white noise of a density.
+    /// The same for white noise with a given density.
     pub(super) fn noise_rms(&self, band_hz: [f64; 2], derivative: i32, density: f64) -> f64 {
         self.integral(band_hz, derivative, |_| density)
     }
@@ -73,20 +73,20 @@ impl Spectrum {
         inside.map(|(bin, f)| density(bin) * weight(f) * self.step_hz).sum::<f64>().sqrt()
     }
 
-    /// Mean density in the top eighth of the frequencies: white noise has this density or less.
+    /// Mean density in the top eighth of the frequencies: an upper bound on the density of white noise.
     pub(super) fn top(&self) -> f64 {
         let n = self.density.len();
         let first = n - ((n as f64 * TOP_SHARE) as usize).max(1);
         self.density[first..].iter().sum::<f64>() / (n - first) as f64
     }
 
-    /// Standard deviation of white noise of a density at the series' rate.
+    /// Standard deviation of white noise with a given density at the series' rate.
     pub(super) fn noise_sigma(&self, density: f64) -> f64 {
         (0.5 * density * self.rate_hz).sqrt()
     }
 }
 
-/// Values less their least-squares line.
+/// Values minus their least-squares line.
 fn without_trend(values: &[f64]) -> Vec<f64> {
     let n = values.len() as f64;
     let middle = 0.5 * (n - 1.0);

@@ -1,4 +1,4 @@
-//! What a rover does about what it sees.
+//! Policies: how a rover acts on its view.
 
 mod schoppers;
 mod sojourner;
@@ -10,16 +10,16 @@ use super::draws::CycleDraws;
 use super::pose::Pose;
 use super::sensing::View;
 
-/// What a policy may know in a cycle.
+/// Everything that a policy knows in a cycle.
 #[derive(Clone, Copy, Debug)]
 pub struct Situation<'a> {
-    /// Where the rover believes that it is.
+    /// The pose that the rover believes it has.
     pub pose: Pose,
     /// The goal, m.
     pub goal_m: [f64; 2],
-    /// What it sees.
+    /// Sensor view.
     pub view: &'a View,
-    /// Its draws of this cycle.
+    /// Random numbers of this cycle.
     pub draws: CycleDraws,
 }
 
@@ -34,7 +34,7 @@ impl Situation<'_> {
         self.pose.distance_m(self.goal_m)
     }
 
-    /// The side of the goal.
+    /// The side on which the goal lies.
     pub fn goal_side(&self) -> Side {
         if self.goal_error_rad() >= 0.0 { Side::Left } else { Side::Right }
     }
@@ -70,20 +70,20 @@ impl Side {
 /// Why a policy stops.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Stop {
-    /// It believes to be at the goal.
+    /// It believes that it is at the goal.
     AtGoal,
-    /// It knows of no way to the goal.
+    /// It finds no way to the goal.
     NoWay,
 }
 
-/// What is to be done in a cycle: a turn in place, then a drive.
+/// The command of a cycle: a turn in place, then a straight drive.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Command {
-    /// To the left, rad.
+    /// Turn, left positive, rad.
     pub turn_rad: f64,
-    /// Ahead; below 0 back, m.
+    /// Distance ahead, m; negative backwards.
     pub drive_m: f64,
-    /// Stop for good.
+    /// Ends the drive.
     pub stop: Option<Stop>,
 }
 
@@ -93,26 +93,26 @@ impl Command {
         Self { turn_rad, ..Self::default() }
     }
 
-    /// A drive straight ahead, or back.
+    /// A straight drive, ahead or back.
     pub fn drive(drive_m: f64) -> Self {
         Self { drive_m, ..Self::default() }
     }
 
-    /// The end.
+    /// The end of the drive.
     pub fn stop(stop: Stop) -> Self {
         Self { stop: Some(stop), ..Self::default() }
     }
 }
 
-/// A rover's mind: called once a cycle, with what the rover sees.
+/// A navigation policy, called once per cycle with the rover's view.
 pub trait Policy {
-    /// What to do.
+    /// The command for this cycle.
     fn decide(&mut self, situation: &Situation<'_>) -> Command;
 
-    /// What it is at, for recordings.
+    /// Its state, for recordings.
     fn state(&self) -> &'static str;
 
-    /// The way that it plans to take, from where it believes to be, m; empty for policies without plans.
+    /// The planned path from the believed position, m; empty for policies that do not plan.
     fn plan(&self) -> &[[f64; 2]] {
         &[]
     }

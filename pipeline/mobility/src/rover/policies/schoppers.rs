@@ -1,60 +1,60 @@
-//! The Schoppers-like navigator: keep what is straight ahead safe, and turn to the goal where that stays so.
+//! The Schoppers-like navigator: it drives where the ground straight ahead is safe, and turns to the goal where it stays safe.
 //!
-//! With the inner rectangles safe:
-//! * no commitment left, and the outer rectangle on the side of the goal safe or the error of the bearing small: it turns towards the goal,
-//!   and back again where the inner rectangles are unsafe from there;
-//! * it drives by a step.
+//! If the inner rectangles are safe:
+//! * if no commitment is left, and the outer rectangle on the side of the goal is safe or the bearing error is small, it turns
+//!   towards the goal, and back again if the inner rectangles are unsafe in that direction;
+//! * otherwise it drives one step.
 //!
-//! Otherwise it turns to the side with more safe rectangles, or to that of the goal, and commits itself to the new direction for a distance.
-//! After a full turn without a way it backs up, turns the other way from then on, and commits itself for longer, until it has come
-//! nearer to the goal.
+//! If they are unsafe, it turns to the side with more safe rectangles, or to the side of the goal, and commits itself to the new
+//! direction for a distance. After a full turn without finding a way it backs up, turns the other way from then on, and commits
+//! itself for longer, until it has come nearer to the goal.
 //!
-//! The paper has the rectangles and that they are safe or unsafe; the rules are ours.
+//! The paper describes the rectangles and their classification as safe or unsafe; the rules are our choice.
 
 use super::{Command, Policy, Side, Situation, Stop};
 use std::f64::consts::TAU;
 
-/// Numbers of the navigator.
+/// Parameters of the navigator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SchoppersRules {
     /// Distance from the goal at which it stops, m.
     pub goal_tolerance_m: f64,
-    /// Turn of a cycle, rad.
+    /// Turn per cycle, rad.
     pub turn_rad: f64,
-    /// Drive of a cycle, m.
+    /// Distance driven per cycle, m.
     pub step_m: f64,
-    /// Error of the bearing at which it turns to the goal whatever is beside it, rad.
+    /// Bearing error below which it turns to the goal even if the outer rectangle on that side is unsafe, rad.
     pub bearing_tolerance_rad: f64,
-    /// Drive after a turn away before it turns to the goal again, m.
+    /// Commitment: distance driven after turning away before it turns to the goal again, m.
     pub commit_m: f64,
-    /// Factor of that after a full turn.
+    /// Growth factor of the commitment after a full turn.
     pub commit_growth: f64,
-    /// Its largest value, m.
+    /// Largest commitment, m.
     pub commit_max_m: f64,
-    /// Nearer to the goal by this, it commits itself as at first, m.
+    /// Progress towards the goal after which the commitment is reset to `commit_m`, m.
     pub progress_m: f64,
 }
 
-/// The navigator, and what it remembers.
+/// The navigator and its memory.
 #[derive(Clone, Debug)]
 pub struct SchoppersLike {
     rules: SchoppersRules,
     latched: Option<Side>,
-    /// Turned since the way was free, rad.
+    /// Angle turned since the way was last free, rad.
     turned_rad: f64,
-    /// Left of the commitment, m.
+    /// Remaining commitment, m.
     committed_m: f64,
     /// Next commitment, m.
     commit_m: f64,
-    /// Distance to the goal when the commitment grew last, m.
+    /// Distance to the goal when the commitment last grew, m.
     grown_at_m: f64,
-    /// A turn to the goal that is being tried, rad.
+    /// A tentative turn to the goal, rad.
     tried_rad: Option<f64>,
     state: &'static str,
 }
 
 impl SchoppersLike {
-    /// A navigator at the start.
+    /// A navigator in its initial state.
     pub fn new(rules: SchoppersRules) -> Self {
         Self {
             rules,
@@ -77,15 +77,15 @@ impl SchoppersLike {
         Command { turn_rad, drive_m: self.rules.step_m, stop: None }
     }
 
-    fn go_on(&mut self, situation: &Situation<'_>) -> Command {
+    fn proceed(&mut self, situation: &Situation<'_>) -> Command {
         let error_rad = situation.goal_error_rad();
         let areas = &situation.view.areas;
         let outer = match situation.goal_side() {
             Side::Left => areas.first(),
             Side::Right => areas.last(),
         };
-        let room = outer.is_some_and(|area| !area.hazard) || error_rad.abs() < self.rules.bearing_tolerance_rad;
-        if self.committed_m <= 0.0 && room && error_rad != 0.0 {
+        let has_room = outer.is_some_and(|area| !area.hazard) || error_rad.abs() < self.rules.bearing_tolerance_rad;
+        if self.committed_m <= 0.0 && has_room && error_rad != 0.0 {
             let turn_rad = error_rad.clamp(-self.rules.turn_rad, self.rules.turn_rad);
             self.tried_rad = Some(turn_rad);
             self.state = "turn to goal";
@@ -112,7 +112,7 @@ impl SchoppersLike {
     }
 }
 
-/// The side with more safe rectangles; with as many, that of the goal.
+/// The side with more safe rectangles; the side of the goal if they are equal in number.
 fn freer_side(situation: &Situation<'_>) -> Side {
     let areas = &situation.view.areas;
     let safe = |sign: f64| areas.iter().filter(|area| !area.hazard && sign * area.left_m() > 0.0).count();
@@ -123,7 +123,7 @@ fn freer_side(situation: &Situation<'_>) -> Side {
     }
 }
 
-/// Whether the rectangles beside the centre line are safe: the middle one of an odd number.
+/// Whether the rectangles next to the centre line are safe; of an odd number, the middle one.
 fn inner_safe(situation: &Situation<'_>) -> bool {
     let count = situation.view.areas.len();
     let inner = (count.saturating_sub(1) / 2)..=(count / 2);
@@ -147,7 +147,7 @@ impl Policy for SchoppersLike {
                 self.state = "turn back";
                 self.drive(-tried_rad)
             }
-            (None, true) => self.go_on(situation),
+            (None, true) => self.proceed(situation),
             (None, false) => self.avoid(situation),
         }
     }

@@ -1,50 +1,49 @@
-//! The Sojourner-like navigator: turn away from what is in the way, pass it, turn back to the goal.
+//! The Sojourner-like navigator: it turns away from a hazard, passes it, and turns back to the goal.
 //!
 //! Each cycle, in this order:
-//! 1. Within the tolerance of the goal it stops.
-//! 2. At a hazard it turns in place: away from it where only one side has hazards, else towards the goal, and on in the same direction
-//!    until nothing is in the way. After a full turn without a clear view it backs up by a step and turns the other way.
-//! 3. With a clear view it drives straight on until it has passed what it turned away from; then it turns to the goal, and drives by a
-//!    step.
+//! 1. Within the goal tolerance it stops.
+//! 2. At a hazard it turns in place: away from the hazard if only one side has hazards, else towards the goal, and further in the same
+//!    direction until the view is clear. After a full turn without a clear view it backs up by one step and turns the other way.
+//! 3. With a clear view it drives straight on until it has passed the hazard; then it turns to the goal and drives one step.
 //!
-//! The paper has the steps (at most the radius of a wheel), the sensing and the behaviours by name; Mishkin et al. (1998) have the hazards and
-//! the turning back to the goal. Angles, the distance to pass and the backing are ours.
+//! The paper gives the steps (at most the wheel radius), the sensing and the names of the behaviours; Mishkin et al. (1998) describe
+//! the hazards and the turn back to the goal. The angles, the distance to pass a hazard and the backing up are our choice.
 
 use super::{Command, Policy, Side, Situation, Stop};
 use crate::rover::draws::Purpose;
 use std::f64::consts::TAU;
 
-/// Numbers of the navigator.
+/// Parameters of the navigator.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SojournerRules {
     /// Distance from the goal at which it stops, m.
     pub goal_tolerance_m: f64,
-    /// Turn of a cycle, rad.
+    /// Turn per cycle, rad.
     pub turn_rad: f64,
     /// Standard deviation of turns away from a hazard, rad.
     pub turn_noise_rad: f64,
-    /// Drive straight on after a hazard, m.
+    /// Distance driven straight on after a hazard, m.
     pub pass_m: f64,
-    /// Drive of a cycle, m.
+    /// Distance driven per cycle, m.
     pub step_m: f64,
-    /// Error of the bearing that it does not mind, rad.
+    /// Bearing error that it does not correct, rad.
     pub bearing_tolerance_rad: f64,
 }
 
-/// The navigator, and what it remembers.
+/// The navigator and its memory.
 #[derive(Clone, Debug)]
 pub struct SojournerLike {
     rules: SojournerRules,
     latched: Option<Side>,
-    /// Turned since the view was clear, rad.
+    /// Angle turned since the view was last clear, rad.
     turned_rad: f64,
-    /// Left to drive straight on, m.
+    /// Remaining distance to drive straight on, m.
     pass_m: f64,
     state: &'static str,
 }
 
 impl SojournerLike {
-    /// A navigator at the start.
+    /// A navigator in its initial state.
     pub fn new(rules: SojournerRules) -> Self {
         Self { rules, latched: None, turned_rad: 0.0, pass_m: 0.0, state: "start" }
     }
@@ -64,7 +63,7 @@ impl SojournerLike {
         Command::turn(side.sign() * (self.rules.turn_rad + noise_rad))
     }
 
-    fn go_on(&mut self, situation: &Situation<'_>) -> Command {
+    fn proceed(&mut self, situation: &Situation<'_>) -> Command {
         self.latched = None;
         self.turned_rad = 0.0;
         let step_m = self.rules.step_m;
@@ -80,13 +79,13 @@ impl SojournerLike {
         }
         self.state = "turn to goal";
         let turn_rad = error_rad.clamp(-self.rules.turn_rad, self.rules.turn_rad);
-        // What is left to turn is turned after another look.
+        // The rest of the turn follows after another look.
         let drive_m = if error_rad.abs() > self.rules.turn_rad { 0.0 } else { step_m };
         Command { turn_rad, drive_m, stop: None }
     }
 }
 
-/// Right of hazards on the left alone, left of those on the right alone, else towards the goal.
+/// Right if all hazards are on the left, left if all are on the right, else towards the goal.
 fn away_from_hazards(situation: &Situation<'_>) -> Side {
     let on = |sign: f64| situation.view.areas.iter().any(|area| area.hazard && sign * area.left_m() > 1e-9);
     match (on(1.0), on(-1.0)) {
@@ -102,7 +101,7 @@ impl Policy for SojournerLike {
             self.state = "at goal";
             return Command::stop(Stop::AtGoal);
         }
-        if situation.view.has_hazard() { self.avoid(situation) } else { self.go_on(situation) }
+        if situation.view.has_hazard() { self.avoid(situation) } else { self.proceed(situation) }
     }
 
     fn state(&self) -> &'static str {

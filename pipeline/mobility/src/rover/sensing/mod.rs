@@ -1,4 +1,4 @@
-//! What a rover senses: areas ahead of it, from left to right, each a hazard or not.
+//! Sensing: areas ahead of the rover, from left to right, each a hazard or not.
 
 mod rays;
 mod rectangles;
@@ -10,12 +10,12 @@ use super::draws::CycleDraws;
 use super::pose::{Body, Pose};
 use sastrugi_numeric::{Ground, NoGround};
 
-/// Part of the ground ahead.
+/// An area of the ground ahead.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Area {
     /// Its corners in the rover's own axes (ahead, left), m: near right, near left, far left, far right.
     pub corners_m: [[f64; 2]; 4],
-    /// Whether the rover must not go there.
+    /// Whether the rover must not drive there.
     pub hazard: bool,
 }
 
@@ -36,29 +36,30 @@ impl Area {
 pub struct Ray {
     /// Origin, in the coordinates of the terrain, m.
     pub from_m: [f64; 3],
-    /// Where it met the ground, or where it was given up, m.
+    /// Where it hit the ground, or where it ended without a hit, m.
     pub to_m: [f64; 3],
-    /// Height of the hit above the plane of the body, m; `None` where nothing was hit.
+    /// Height of the hit above the plane of the body, m; `None` without a hit.
     pub height_m: Option<f64>,
-    /// The ground that it tells of, in the rover's own axes (ahead, left), m: where it met it, or, where it met none, where it was aimed.
+    /// The place that it measures, in the rover's own axes (ahead, left), m: the hit or, without a hit, the point at which it was
+    /// aimed.
     pub place_m: [f64; 2],
-    /// Whether it shows a hazard there.
+    /// Whether that place is a hazard.
     pub hazard: bool,
 }
 
-/// What a rover sees in one cycle.
+/// The sensor view of one cycle.
 #[derive(Clone, Debug, PartialEq)]
 pub struct View {
-    /// From left to right.
+    /// Areas from left to right.
     pub areas: Vec<Area>,
-    /// Column by column from the left, near ones first; none for sensors without.
+    /// Rays column by column from the left, near ones first; empty for sensors without rays.
     pub rays: Vec<Ray>,
-    /// Whether the rover itself leans too much.
+    /// Whether the rover itself tilts beyond its limit.
     pub tilted: bool,
 }
 
 impl View {
-    /// Whether something is in the way.
+    /// Whether there is a hazard in view, or the rover tilts too much.
     pub fn has_hazard(&self) -> bool {
         self.tilted || self.areas.iter().any(|area| area.hazard)
     }
@@ -67,17 +68,17 @@ impl View {
 /// A sensor.
 #[derive(Clone, Debug, PartialEq)]
 pub enum Sensor {
-    /// Ranges along rays.
+    /// Range measurements along rays.
     Rays(RaySensor),
     /// Safe and unsafe rectangles.
     Rectangles(RectangleSensor),
 }
 
 impl Sensor {
-    /// What a rover sees; `noise_m` is the standard deviation of sensed heights.
+    /// The view of a rover; `noise_m` is the standard deviation of sensed heights.
     ///
     /// # Errors
-    /// Ground that is not known, which is no hazard and no height of 0.
+    /// Unknown ground, which counts neither as a hazard nor as a height of 0.
     pub fn look(
         &self,
         ground: &impl Ground,

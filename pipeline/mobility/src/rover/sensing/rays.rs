@@ -1,24 +1,24 @@
-//! Ranges along rays: columns of rays ahead, each column a strip of ground.
+//! Range measurements along rays: columns of rays ahead, each column covering a strip of ground.
 //!
-//! A ray leaves the front of the rover and aims at a point of the plane of the body ahead; it is followed to twice that range. What
-//! it hits has the height v above that plane. A column is a hazard where one of its rays is, and a ray is one where
+//! A ray leaves the front of the rover and aims at a point ahead on the plane of the body; it is traced to twice that range. Its hit
+//! has the height v above that plane. A column is a hazard if one of its rays is, and a ray is a hazard if
 //!
 //! * it hits nothing (a drop-off),
 //! * |v| exceeds the hazard height,
-//! * v exceeds that of the ray before, behind or beside it by more than the hazard height,
-//! * v is the highest of all, and exceeds the lowest by more than the span.
+//! * v exceeds that of a neighbouring ray, in front, behind or to the side, by more than the hazard height,
+//! * v is the largest of all, and exceeds the smallest by more than the span.
 //!
-//! The paper gives 20 ranges and a tilt; the flight rover avoided rocks, slopes and drop-offs (Mishkin et al., 1998). Their geometry and
-//! their rules are ours. Distances are in plan.
+//! The paper specifies 20 ranges and a tilt; the flight rover avoided rocks, slopes and drop-offs (Mishkin et al., 1998). Geometry
+//! and rules are our choice. Distances are horizontal.
 
 use super::{Area, Ray, View};
 use crate::rover::draws::{CycleDraws, Purpose};
 use crate::rover::pose::{Axes, Body, Pose};
 use sastrugi_numeric::{Ground, NoGround};
 
-/// Rays are followed to this many nominal ranges.
+/// Rays are traced to this many nominal ranges.
 const REACH: f64 = 2.0;
-/// A ray leaves this share of its column's offset from the centre line.
+/// Lateral offset of a ray's origin, as a share of its column's offset from the centre line.
 const SPREAD: f64 = 0.3;
 /// Steps along a ray, in cells of the ground.
 const STEP_CELLS: f64 = 0.5;
@@ -26,19 +26,19 @@ const STEP_CELLS: f64 = 0.5;
 /// Geometry and limits of a sensor of rays.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RaySensor {
-    /// Nose ahead of the centre, m.
+    /// Distance of the nose ahead of the centre, m.
     pub nose_m: f64,
-    /// The rays leave this far behind the nose, m.
+    /// Distance of the ray origins behind the nose, m.
     pub behind_nose_m: f64,
-    /// Height of their origin above the plane of the body, m.
+    /// Height of the ray origins above the plane of the body, m.
     pub height_m: f64,
-    /// Offsets of the columns to the left, from left to right, m.
+    /// Lateral offsets of the columns, left positive, from left to right, m.
     pub columns_m: Vec<f64>,
-    /// Where the rays of a column are aimed, beyond the nose, near ones first, m.
+    /// Distances beyond the nose at which the rays of a column are aimed, near ones first, m.
     pub rows_m: Vec<f64>,
     /// Hazard height, m.
     pub step_m: f64,
-    /// Largest difference of heights in a view without a hazard, m.
+    /// Largest height difference in a view without a hazard, m.
     pub span_m: f64,
     /// Largest tilt, rad.
     pub tilt_max_rad: f64,
@@ -72,7 +72,7 @@ impl RaySensor {
         Ok(View { areas, rays, tilted: body.tilt_rad() > self.tilt_max_rad })
     }
 
-    /// The ground under a column, halfway to its neighbours.
+    /// The strip of ground of a column, halfway to its neighbours.
     fn strip(&self, column: usize, hazard: bool) -> Area {
         let at = |k: usize| self.columns_m[k];
         let last = self.columns_m.len() - 1;
@@ -106,7 +106,7 @@ impl RaySensor {
             let [x, y] = axes.to_ground(point(t));
             let gap = above(t) - (ground.at(x, y)?.height_m - body.height_at_m(point(t)));
             if gap <= 0.0 {
-                // Between the last step and this one, as far as both are off; at the origin itself there is no last one.
+                // Interpolate between the last step and this one; at the origin there is no last step.
                 let back = if last.is_finite() { gap / (gap - last) } else { 0.0 };
                 let hit = t - back * REACH / f64::from(steps);
                 let to_m = space(hit, body.height_at_m(point(hit)) + above(hit));
@@ -118,7 +118,7 @@ impl RaySensor {
         Ok(Ray { from_m, to_m, height_m: None, place_m: point(1.0), hazard: false })
     }
 
-    /// Hazard of each ray, from the heights column by column.
+    /// Hazard flag of each ray, from the heights column by column.
     pub(crate) fn hazards(&self, heights: &[Option<f64>]) -> Vec<bool> {
         let rows = self.rows_m.len();
         let too_high = |v: &Option<f64>| v.is_none_or(|v| v.abs() > self.step_m);

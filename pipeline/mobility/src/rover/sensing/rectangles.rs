@@ -1,9 +1,9 @@
 //! Rectangles ahead, safe or unsafe, by perfect knowledge of the ground in them.
 //!
-//! A rectangle is unsafe where a pixel of rock stands higher than the clearance above the sand around it, or where the sand is steep.
-//! The sand is the least-squares plane through the rectangle's pixels of sand; where these are too few, through those of all
-//! rectangles, and without any the plane of the body. The paper gives the size, the four rectangles, and that they come from
-//! the DEM and the map of rock and sand; the rule is ours.
+//! A rectangle is unsafe if a rock pixel in it is higher above the sand than the clearance, or if the sand is too steep. The sand is
+//! the least-squares plane through the sand pixels of the rectangle; if these are too few, through those of all rectangles; and if
+//! these are too few as well, the plane of the body. The paper gives the size, the four rectangles, and that they are derived from
+//! the DEM and the map of rock and sand; the rule is our choice.
 
 use super::{Area, View};
 use crate::rover::draws::{CycleDraws, Purpose};
@@ -14,15 +14,15 @@ use sastrugi_numeric::{Ground, GroundClass, NoGround};
 /// Geometry and limits of a sensor of rectangles.
 #[derive(Clone, Debug, PartialEq)]
 pub struct RectangleSensor {
-    /// Its near edge ahead of the centre, m.
+    /// Distance of the near edge ahead of the centre, m.
     pub near_m: f64,
-    /// Extent ahead, m.
+    /// Length, m.
     pub length_m: f64,
-    /// Extent to both sides together, m.
+    /// Total width, m.
     pub width_m: f64,
-    /// Rectangles side by side.
+    /// Number of rectangles side by side.
     pub count: usize,
-    /// Height of a rock above the sand that the rover can pass over, m.
+    /// Largest height of a rock above the sand that the rover can pass over, m.
     pub clearance_m: f64,
     /// Steepest sand, m per m.
     pub slope_max: f64,
@@ -53,7 +53,7 @@ impl RectangleSensor {
         }
         let sand = |pixels: &Vec<Pixel>| {
             let mut sums = PlaneSums::default();
-            // Heights near 0, where squares lose no digits.
+            // Heights relative to the body, so that squares lose no digits.
             let of_sand = pixels.iter().filter(|p| !p.is_rock);
             of_sand.for_each(|p| sums.add(p.at, p.height_m - body.height_m));
             sums
@@ -73,7 +73,7 @@ impl RectangleSensor {
         Ok(View { areas, rays: Vec::new(), tilted: body.tilt_rad() > self.tilt_max_rad })
     }
 
-    /// Right and left edge of a rectangle, from the left.
+    /// Right and left edge of a rectangle; rectangles are numbered from the left.
     fn sides(&self, number: usize) -> [f64; 2] {
         let each = self.width_m / self.count as f64;
         let left = 0.5 * self.width_m - number as f64 * each;

@@ -9,9 +9,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum DriveParameters {
-    /// The wheels of one side turn together; the vehicle turns by driving its sides at different speeds.
+    /// The wheels of a side turn together; the vehicle turns by driving its sides at different speeds.
     SkidSteer(SkidSteerParameters),
-    /// Every wheel has a motor; the wheels of some axles steer, so that all wheels roll about one centre of turning.
+    /// Every wheel has a motor; the wheels of some axles steer so that all wheels roll about one centre of turning.
     Ackermann(AckermannParameters),
 }
 
@@ -21,7 +21,7 @@ pub enum DriveParameters {
 pub struct SkidSteerParameters {
     /// Largest torque of a side, N m.
     pub torque_limit_n_m: f64,
-    /// Torque of a side per difference between commanded and actual wheel speed, N m s/rad.
+    /// Torque of a side per unit difference between commanded and actual wheel speed, N m s/rad.
     pub servo_gain_n_m_s: f64,
     /// Largest commanded speed, m/s.
     pub speed_limit_m_s: f64,
@@ -31,16 +31,16 @@ pub struct SkidSteerParameters {
     pub yaw_rate_limit_rad_s: f64,
     /// Largest change of the commanded yaw rate, rad/s2.
     pub yaw_acceleration_limit_rad_s2: f64,
-    /// The wheel speeds are computed for a track wider by this factor, which makes up for the skidding.
+    /// Wheel speeds are computed for a track wider by this factor, to compensate for skidding.
     pub track_multiplier: f64,
 }
 
-/// Steered wheels, each with its own motor. The centre of turning lies beside the axles that do not steer (beside the origin
-/// of base_link where all of them do). Steering angles follow their commands at a limited rate, whatever the load.
+/// Steered wheels, each with its own motor. The centre of turning lies abeam of the unsteered axles (of the origin of
+/// base_link if all axles steer). Steering angles follow their commands at a limited rate, whatever the load.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AckermannParameters {
-    /// Axles whose wheels steer, by number from the front, which is 0.
+    /// Indices of the axles whose wheels steer, counted from the front, which is 0.
     pub steered_axles: Vec<u32>,
     /// Largest steering angle of a wheel to either side, deg, below 90.
     pub steering_limit_deg: f64,
@@ -50,7 +50,7 @@ pub struct AckermannParameters {
     pub spot_turn: bool,
     /// Largest torque of a wheel, N m.
     pub torque_limit_n_m: f64,
-    /// Torque of a wheel per difference between commanded and actual speed, N m s/rad.
+    /// Torque of a wheel per unit difference between commanded and actual speed, N m s/rad.
     pub servo_gain_n_m_s: f64,
     /// Largest commanded speed, m/s.
     pub speed_limit_m_s: f64,
@@ -63,7 +63,7 @@ pub struct AckermannParameters {
 }
 
 impl DriveParameters {
-    /// Checks every number, for a vehicle with that many axles.
+    /// Checks every number, for a vehicle with `axles` axles.
     pub(super) fn check(&self, axles: usize) -> Result<(), ParameterError> {
         match self {
             Self::SkidSteer(drive) => drive.check(),
@@ -100,7 +100,7 @@ impl AckermannParameters {
         ParameterError::between("steering_limit_deg", self.steering_limit_deg, 0.0, 90.0)?;
         let key = "steered_axles";
         if self.steered_axles.is_empty() {
-            return Err(ParameterError::new(key, "is empty; a vehicle of this drive has at least one steered axle"));
+            return Err(ParameterError::new(key, "is empty; this drive needs at least one steered axle"));
         }
         match self.steered_axles.iter().find(|&&axle| axle as usize >= axles) {
             Some(axle) => Err(ParameterError::new(key, format!("names axle {axle}; the axles are 0 to {}", axles - 1))),

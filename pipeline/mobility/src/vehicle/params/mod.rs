@@ -16,13 +16,13 @@ use serde::{Deserialize, Serialize};
 pub struct VehicleParameters {
     /// Body without wheels.
     pub chassis: ChassisParameters,
-    /// Wheels: one on either side of every axle.
+    /// Wheels: one at each end of every axle.
     pub wheels: WheelParameters,
-    /// How the wheels hang on the chassis.
+    /// Suspension of the wheels.
     pub suspension: SuspensionParameters,
-    /// Contact of a wheel with the ground.
+    /// Contact between wheel and ground.
     pub tyre: TyreParameters,
-    /// Contact of the chassis with the ground.
+    /// Contact between chassis and ground.
     pub belly: BellyParameters,
     /// Motors and steering.
     pub drive: DriveParameters,
@@ -44,13 +44,13 @@ pub struct ChassisParameters {
     pub bottom_z_m: f64,
 }
 
-/// Wheels: one on either side of every axle.
+/// Wheels: one at each end of every axle.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct WheelParameters {
-    /// Position of the axles along x in base_link, front to rear, m.
+    /// Positions of the axles along x in base_link, front to rear, m.
     pub axles_m: Vec<f64>,
-    /// Distance between the middle planes of a left and a right wheel, m.
+    /// Distance between the centre planes of a left and a right wheel, m.
     pub track_m: f64,
     /// Height of the axles in base_link, m.
     pub axle_z_m: f64,
@@ -66,11 +66,11 @@ pub struct WheelParameters {
     pub transverse_inertia_kg_m2: f64,
 }
 
-/// Contact of a wheel with the ground.
+/// Contact between wheel and ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TyreParameters {
-    /// Static load over static sag on level ground, N/m; the stiffness of each rim ray follows from it.
+    /// Static load divided by static sag on level ground, N/m; the stiffness of each rim ray follows from it.
     pub stiffness_n_m: f64,
     /// Damping along the contact normal, N s/m per wheel.
     pub damping_n_s_m: f64,
@@ -78,34 +78,34 @@ pub struct TyreParameters {
     pub tangential_stiffness_n_m: f64,
     /// Damping of the tread in the contact plane, N s/m per wheel.
     pub tangential_damping_n_s_m: f64,
-    /// Distance rolled over which the tread forgets its deflection, m.
+    /// Rolling distance over which a tread deflection decays, m.
     pub relaxation_length_m: f64,
     /// Discs across the width of a wheel, 1 to 9.
     pub discs: u32,
     /// Rays on the rim of each disc, 3 to 181.
     pub rays: u32,
-    /// The rays span this angle to either side of the body's down direction, deg, 10 to 120.
+    /// Angle that the rays span on each side of the body's down direction, deg, 10 to 120.
     pub fan_deg: f64,
 }
 
-/// Contact of the chassis with the ground.
+/// Contact between chassis and ground.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BellyParameters {
     /// Contact points along and across the bottom plate, 2 to 101 each.
     pub points: [u32; 2],
-    /// Height of three contact points each on the front and rear bumper in base_link, m.
+    /// Height in base_link of the contact points on the bumpers (three at the front, three at the rear), m.
     pub bumper_z_m: f64,
     /// Stiffness of a contact point, normal and tangential, N/m.
     pub stiffness_n_m: f64,
-    /// Normal damping as a share of the elastic force per approach speed (Hunt and Crossley, 1975), s/m.
+    /// Normal damping as a fraction of the elastic force per unit approach speed (Hunt and Crossley, 1975), s/m.
     pub dissipation_s_m: f64,
     /// Damping of a contact point in the contact plane, N s/m.
     pub tangential_damping_n_s_m: f64,
 }
 
 impl VehicleParameters {
-    /// Checks every number and how they fit together.
+    /// Checks every number and their consistency.
     pub(crate) fn check(&self) -> Result<(), ParameterError> {
         self.chassis.check().map_err(|e| e.within("chassis"))?;
         self.wheels.check().map_err(|e| e.within("wheels"))?;
@@ -117,7 +117,7 @@ impl VehicleParameters {
         self.check_balance()
     }
 
-    /// The vehicle stands on its wheels: its centre of mass lies between them.
+    /// The centre of mass must lie between the wheels.
     fn check_balance(&self) -> Result<(), ParameterError> {
         let [x, y, _] = self.chassis.centre_of_mass_m;
         let axles = &self.wheels.axles_m;
@@ -131,13 +131,16 @@ impl VehicleParameters {
         }
         let half_track = 0.5 * self.wheels.track_m;
         if y.abs() >= half_track {
-            return Err(ParameterError::new(key, format!("y is {y}; it must lie within {half_track} m of the middle")));
+            return Err(ParameterError::new(
+                key,
+                format!("y is {y}; it must lie within {half_track} m of the centre line"),
+            ));
         }
         Ok(())
     }
 }
 
-/// Most axles of a vehicle.
+/// Maximum number of axles.
 pub(crate) const AXLES_MAX: usize = 9;
 
 /// `Ok` when every named value is finite and above 0.
@@ -184,16 +187,16 @@ impl WheelParameters {
         self.check_room()
     }
 
-    /// No wheel stands inside another.
+    /// Wheels must not overlap.
     fn check_room(&self) -> Result<(), ParameterError> {
         if !(2..=AXLES_MAX).contains(&self.axles_m.len()) {
-            let message = format!("lists {} axles; it takes 2 to {AXLES_MAX}, front to rear", self.axles_m.len());
+            let message = format!("lists {} axles; it must list 2 to {AXLES_MAX}, front to rear", self.axles_m.len());
             return Err(ParameterError::new("axles_m", message));
         }
         let diameter = 2.0 * self.radius_m;
         if let Some(pair) = self.axles_m.windows(2).find(|pair| pair[0] - pair[1] < diameter) {
             let message = format!(
-                "{} and {} are less than a wheel diameter of {diameter} m apart, or not front to rear",
+                "{} and {} are less than the wheel diameter of {diameter} m apart, or not in order from front to rear",
                 pair[0], pair[1]
             );
             return Err(ParameterError::new("axles_m", message));

@@ -1,24 +1,24 @@
-//! How the wheels hang on the chassis.
+//! Suspension of the wheels.
 
 use super::{all_positive, finite};
 use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How the wheels hang on the chassis.
+/// Suspension of the wheels.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "snake_case")]
 pub enum SuspensionParameters {
     /// Axles fixed to the chassis.
     Rigid,
-    /// Every wheel moves up and down by itself, on a spring and a damper.
+    /// Every wheel moves up and down independently, on a spring and a damper.
     Independent(IndependentParameters),
-    /// Three axles without springs: on either side a rocker carries the front wheel and, on a bogie, the middle and the rear
-    /// wheel; a differential turns the rockers of both sides by opposite angles.
+    /// Three axles without springs: on each side, a rocker carries the front wheel and a bogie with the middle and rear
+    /// wheels; a differential turns the two rockers by opposite angles.
     RockerBogie(RockerBogieParameters),
 }
 
-/// Springs and dampers of single wheels. At zero travel every spring carries an equal share of the chassis.
+/// Spring and damper of each wheel. At zero travel every spring carries an equal share of the chassis weight.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct IndependentParameters {
@@ -26,11 +26,11 @@ pub struct IndependentParameters {
     pub stiffness_n_m: f64,
     /// Damping at the wheel, N s/m.
     pub damping_n_s_m: f64,
-    /// Travel of the wheel from zero up to the stop, m.
+    /// Upward travel of the wheel from zero to the stop, m.
     pub bump_m: f64,
-    /// Travel of the wheel from zero down to the stop, m.
+    /// Downward travel of the wheel from zero to the stop, m.
     pub droop_m: f64,
-    /// Stiffness of either stop, N/m.
+    /// Stiffness of each stop, N/m.
     pub stop_stiffness_n_m: f64,
 }
 
@@ -42,18 +42,18 @@ pub struct RockerBogieParameters {
     pub rocker_pivot_m: [f64; 2],
     /// Pivot of the bogies on the rockers in base_link with all joints at zero, `[x, z]`, m.
     pub bogie_pivot_m: [f64; 2],
-    /// Largest angle of a rocker to either side, deg, below 90.
+    /// Largest angle of a rocker in either direction, deg, below 90.
     pub rocker_limit_deg: f64,
-    /// Largest angle of a bogie against its rocker to either side, deg, below 90.
+    /// Largest angle of a bogie relative to its rocker in either direction, deg, below 90.
     pub bogie_limit_deg: f64,
-    /// Friction of a joint as damping, N m s/rad.
+    /// Joint friction, modelled as damping, N m s/rad.
     pub damping_n_m_s: f64,
     /// Stiffness of the stops, N m/rad.
     pub stop_stiffness_n_m: f64,
 }
 
 impl SuspensionParameters {
-    /// Checks every number, for a vehicle with axles there, front to rear.
+    /// Checks every number, for a vehicle with axles at `axles_m`, front to rear.
     pub(super) fn check(&self, axles_m: &[f64]) -> Result<(), ParameterError> {
         match self {
             Self::Rigid => Ok(()),
@@ -98,7 +98,7 @@ impl RockerBogieParameters {
             let message = format!("x is {x}; it must lie between {what}, {low} to {high} m");
             if x > low && x < high { Ok(()) } else { Err(ParameterError::new(key, message)) }
         };
-        between("bogie_pivot_m", bogie, rear, middle, "the rear and the middle axle")?;
+        between("bogie_pivot_m", bogie, rear, middle, "the rear and middle axles")?;
         between("rocker_pivot_m", rocker, bogie, front, "the bogie pivot and the front axle")
     }
 }

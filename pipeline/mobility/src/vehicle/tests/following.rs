@@ -10,7 +10,7 @@ fn line(points_m: &[[f64; 2]]) -> Polyline {
     Polyline::new(points_m).unwrap()
 }
 
-/// An arc about a centre from one angle through another, deg, in segments of about 1 deg.
+/// An arc about a centre, of `through_deg` from `from_deg`, in segments of about 1 deg.
 fn arc([x, y]: [f64; 2], radius_m: f64, from_deg: f64, through_deg: f64) -> Vec<[f64; 2]> {
     let count = through_deg.abs().ceil();
     let at = |k: f64| {
@@ -20,7 +20,7 @@ fn arc([x, y]: [f64; 2], radius_m: f64, from_deg: f64, through_deg: f64) -> Vec<
     (0..=count as usize).map(|k| at(k as f64)).collect()
 }
 
-/// Two circles side by side, one to the left and one to the right; start, crossing and goal are the same point.
+/// A left and a right circle side by side; start, crossing and goal are the same point.
 fn figure_eight([x, y]: [f64; 2], radius_m: f64) -> Polyline {
     let left = arc([x - radius_m, y], radius_m, 0.0, 360.0);
     let right = arc([x + radius_m, y], radius_m, 180.0, -360.0);
@@ -37,28 +37,28 @@ fn followed(dem: &Grid, vehicle: &str, along: &Polyline) -> (Mission, Recording)
     (mission, recording)
 }
 
-/// Steady circle of a vehicle that pursues a circle of radius R at look-ahead L along it, by bisection of `turn(rho)`, the curvature
-/// that it takes less the one that keeps it on the circle of radius `rho`.
+/// Steady circle of a vehicle that pursues a circle of radius R at look-ahead L along it, by bisection of `turn(rho)`: the
+/// commanded curvature minus the curvature that keeps it on the circle of radius `rho`.
 fn steady_radius_m(radius_m: f64, turn: impl Fn(f64) -> f64) -> f64 {
     let (mut low, mut high) = (0.7 * radius_m, 1.5 * radius_m);
     for _ in 0..60 {
         let middle = 0.5 * (low + high);
-        // Farther out the pursuit turns more tightly than the circle asks.
+        // Farther out, pursuit turns more tightly than the circle requires.
         if turn(middle) > 0.0 { high = middle } else { low = middle }
     }
     0.5 * (low + high)
 }
 
-/// Bearing left of the tangent, and distance, of the look-ahead point from a vehicle on a circle of radius `rho` about the same centre.
+/// Bearing left of the tangent, and distance, of the look-ahead point for a vehicle on a concentric circle of radius `rho`.
 fn sight(rho: f64, radius_m: f64, lookahead_m: f64) -> (f64, f64) {
     let (sin, cos) = libm::sincos(lookahead_m / radius_m);
     let (left, ahead) = (rho - radius_m * cos, radius_m * sin);
     (libm::atan2(left, ahead), (left * left + ahead * ahead).sqrt())
 }
 
-/// A point vehicle that does as it is told, on three laps of a circle, with gains g of the steering. On the circle of radius rho it is
-/// steady where `2 g sin a / d = 1 / rho`, or `(2 g - 1) rho^2 + 2 (1 - g) R cos(L / R) rho - R^2 = 0`; the plain arc (g = 1) has no
-/// error. Tolerance 2 mm: sagitta of the segments 0.2 mm, travel within a control period 20 mm.
+/// A point vehicle that follows its commands exactly, on three laps of a circle, with steering gains g. It is steady on the circle
+/// of radius rho where `2 g sin a / d = 1 / rho`, or `(2 g - 1) rho^2 + 2 (1 - g) R cos(L / R) rho - R^2 = 0`; the plain arc
+/// (g = 1) has no error. Tolerance 2 mm: sagitta of the segments 0.2 mm, travel within a control period 20 mm.
 #[test]
 fn val_pursuit_of_a_circle_has_the_closed_form_error() {
     const RADIUS_M: f64 = 6.0;
@@ -91,9 +91,9 @@ fn val_pursuit_of_a_circle_has_the_closed_form_error() {
     }
 }
 
-/// The car on two laps: its middle, which is steered to the circle, lies b = 1.35 m before the axle that it turns about, so that it looks
-/// `asin(b / rho)` out of the circle, and the balance is `2 sin(a + asin(b / rho)) / d = 1 / sqrt(rho^2 - b^2)`. Tolerance 2 cm of
-/// an error of 84 cm to the inside.
+/// The car on two laps: its centre, which is steered along the circle, lies b = 1.35 m ahead of the axle about which it turns, so
+/// it points `asin(b / rho)` outwards, and the balance is `2 sin(a + asin(b / rho)) / d = 1 / sqrt(rho^2 - b^2)`. Tolerance
+/// 2 cm of an error of 84 cm to the inside.
 #[test]
 fn val_a_car_on_a_circle_has_the_closed_form_error() {
     const RADIUS_M: f64 = 12.0;
@@ -110,8 +110,8 @@ fn val_a_car_on_a_circle_has_the_closed_form_error() {
     assert!((found - expected).abs() < 0.02, "{found} {expected}");
 }
 
-/// A polyline of two points, and one with a vertex in the middle, drive as the straight mission does: same time to a sample,
-/// same place to 1 mm.
+/// A polyline of two points, and one with a vertex in the middle, give the same drive as the straight mission: same time to a
+/// sample, same position to 1 mm.
 #[test]
 fn val_a_straight_polyline_is_the_straight_mission() {
     let dem = terrain([25.0, 10.0], |x, y| 0.03 * libm::sin(2.0 * x + y));
@@ -130,7 +130,7 @@ fn val_a_straight_polyline_is_the_straight_mission() {
     }
 }
 
-/// Straight missions are written as before there were polylines, and read back; so are polylines.
+/// Straight missions are written without a polyline key and read back; missions along polylines round-trip too.
 #[test]
 fn gold_missions_in_files() {
     let straight = Mission::between(0, [1.0, 2.0], [3.0, 2.0]);
@@ -143,8 +143,8 @@ fn gold_missions_in_files() {
     }
 }
 
-/// Every vehicle drives a figure eight whose start, crossing and goal are one point: it arrives after both loops, not before. Path and
-/// time are those of the whole line within 10 %; the error stays below a quarter of the radius.
+/// Every vehicle drives a figure eight whose start, crossing and goal coincide: it arrives after both loops, not before. Path and
+/// time are those of the complete line within 10 %; the error stays below a quarter of the radius.
 #[test]
 fn val_every_vehicle_drives_a_figure_eight() {
     let dem = flat(50.0);
@@ -160,8 +160,8 @@ fn val_every_vehicle_drives_a_figure_eight() {
     }
 }
 
-/// A square back to its start, corners of 120 deg, and a dead end: the whole line is followed, within the look-ahead
-/// distance of it by vehicles that turn on the spot.
+/// A closed square, corners of 120 deg, and a dead end: vehicles that turn on the spot follow the complete line, within the
+/// look-ahead distance.
 #[test]
 fn val_sharp_corners_are_driven() {
     let dem = flat(50.0);
@@ -180,9 +180,9 @@ fn val_sharp_corners_are_driven() {
     }
 }
 
-/// The car swings wide at corners that it cannot turn at, and comes round to the goal.
+/// The car swings wide at corners too sharp for it, and still reaches the goal.
 #[test]
-fn val_a_car_comes_round_sharp_corners() {
+fn val_a_car_swings_wide_at_sharp_corners() {
     let dem = flat(60.0);
     let square = line(&[[15.0, 15.0], [45.0, 15.0], [45.0, 45.0], [15.0, 45.0], [15.0, 15.0]]);
     let zigzag = line(&[[10.0, 20.0], [45.0, 20.0], [25.0, 45.0]]);
@@ -202,16 +202,16 @@ fn prop_repeated_points_change_no_bit() {
     assert_eq!(outcome(&a).kind, EventKind::Success);
 }
 
-/// A polyline that the vehicle cannot finish ends as any mission does, with what is left of the line.
+/// A polyline that the vehicle cannot finish ends like any mission; the event gives the remaining length of the line.
 #[test]
-fn val_what_is_left_is_told_along_the_line() {
+fn val_remaining_distance_is_measured_along_the_line() {
     let square = line(&[[4.0, 4.0], [10.0, 4.0], [10.0, 10.0], [4.0, 10.0], [4.0, 4.0]]);
     let recording = run(&flat(14.0), &Mission::along(0, square), |p| p.timeout_s = 3.0);
     let event = outcome(&recording);
     let left_m: f64 = event.text.split(' ').next().unwrap().parse().unwrap();
-    assert_eq!(event.kind, EventKind::Timeout);
+    assert_eq!((event.kind, event.time_s), (EventKind::Timeout, 3.0));
     assert!((20.5..22.0).contains(&left_m), "{}", event.text);
-    assert!(recording.events[0].text.ends_with("24.00 m to follow"));
+    assert!(recording.events[0].text.ends_with("course of 24.00 m"));
 }
 
 #[test]
@@ -228,7 +228,7 @@ fn val_lookahead_grows_with_the_commanded_speed() {
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(48))]
 
-    /// No polyline makes the steering panic, or the mission end without an outcome.
+    /// On any polyline, the steering does not panic and the mission ends with an outcome.
     #[test]
     fn prop_any_polyline_has_an_outcome(
         points in prop::collection::vec(prop::array::uniform2(prop_oneof![

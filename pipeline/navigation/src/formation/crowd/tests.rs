@@ -10,7 +10,7 @@ fn level(side: usize) -> TravelMap {
     map_of(side, side, limits(30.0, 30.0), |_, _| 0.0)
 }
 
-/// What became of members with one target each.
+/// Result of a run with one target per member.
 struct End {
     stuck: Option<usize>,
     arrived: usize,
@@ -48,7 +48,7 @@ fn run(map: &TravelMap, ends: &[[Vector; 2]]) -> End {
 #[test]
 fn val_a_member_alone_goes_straight() {
     let end = run(&level(60), &[[[10.5, 30.5], [40.5, 30.5]]]);
-    // 30 m less the metre at which it has arrived, at 0.1 m a step.
+    // 30 m less the metre within which it has arrived, at 0.1 m per step.
     assert!((290..=291).contains(&end.steps), "{}", end.steps);
     assert!((end.motions[0].position_m[1] - 30.5).abs() < 1e-9);
 }
@@ -63,23 +63,22 @@ fn val_members_head_on_pass_each_other() {
     }
 }
 
-/// Two lines of members that change places, each the mirror image of the other.
+/// Two lines of members that exchange positions, each the mirror image of the other.
 #[test]
-fn val_mirrored_teams_change_places() {
+fn val_mirrored_teams_exchange_positions() {
     let line = |k: usize| 20.5 + 3.0 * k as f64;
     for members in 1..=5 {
         let east = (0..members).map(|k| [[10.5, line(k)], [45.5, line(k)]]);
         let west = (0..members).map(|k| [[45.5, line(k)], [10.5, line(k)]]);
         let end = run(&level(60), &east.chain(west).collect::<Vec<_>>());
-        assert!(end.stuck.is_some() || end.arrived == 2 * members);
+        assert_eq!((end.stuck, end.arrived), (None, 2 * members), "{members} a side");
         assert!(end.least_m >= 1.0 - 1e-9, "{}", end.least_m);
-        assert_eq!(end.stuck, None, "{members} a side");
     }
 }
 
-/// Members on a ring, each with its target on the other side: they all meet in the middle.
+/// Members on a ring, each with its target on the opposite side, so that they all meet in the middle.
 #[test]
-fn val_rings_arrive_or_are_stuck() {
+fn val_rings_of_members_arrive() {
     let map = level(80);
     for members in 2..=16 {
         let at = |k: usize| {
@@ -94,8 +93,8 @@ fn val_rings_arrive_or_are_stuck() {
 }
 
 #[test]
-fn val_a_passage_of_one_cell_is_not_for_two() {
-    // Head-on in a passage without a place to pass: stuck, and it says so.
+fn val_two_members_cannot_pass_in_a_passage_of_one_cell() {
+    // Head-on in a passage without a place to pass: stuck, and reported as such.
     let map = drawn(&["##########", "..........", "##########"]);
     let [a, b] = [0, 9].map(|col| map.position_m(map.node(1, col)));
     let end = run(&map, &[[a, b], [b, a]]);
@@ -105,8 +104,8 @@ fn val_a_passage_of_one_cell_is_not_for_two() {
 }
 
 #[test]
-fn val_as_in_the_thesis_a_dead_end_is_a_repeated_state() {
-    // A pocket that opens away from the goal: the directions of Algorithm 7 lead nowhere, a detour does.
+fn val_without_detours_a_dead_end_is_a_repeated_state() {
+    // A pocket that opens away from the goal: the directions of Algorithm 7 make no progress, a detour does.
     let map = drawn(&[
         "............",
         "..#######...",
@@ -147,13 +146,13 @@ fn val_moving_obstacles_are_dodged() {
             assert_eq!((end.arrived, end.contacts), (1, 0), "{points_m:?} at {speed_m_s} m/s");
         }
     }
-    // One that stands in the way is gone round.
+    // A stationary obstacle is passed.
     let end = run_with(&map, SETTINGS, &ends, vec![obstacle([[25.5, 30.5]; 2], 1.0)]);
     assert_eq!((end.arrived, end.contacts), (1, 0));
 }
 
 #[test]
-fn val_the_lost_are_gone_round() {
+fn val_lost_members_are_passed() {
     let map = level(60);
     let costs = thesis_costs(&map);
     let on = TeamGround::new(ground(&map, &costs));
@@ -166,7 +165,7 @@ fn val_the_lost_are_gone_round() {
     assert_eq!(crowd.motions()[0].position_m, starts_m[0]);
 }
 
-/// The closest approach of two straight moves against many points on the way.
+/// The closest approach of two straight moves against many intermediate points.
 #[test]
 fn prop_closest_approach_is_the_least_distance() {
     let mut random = crate::testing::Random(3);
@@ -177,5 +176,21 @@ fn prop_closest_approach_is_the_least_distance() {
         let least = sampled.fold(f64::INFINITY, f64::min);
         let exact = closest_approach(offset, motion);
         assert!(exact <= least + 1e-12 && least - exact < 5e-3, "{exact} {least}");
+    }
+}
+
+#[test]
+fn val_discs_touch_if_they_approach_closer_than_their_radii() {
+    for (offset_m, motion_m, expected) in [
+        ([2.0, 0.0], [-1.5, 0.0], true),
+        ([2.0, 0.0], [-0.5, 0.0], false),
+        // Passing exactly at the least distance, and a little closer.
+        ([2.0, 1.0], [-4.0, 0.0], false),
+        ([2.0, 0.99], [-4.0, 0.0], true),
+        // Closer already: leaving is allowed, coming closer still is not.
+        ([0.5, 0.0], [1.0, 0.0], false),
+        ([0.5, 0.0], [-0.2, 0.0], true),
+    ] {
+        assert_eq!(touches(offset_m, motion_m, 1.0), expected, "{offset_m:?} by {motion_m:?}");
     }
 }

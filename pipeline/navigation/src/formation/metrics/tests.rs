@@ -8,6 +8,11 @@ fn val_errors_have_their_signs() {
     assert_eq!(errors([5.0, -12.0]), [2.0, 0.0]);
     assert_eq!(errors([8.0, -10.0]), [0.0, 3.0]);
     assert_eq!(errors([5.0, -9.0]), [-1.0, 0.0]);
+    // The same heading east: the slot is to the west and to the south.
+    let errors = |follower_m| errors_m([0.0, 0.0], [1.0, 0.0], follower_m, [10.0, 5.0]);
+    assert_eq!(errors([-10.0, -5.0]), [0.0, 0.0]);
+    assert_eq!(errors([-12.0, -5.0]), [2.0, 0.0]);
+    assert_eq!(errors([-10.0, -8.0]), [0.0, 3.0]);
 }
 
 #[test]

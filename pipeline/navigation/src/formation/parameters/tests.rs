@@ -54,3 +54,20 @@ fn val_custom_slots_are_the_team() {
     let both = TeamParameters { members: Some(3), ..custom };
     assert_eq!(both.check().unwrap_err().key, "members");
 }
+
+#[test]
+fn val_legs_are_as_long_as_the_spacing_unless_stated() {
+    let plain = TeamParameters { spacing_m: 7.0, ..TeamParameters::default() };
+    assert_eq!(plain.leg_max_m(), 7.0);
+    assert_eq!(TeamParameters { waypoint_spacing_m: Some(3.0), ..plain.clone() }.leg_max_m(), 3.0);
+    assert_eq!(TeamParameters { literal_waypoints: true, ..plain }.leg_max_m(), f64::INFINITY);
+}
+
+#[test]
+fn val_samples_are_a_number_of_steps_apart() {
+    let every = |sample_rate_hz, step_s| {
+        TeamParameters { sample_rate_hz, step_s, ..TeamParameters::default() }.sample_every().ok()
+    };
+    assert_eq!([every(10.0, 0.1), every(2.0, 0.1), every(0.5, 0.25)], [Some(1), Some(5), Some(8)]);
+    assert_eq!([every(4.0, 0.1), every(20.0, 0.1)], [None, None]);
+}

@@ -37,7 +37,7 @@ fn val_open_ground_reproduces_the_offsets() {
                 let expected_m = add(leader_m, sub(scale(right, width_m), scale(forward, depth_m)));
                 assert!(distance(*target_m, expected_m) < 1e-9, "{pattern:?} {k}");
             }
-            // The front of the box has its middle at the waypoint.
+            // The middle of the box's front is at the waypoint.
             let [a, b, ..] = placements[0].corners_m;
             assert!(distance(scale(add(a, b), 0.5), route_m[0]) < 1e-9);
         }
@@ -50,7 +50,7 @@ fn val_the_last_waypoint_keeps_the_heading() {
     assert_eq!(placements[1].targets_m[1], [50.5, 40.5]);
 }
 
-/// Level ground with free rows `free`, 0 north.
+/// Level ground with free rows `free`, counted from the north.
 fn corridor(free: std::ops::Range<usize>) -> TravelMap {
     let mut map = level(101, 101);
     let walls: Vec<u32> = (0..map.len() as u32).filter(|n| !free.contains(&map.place(*n)[0])).collect();
@@ -60,7 +60,7 @@ fn corridor(free: std::ops::Range<usize>) -> TravelMap {
 
 #[test]
 fn val_a_corridor_compresses_the_width() {
-    // Free rows 40 to 55, so that between the outer ones there are 15 m for the 30 m of the line.
+    // Free rows 40 to 55, which leave 15 m between the outer ones for the 30 m of the line.
     let map = corridor(40..56);
     let middle_m = map.position_m(map.node(48, 60));
     let route_m = [middle_m, add(middle_m, [20.0, 0.0])];
@@ -84,8 +84,8 @@ fn val_a_wall_behind_compresses_the_depth() {
 }
 
 #[test]
-fn val_a_lone_rock_moves_one_member() {
-    // The rock lies where slot 3 of the wedge would be; the other slots stay where they are in the open.
+fn val_an_isolated_rock_moves_one_member() {
+    // The rock is where slot 3 of the wedge would be; the other slots stay where they are in open ground.
     let mut map = level(121, 121);
     let waypoint_m = map.position_m(map.node(60, 60));
     let route_m = [sub(waypoint_m, [30.0, 0.0]), waypoint_m, add(waypoint_m, [20.0, 0.0])];
@@ -100,7 +100,7 @@ fn val_a_lone_rock_moves_one_member() {
 
 #[test]
 fn val_targets_that_collapse_are_pushed_back_along_the_route() {
-    // A passage of one cell: all four of a line stand one behind the other.
+    // A passage of one cell: the four members of a line stand one behind another.
     let map = corridor(50..51);
     let at = |col: usize| map.position_m(map.node(50, col));
     let placements = placed(&map, &formation(Pattern::Line), &[at(40), at(60), at(80)], &[]);
@@ -113,7 +113,7 @@ fn val_targets_that_collapse_are_pushed_back_along_the_route() {
 }
 
 #[test]
-fn val_targets_keep_clear_of_the_lost() {
+fn val_targets_keep_clear_of_lost_members() {
     let map = level(81, 81);
     let waypoint_m = map.position_m(map.node(40, 40));
     let route_m = [sub(waypoint_m, [30.0, 0.0]), waypoint_m];
@@ -124,7 +124,7 @@ fn val_targets_keep_clear_of_the_lost() {
 }
 
 #[test]
-fn val_a_place_without_room_is_squeezed() {
+fn val_a_waypoint_without_room_is_squeezed() {
     // A closed pocket of two cells.
     let map = drawn(&["######", "#..###", "######"]);
     let [a, b] = [1, 2].map(|col| map.position_m(map.node(1, col)));
@@ -137,7 +137,7 @@ fn val_a_place_without_room_is_squeezed() {
     assert!(!placed(&map, &alone.unwrap(), &[a, b], &[])[1].squeezed);
 }
 
-/// On any ground: every target can be stood on, and the targets of a waypoint that is not squeezed are apart.
+/// On any ground, members can stand on every target, and the targets of a waypoint that is not squeezed keep their separation.
 #[test]
 fn prop_targets_are_on_the_ground_and_apart() {
     let mut random = Random(7);

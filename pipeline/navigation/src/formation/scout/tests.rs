@@ -6,7 +6,7 @@ use crate::formation::{Outcome, TeamParameters};
 use crate::testing::{ground, hills, limits, map_of, thesis_costs};
 use crate::{Method, RouteSettings};
 
-/// Sees the whole of every map here.
+/// Sees all of every map here.
 const ALL_M: f64 = 1e4;
 
 fn seeing(sensing_radius_m: Option<f64>) -> TeamParameters {
@@ -17,9 +17,9 @@ struct Run {
     outcome: Outcome,
     metrics: Metrics,
     events: Vec<EventKind>,
-    /// Places of the leader with the way that it made for from there.
+    /// Positions of the leader, with the route that it followed from there.
     ways: Vec<Vec<Vector>>,
-    /// What the leader drove, m.
+    /// Distance driven by the leader, m.
     driven_m: f64,
 }
 
@@ -37,7 +37,7 @@ fn run(map: &TravelMap, parameters: &TeamParameters, route_m: &[Vector]) -> Run 
     }
 }
 
-/// Level ground with a pocket that opens to the west, between a start and a goal.
+/// Level ground with a pocket that opens to the west, between start and goal.
 fn pocket() -> (TravelMap, [Vector; 2]) {
     let mut map = map_of(120, 160, limits(30.0, 30.0), |_, _| 0.0);
     let sides = (60..100).flat_map(|col| [(30, col), (90, col)]);
@@ -49,7 +49,7 @@ fn pocket() -> (TravelMap, [Vector; 2]) {
 }
 
 #[test]
-fn val_a_team_walks_into_a_dead_end_that_it_does_not_see() {
+fn val_a_team_enters_a_dead_end_that_it_does_not_see() {
     let (map, ends_m) = pocket();
     let sees_all = run(&map, &seeing(Some(ALL_M)), &ends_m);
     assert_eq!((sees_all.outcome, sees_all.metrics.replans, sees_all.ways.len()), (Outcome::Arrived, 0, 1));
@@ -68,7 +68,7 @@ fn val_a_team_walks_into_a_dead_end_that_it_does_not_see() {
 }
 
 #[test]
-fn prop_a_team_is_led_over_ground_that_it_sees() {
+fn prop_a_team_is_led_over_seen_ground() {
     let (map, ends_m) = pocket();
     for radius_m in [7.0, 15.0, 30.0] {
         let blind = run(&map, &seeing(Some(radius_m)), &ends_m);
@@ -82,7 +82,7 @@ fn prop_a_team_is_led_over_ground_that_it_sees() {
 }
 
 #[test]
-fn val_a_team_without_a_way_is_stuck() {
+fn val_a_team_without_a_path_is_stuck() {
     let (mut map, ends_m) = pocket();
     let wall: Vec<Node> = (0..120).map(|row| map.node(row, 110)).collect();
     wall.into_iter().for_each(|node| map.block(node));
@@ -91,7 +91,7 @@ fn val_a_team_without_a_way_is_stuck() {
 }
 
 #[test]
-fn val_a_team_goes_on_when_its_leader_is_lost() {
+fn val_a_team_continues_when_its_leader_is_lost() {
     let (map, ends_m) = pocket();
     let losses = vec![crate::formation::parameters::Loss { time_s: 40.0, member: 1 }];
     let run = run(&map, &TeamParameters { losses, ..seeing(Some(15.0)) }, &ends_m);
@@ -112,7 +112,7 @@ fn val_a_radius_too_small_for_the_cells_is_refused() {
     assert!(refused(-1.0).contains("sensing_radius_m"));
 }
 
-/// Runs between the corners of maps of hills: radius, share that arrive, cost of the way driven over that of the grid's smoothed route.
+/// Runs between the corners of maps of hills: radius, numbers of arrivals and runs, cost of the path driven relative to the grid's smoothed route.
 fn over_hills(size: usize, seeds: std::ops::RangeInclusive<u64>, radii_m: &[f64]) -> Vec<(f64, usize, usize, f64)> {
     let mut sums: Vec<(f64, usize, usize, f64)> = radii_m.iter().map(|radius_m| (*radius_m, 0, 0, 0.0)).collect();
     for (seed, per_million) in seeds.flat_map(|seed| [(seed, 42.0), (seed, 145.0)]) {
@@ -144,7 +144,7 @@ fn over_hills(size: usize, seeds: std::ops::RangeInclusive<u64>, radii_m: &[f64]
     sums
 }
 
-/// Cost of a way from place to place.
+/// Cost of a path from position to position.
 fn driven(ground: &crate::Ground<'_>, places_m: &[Vector]) -> f64 {
     let cost = |pair: &[Vector]| {
         let [a, b] = [pair[0], pair[1]].map(|place_m| ground.map.point_at(place_m));

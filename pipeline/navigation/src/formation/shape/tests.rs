@@ -46,7 +46,7 @@ fn val_rearrangements_are_those_of_the_thesis() {
 }
 
 #[test]
-fn val_losses_that_cannot_be_are_refused() {
+fn val_impossible_losses_are_refused() {
     let mut pair = of(Pattern::Column, 2);
     assert_eq!(pair.lose(3), Err(FormationError::NotThere(3)));
     pair.lose(1).unwrap();
@@ -55,8 +55,8 @@ fn val_losses_that_cannot_be_are_refused() {
 }
 
 #[test]
-fn val_teams_within_are_taken_apart() {
-    // A column of two; its second slot holds a column of three, whose first member holds the slot.
+fn val_nested_teams_are_flattened() {
+    // A column of two whose second slot holds a column of three; the first member of that column occupies the slot.
     let inner = vec![slot(1, 0, 0.0, 0.0), slot(2, 1, 2.0, 0.0), slot(3, 2, 2.0, 1.0)];
     let outer = [slot(1, 0, 0.0, 0.0), SlotParameters { team: inner, ..slot(2, 1, 10.0, 5.0) }, slot(3, 1, 20.0, 0.0)];
     let formation = Formation::new(&outer, 0.5).unwrap();
@@ -99,7 +99,7 @@ fn val_wrong_formations_are_refused() {
 }
 
 proptest! {
-    /// Whoever is lost: nobody but the lost goes, no slot is held twice, and the first slot stays.
+    /// Whoever is lost: only the lost member leaves, no slot is occupied twice, and the first slot remains.
     #[test]
     fn prop_a_loss_loses_one(members in 2u32..20, pattern in 0usize..3, lost in 1u32..20) {
         let mut formation = of(Pattern::ALL[pattern], members);

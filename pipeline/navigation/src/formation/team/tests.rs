@@ -10,7 +10,7 @@ use crate::vertices::VertexSettings;
 const MAPS: [(&str, f64, u64); 3] = [("plain", 34.0, 3), ("rough", 42.0, 6), ("very rough", 145.0, 6)];
 const SHAPES: [Shape; 3] = [Shape::Column, Shape::Line, Shape::Wedge];
 
-/// A smoothed route over the roadmap without threshold, from corner to corner with a margin, m; `None` where no path leads there.
+/// A smoothed route over the roadmap without threshold, from corner to corner with a margin, m; `None` if no path exists.
 fn route_over(map: &TravelMap, costs: &CostModel) -> Option<Vec<Vector>> {
     let [rows, cols] = map.shape();
     let vertices = VertexSettings { step_over_m: 1.0, ..VertexSettings::default() };
@@ -24,7 +24,7 @@ fn route_over(map: &TravelMap, costs: &CostModel) -> Option<Vec<Vector>> {
     Some(route.smoothed.iter().map(|node| map.position_m(*node)).collect())
 }
 
-/// A run over hills with its samples of every step.
+/// A run over hills, sampled at every step.
 struct Run {
     outcome: Outcome,
     metrics: Metrics,
@@ -52,7 +52,7 @@ fn of(formation: Shape) -> TeamParameters {
     TeamParameters { formation, ..TeamParameters::default() }
 }
 
-/// Steepest slope of a step to the side, degrees. (Steps on straight lines to a target keep to the limits over quarters of a cell.)
+/// Steepest slope of a step to the side, degrees. (Steps on straight lines to a target keep the limits over quarters of a cell.)
 fn steepest_dodge_deg(map: &TravelMap, run: &Run) -> f64 {
     let steps = run.motions.iter().flatten().filter(|motion| motion.dodging);
     let slope_deg = |motion: &Motion| {
@@ -124,7 +124,7 @@ fn stat_teams_arrive_over_hills() {
     }
 }
 
-/// Level ground with a wall that has a gap: rows `gap` of column 100 and the two beside it.
+/// Level ground with a wall that has a gap: the rows `gap` of column 100 and of the two columns next to it.
 fn wall_with_gap(gap: std::ops::Range<usize>) -> TravelMap {
     let mut map = map_of(120, 260, limits(30.0, 30.0), |_, _| 0.0);
     let wall = (0..120).filter(|row| !gap.contains(row)).flat_map(|row| (99..102).map(move |col| (row, col)));
@@ -141,7 +141,7 @@ fn val_a_line_passes_a_gap_and_recovers() {
     let run = run(&map, &of(Shape::Line), &route_m);
     assert_eq!(run.outcome, Outcome::Arrived);
     assert!(run.metrics.least_separation_m >= 1.0 - 1e-9);
-    // From 30 m behind the wall on every member is in its place within the tolerance.
+    // From 30 m behind the wall, every member is in its slot within the tolerance.
     let errors = run.samples.iter().flat_map(|members| {
         let all_behind = members.iter().all(|sample| sample.position_m[0] > middle_m[0] + 31.5);
         members.iter().filter(move |_| all_behind).filter_map(|sample| sample.errors_m)
@@ -216,4 +216,15 @@ fn prop_a_run_repeats_bit_for_bit() {
     let [one, two] = [0; 2].map(|_| run(&map, &parameters, &route_m));
     assert_eq!(bits(&one), bits(&two));
     assert_eq!(one.events, two.events);
+}
+
+#[test]
+fn val_routes_are_divided_into_equal_legs() {
+    let route_m = [[0.0, 0.0], [40.0, 0.0], [40.0, 0.0], [40.0, 5.0]];
+    let expected = vec![[0.0, 0.0], [10.0, 0.0], [20.0, 0.0], [30.0, 0.0], [40.0, 0.0], [40.0, 5.0]];
+    assert_eq!(divided(&route_m, 10.0), Ok(expected));
+    assert_eq!(divided(&route_m, f64::INFINITY), Ok(vec![[0.0, 0.0], [40.0, 0.0], [40.0, 5.0]]));
+    // Legs of at most 12 m, of equal length.
+    assert_eq!(divided(&route_m[..2], 12.0).map(|points_m| points_m.len()), Ok(5));
+    assert_eq!(divided(&[[1.0, 1.0]; 3], 10.0), Err(TeamError::Route));
 }

@@ -10,7 +10,7 @@ fn prop_components_agree_with_petgraph() {
             .map(|_| (random.below(count.into()) as u32, random.below(count.into()) as u32))
             .collect();
         let of = |v: u32| edges.iter().filter(move |edge| edge.0 == v).map(|edge| edge.1);
-        // The last successor of each vertex is missing, as a step off the map is.
+        // The last successor of each vertex is missing, like a step off the map.
         let ours = components(count, |v| of(v).count() as u32 + 1, |v, k| of(v).nth(k as usize));
         let mut graph = petgraph::graph::DiGraph::<(), ()>::from_edges(&edges);
         while graph.node_count() < count as usize {

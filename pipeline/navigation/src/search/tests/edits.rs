@@ -1,5 +1,5 @@
-//! Queries between edits of a map with their published optima: `dao_arena2` of the dynamic track of the Grid-based Path Planning
-//! Competition (2023). Moves are octile and cut no corners.
+//! Queries between edits of a map, with published optima: `dao_arena2` of the dynamic track of the Grid-based Path Planning Competition (2023). Moves
+//! are octile and do not cut corners.
 
 use super::scenarios::text;
 use crate::cost::CostModel;
@@ -12,14 +12,14 @@ use std::str::SplitWhitespace;
 
 const QUERIES: usize = 2000;
 const EDITS: usize = 439;
-/// The file prints 11 decimals of sums of up to some hundred steps.
+/// The file prints 11 decimals of sums of up to a few hundred steps.
 const TOLERANCE: f64 = 1e-9;
 
 /// Rows of cells, `.` free.
 type Patch = Vec<String>;
 
 enum Command {
-    /// Number of a patch, and the row and column of its first cell.
+    /// Index of a patch, and the row and column of its first cell.
     Edit { patch: usize, place: [usize; 2] },
     /// Start and goal (row, column) with the length of the shortest path.
     Query { ends: [[usize; 2]; 2], optimum: f64 },
@@ -29,7 +29,7 @@ fn number(words: &mut SplitWhitespace<'_>) -> usize {
     words.next().unwrap().parse().unwrap()
 }
 
-/// The files give columns first.
+/// The files list columns first.
 fn place(words: &mut SplitWhitespace<'_>) -> [usize; 2] {
     let col = number(words);
     [number(words), col]
@@ -41,7 +41,7 @@ fn patches() -> Vec<Patch> {
     text.split("\npatch ").skip(1).map(rows_of).collect()
 }
 
-/// Shape of the map, and what happens on it.
+/// Shape of the map, and the commands on it.
 fn commands() -> ([usize; 2], Vec<Command>) {
     let text = text("dao_arena2.scen.gz");
     let header = |key: &str| {
@@ -63,7 +63,7 @@ fn commands() -> ([usize; 2], Vec<Command>) {
     ([header("height "), header("width ")], text.lines().filter_map(command).collect())
 }
 
-/// Lays a patch onto the map; returns the nodes whose steps may have changed.
+/// Applies a patch to the map; returns the nodes whose steps may have changed.
 fn apply(map: &mut TravelMap, patch: &Patch, [row, col]: [usize; 2]) -> Vec<Node> {
     let mut changed = Vec::new();
     for (r, line) in patch.iter().enumerate() {
@@ -87,13 +87,13 @@ fn grid_of<'a>(map: &'a TravelMap, costs: &'a CostModel) -> GridNetwork<'a> {
     GridNetwork { ground: ground(map, costs), neighbourhood: Neighbourhood::Eight }
 }
 
-/// The map as it is, and searches that follow its edits.
+/// The present map, and searches that follow its edits.
 struct Replay {
     map: TravelMap,
-    /// The map before the last edits, and the nodes that these changed.
+    /// The map before the last edits, and the nodes changed by these.
     before: TravelMap,
     changed: Vec<Node>,
-    /// A search that lasts through all edits, its goal, and the nodes changed since it was last asked.
+    /// A search that lasts through all edits, its goal, and the nodes changed since its last query.
     lasting: DStarLite,
     lasting_goal: Node,
     lasting_changed: Vec<Node>,
@@ -106,7 +106,7 @@ impl Replay {
         Self { map, before, changed: Vec::new(), lasting, lasting_goal: goal, lasting_changed: Vec::new() }
     }
 
-    /// The edits that follow belong together.
+    /// Starts a group of edits.
     fn begin_edits(&mut self) {
         self.before.clone_from(&self.map);
         self.changed.clear();
@@ -118,8 +118,8 @@ impl Replay {
         self.lasting_changed.extend(nodes);
     }
 
-    /// A*, and a search from before the last edits that D* Lite repairs: both have the published length, the repaired one the bits of
-    /// Dijkstra and the path of a fresh search.
+    /// Checks A*, and a search from before the last edits that D* Lite repairs: both have the published length, and the repaired search has the
+    /// values of Dijkstra bit for bit and the path of a fresh search.
     fn check(&self, costs: &CostModel, [start, goal]: [Node; 2], optimum: f64) {
         let (before, now) = (grid_of(&self.before, costs), grid_of(&self.map, costs));
         let direct = astar::search(&now, start, goal).unwrap().cost;
@@ -136,7 +136,7 @@ impl Replay {
         assert_eq!(found.path, DStarLite::new(&now, start, goal).search(&now).unwrap().path);
     }
 
-    /// The lasting search, moved to a start, has the bits of Dijkstra.
+    /// The lasting search, moved to a start, has the values of Dijkstra bit for bit.
     fn check_lasting(&mut self, costs: &CostModel, start: Node) {
         let now = grid_of(&self.map, costs);
         self.lasting.move_to(&now, start);

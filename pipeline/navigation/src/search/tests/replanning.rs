@@ -7,7 +7,7 @@ use crate::search::dstar_lite::DStarLite;
 use crate::search::grid::GridNetwork;
 use crate::testing::{NEIGHBOURHOODS, Random, drawn, ground, rough, thesis_costs};
 
-/// Follows edits of a map with a search from a moving start, and compares each with a fresh one; `edit` returns the nodes that it changed.
+/// Follows edits of a map with a search from a moving start, and compares each with a fresh search; `edit` returns the nodes that it changed.
 fn follow(
     mut map: TravelMap,
     neighbourhood: Neighbourhood,
@@ -63,7 +63,7 @@ fn follow(
     [followed, afresh]
 }
 
-/// Blocks or frees some cells, or gives one another height.
+/// Blocks or frees some cells, or changes the height of one.
 fn edit(map: &mut TravelMap, random: &mut Random) -> Vec<Node> {
     let mut edited = Vec::new();
     for _ in 0..1 + random.below(4) {

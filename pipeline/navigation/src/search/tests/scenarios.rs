@@ -1,4 +1,4 @@
-//! The scenarios of the Moving AI benchmark (Sturtevant, 2012): lengths of shortest octile paths that cut no corners.
+//! Scenarios of the Moving AI benchmark (Sturtevant, 2012): lengths of shortest octile paths that do not cut corners.
 
 use crate::map::{Neighbourhood, Node, TravelMap};
 use crate::search::dstar_lite::DStarLite;
@@ -28,10 +28,10 @@ fn map(name: &str) -> TravelMap {
     map
 }
 
-/// Length of a diagonal in the files: the root of two to nine decimals.
+/// Length of a diagonal in the files: the square root of 2 to nine decimals.
 const DIAGONAL: f64 = 1_414_213_562.0 / 1e9;
 
-/// Length of a path by the files' diagonals.
+/// Length of a path with the files' diagonals.
 fn length(map: &TravelMap, path: &[Node]) -> f64 {
     let is_diagonal = |pair: &&[Node]| {
         let ([r0, c0], [r1, c1]) = (map.place(pair[0]), map.place(pair[1]));
@@ -72,7 +72,7 @@ fn val_all_scenarios_of_the_maze_have_their_length() {
     check("maze512-32-9.map.gz", "maze512-32-9.map.scen.gz", 1, 8010, 1e-8);
 }
 
-/// 2000 queries between 439 edits of the arena, numbers as in the dynamic track of the grid-based path planning competition.
+/// 2000 queries between 439 edits of the arena; both numbers are those of the dynamic track of the grid-based path planning competition.
 #[test]
 fn val_queries_between_edits_of_the_arena_have_the_bits_of_dijkstra() {
     const QUERIES: usize = 2000;
@@ -89,7 +89,7 @@ fn val_queries_between_edits_of_the_arena_have_the_bits_of_dijkstra() {
         let mut changed = Vec::new();
         if query * EDITS / QUERIES >= edits {
             edits += 1;
-            // A patch of up to 4 x 4 cells is blocked, or freed where it was free at first.
+            // A patch of up to 4 x 4 cells is blocked, or freed where it was free initially.
             let [row, col] = map.place(free[random.below(free.len() as u64) as usize]);
             let [rows, cols] = [0; 2].map(|_| 1 + random.below(4) as usize);
             let block = random.below(2) == 0;

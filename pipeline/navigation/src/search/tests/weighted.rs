@@ -37,12 +37,12 @@ fn prop_the_proven_bound_holds_and_falls_with_the_budget() {
                 (Outcome::Spent, _) => assert!(budget < 100_000),
             }
         }
-        assert!(optimum.is_none() || before == 1.0, "with all the budget it needs the path is a cheapest one");
+        assert!(optimum.is_none() || before == 1.0, "with a sufficient budget the path is optimal");
     }
     assert!(loose > 20, "{loose}");
 }
 
-/// Under one weight a vertex would be expanded again whenever it becomes cheaper, for minutes on such a map of 500 x 500 cells.
+/// With a single weight, a vertex would be expanded again whenever it becomes cheaper, for minutes on such a map of 500 x 500 cells.
 #[test]
 fn val_an_anytime_search_without_a_budget_takes_a_few_times_the_work_of_astar() {
     let map = hills(200, 145.0, 6, 95);
@@ -128,7 +128,7 @@ fn val_landmarks_save_expansions() {
     assert!(2 * guided < plain, "{guided} of {plain}");
 }
 
-/// Costs of the cheapest paths of straight lines from a node, by all lines between all nodes.
+/// Costs of the cheapest paths of straight lines from a node, from all lines between all nodes.
 fn any_angle_optima(ground: &Ground<'_>, start: Node) -> Vec<f64> {
     let count = ground.map.len() as u32;
     let lines = Graph::new(count, |from, visit| {
@@ -139,7 +139,7 @@ fn any_angle_optima(ground: &Ground<'_>, start: Node) -> Vec<f64> {
     dijkstra::costs_from(&lines, start)
 }
 
-/// Shares by which lazy Theta* exceeds the any-angle optimum.
+/// Relative excess of lazy Theta* over the any-angle optimum.
 fn excesses(maps: impl Iterator<Item = TravelMap>, random: &mut Random) -> Vec<f64> {
     let mut excesses = Vec::new();
     for map in maps {
@@ -192,7 +192,7 @@ fn val_on_a_tilted_plane_theta_star_lies_between_the_continuous_optimum_and_the_
 }
 
 #[test]
-fn val_theta_star_keeps_the_way_round_where_the_line_from_the_grandparent_costs_more() {
+fn val_theta_star_keeps_the_longer_path_if_the_line_from_the_grandparent_costs_more() {
     let map = map_of(31, 31, limits(40.0, 40.0), |r, c| {
         let [y, x] = [r as f64 - 15.0, c as f64 - 15.0];
         3.0 / (1.0 + 0.03 * (x * x + y * y))
@@ -209,13 +209,13 @@ fn val_theta_star_keeps_the_way_round_where_the_line_from_the_grandparent_costs_
 
 #[test]
 fn val_one_table_or_an_edit_that_lowers_a_cost_would_break_the_bound() {
-    // Up a ramp it costs more than down.
+    // Going up a ramp costs more than going down.
     let map = map_of(3, 20, limits(30.0, 30.0), |_, c| 0.3 * c as f64);
     let costs = CostModel::new(SlopeCost::Linear { up: 4.0, down: 0.0 }, None, &map).unwrap();
     let grid = GridNetwork { ground: ground(&map, &costs), neighbourhood: Neighbourhood::Four };
     let [bottom, top] = [map.node(1, 0), map.node(1, 19)];
     let [up, down] = [[bottom, top], [top, bottom]].map(|[a, b]| dijkstra::costs_from(&grid, a)[b as usize]);
-    assert!(up > 2.0 * down, "the cost there is no bound for the way back");
+    assert!(up > 2.0 * down, "the cost there is not a bound for the way back");
     let graph_of = |grid: &GridNetwork<'_>| Graph::new(grid.len() as u32, |vertex, visit| grid.edges(vertex, visit));
     let landmarks = Landmarks::new(&graph_of(&grid), 3);
     let cheaper = CostModel::new(SlopeCost::Linear { up: 0.0, down: 0.0 }, None, &map).unwrap();
@@ -224,4 +224,22 @@ fn val_one_table_or_an_edit_that_lowers_a_cost_would_break_the_bound() {
     let bound = |landmarks: &Landmarks| landmarks.bound(bottom, &landmarks.target(&[(top, 0.0)]));
     assert!(bound(&landmarks) > truth);
     assert!(bound(&Landmarks::new(&graph_of(&edited), 3)) <= truth * (1.0 + 1e-12));
+}
+
+/// On a line of ten vertices, one forward 1 and one back 2, the landmark is the far end, and its bounds are the costs.
+#[test]
+fn val_a_landmark_at_the_end_of_a_line_bounds_costs_exactly() {
+    let line = Graph::new(10, |vertex, visit| {
+        if vertex > 0 {
+            visit(vertex - 1, 2.0);
+        }
+        if vertex < 9 {
+            visit(vertex + 1, 1.0);
+        }
+    });
+    let landmarks = Landmarks::new(&line, 1);
+    for (from, to) in (0..10u32).flat_map(|from| (0..10u32).map(move |to| (from, to))) {
+        let expected = if to >= from { f64::from(to - from) } else { 2.0 * f64::from(from - to) };
+        assert_eq!(landmarks.bound(from, &landmarks.target(&[(to, 0.0)])), expected, "{from} to {to}");
+    }
 }

@@ -1,4 +1,4 @@
-//! Stage `missions`: what vehicles are to drive on each heightfield, one file per kind.
+//! Stage `missions`: defines the missions on each heightfield. One file per kind.
 
 mod routed;
 mod straight;
@@ -18,7 +18,7 @@ pub const STAGE: &str = "missions";
 /// The missions of an item.
 const MISSIONS: &str = "missions.json";
 
-/// What missions may follow.
+/// The kinds of missions.
 pub fn kinds() -> Vec<Kind> {
     vec![straight::kind(), routed::kind(), trail::kind()]
 }
@@ -26,7 +26,7 @@ pub fn kinds() -> Vec<Kind> {
 /// Adds the items of `[[missions]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -42,7 +42,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     Ok(())
 }
 
-/// The missions that an item made.
+/// The missions of an item.
+///
+/// `folder_file` is the path from [`file`].
 ///
 /// # Errors
 /// A file that cannot be read.
@@ -51,10 +53,10 @@ pub fn read(folder_file: &Path) -> Result<Vec<Mission>, JobError> {
     serde_json::from_slice(&bytes).map_err(JobError::new)
 }
 
-/// Where the missions of an item are.
+/// Path of the missions of an item.
 ///
 /// # Errors
-/// When the item is no parent.
+/// When the item is not a parent.
 pub fn file(work: &Work<'_>, item: &ItemRef) -> Result<PathBuf, JobError> {
     work.parent(item, MISSIONS)
 }

@@ -1,7 +1,7 @@
-//! Missions along planned routes: the starts and goals of straight missions, and the way a planner would take.
+//! Missions along planned routes between the starts and goals of straight missions.
 //!
-//! Where no route lies within the limits of slope these are raised for that mission, step by step, until one does: every straight mission has
-//! its routed one, so that both can be compared pair by pair. A note says how many.
+//! If no route lies within the slope limits, the limits are raised step by step for that mission until one does. Every straight mission
+//! therefore has a routed counterpart, and the two can be compared pair by pair. A note states how many missions needed raised limits.
 
 use super::{MISSIONS, STAGE, file, read};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
@@ -27,33 +27,33 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
 use std::sync::Arc;
 
-/// What the limits of slope are raised by where there is no route within them, degrees.
+/// Step by which the slope limits are raised when no route lies within them, degrees.
 const RELAXATION_DEG: f64 = 5.0;
-/// Steepest limit that is tried, degrees.
+/// Steepest limit tried, degrees.
 const STEEPEST_DEG: f64 = 85.0;
 
 /// How missions are routed.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RoutedParameters {
-    /// Vehicle whose limits of slope, rolling resistance and band of wavelengths count; needed for `cost = "energy"` and `"band_rms"`.
+    /// Vehicle that sets the slope limits, the rolling resistance and the wavelength band; required for `cost = "energy"` and `"band_rms"`.
     pub vehicle: Option<String>,
-    /// How the routes are planned.
+    /// Settings of the route planner.
     pub route: RouteParameters,
 }
 
-/// How they are described.
+/// Description of this kind of missions.
 pub fn kind() -> Kind {
     Kind {
         family: "missions",
         kind: "routed",
-        summary: "the starts and goals of straight missions, along planned and smoothed routes",
+        summary: "planned and smoothed routes between the starts and goals of straight missions",
         source: "routes: Bayrak (2008) and docs/navigation.md; followed by pure pursuit (Coulter, 1992)",
         parameters: schema_of::<RoutedParameters>(),
     }
 }
 
-/// What is the same on every heightfield.
+/// Settings that are the same on every heightfield.
 struct Plan {
     parameters: RouteParameters,
     vehicle: Option<Vehicle>,
@@ -70,7 +70,7 @@ struct RoutedJob {
 /// Adds the items of one table.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(
     builder: &mut Builder<'_>,
     entry: &Entry<'_>,
@@ -79,13 +79,16 @@ pub fn add(
 ) -> Result<(), BuildError> {
     let Some(of) = &envelope.of else {
         return Err(entry
-            .error("of", "`of` is missing; it names the straight missions whose starts and goals are taken")
+            .error("of", "`of` is missing; name the straight missions whose starts and goals to use")
             .into());
     };
     if !envelope.terrains.is_empty() || envelope.seed.is_some() {
         let key = if envelope.seed.is_some() { "seed" } else { "terrains" };
         return Err(entry
-            .error(key, format!("`{key}` has no meaning for routed missions, which draw nothing; see `of`"))
+            .error(
+                key,
+                format!("`{key}` does not apply to routed missions, which take their starts and goals from `of`"),
+            )
             .into());
     }
     entry.check_keys::<MissionsItem>(params, &schema_of::<RoutedParameters>())?;
@@ -95,7 +98,7 @@ pub fn add(
     };
     raw.route.check().map_err(|e| entry.refuse(e.within("route")))?;
     let vehicle = raw.vehicle.as_deref().map(|name| registry::vehicle(name, &Map::new())).transpose();
-    let vehicle = vehicle.map_err(|e| entry.error("vehicle", format!("`vehicle` {e}")))?;
+    let vehicle = vehicle.map_err(|e| entry.refuse(e))?;
     let given = raw.route.check_given(vehicle.is_some(), false);
     given.map_err(|e| entry.refuse(e.within("route")))?;
     let plan = Plan { parameters: raw.route.clone(), vehicle, roughness: builder.study.roughness.clone() };
@@ -114,7 +117,7 @@ pub fn add(
     Ok(())
 }
 
-/// Ground at the limits of slope, and raised ones where they were needed.
+/// Ground prepared for the slope limits, and for raised limits as they are needed.
 struct Grounds<'a> {
     heights: &'a Grid,
     plan: &'a Plan,
@@ -130,7 +133,7 @@ impl<'a> Grounds<'a> {
         Ok(Self { heights, plan, given, sites: vec![first] })
     }
 
-    /// The ground with limits that were raised so many times; `None` where they would be too steep.
+    /// The ground with limits raised the given number of times; `None` if they would be too steep.
     fn raised(&mut self, times: usize) -> Result<Option<&Site>, JobError> {
         while self.sites.len() <= times {
             let limits = self.sites[0].map().limits().degrees();
@@ -156,13 +159,13 @@ impl<'a> Grounds<'a> {
             }
         }
         Err(JobError::input(format!(
-            "{}: no route joins its start and goal, however steep: cells without data part them",
+            "{}: no route connects start and goal at any slope; cells without data separate them",
             mission.id()
         )))
     }
 }
 
-/// The mission along a route, whose ends are the nearest cells: from the very start to the very goal.
+/// The mission along a route. The ends of the route are cell centres; the mission runs from its exact start to its exact goal.
 fn along(mission: &Mission, nodes: &[[f64; 3]]) -> Result<Mission, JobError> {
     let between = nodes.get(1..nodes.len().saturating_sub(1)).unwrap_or_default();
     let between = between.iter().map(|&[x, y, _]| [x, y]);
@@ -204,7 +207,7 @@ impl Job for RoutedJob {
         work.write(MISSIONS, &serde_json::to_vec(&missions).map_err(JobError::new)?)?;
         let note = raised.iter().max().map(|most| {
             format!(
-                "{} of {} missions have no route within the limits of slope; these were raised for them, by at most {} degrees",
+                "{} of {} missions have no route within the slope limits; the limits were raised for them by up to {} degrees",
                 raised.len(),
                 missions.len(),
                 RELAXATION_DEG * *most as f64

@@ -1,4 +1,4 @@
-//! Straight missions, drawn on the closed class map of each heightfield.
+//! Straight missions drawn on the closed class map of each heightfield.
 
 use super::{MISSIONS, STAGE};
 use crate::builder::{BuildError, Builder, common};
@@ -19,12 +19,12 @@ use sastrugi_store::dem;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
-/// How they are described.
+/// Description of this kind of missions.
 pub fn kind() -> Kind {
     Kind {
         family: "missions",
         kind: "straight",
-        summary: "straight lines of one length with random start and heading, start in low roughness, goal in low or semi",
+        summary: "straight lines of equal length with random start and heading, from low roughness to low or semi roughness",
         source: "Majhor and Bos, section 2.3",
         parameters: schema_of::<MissionParameters>(),
     }
@@ -35,14 +35,14 @@ struct StraightJob {
     settings: MissionSettings,
     start_cells: StartCells,
     streams: Streams,
-    /// Cells of the heightfield.
+    /// Number of cells of the heightfield.
     cells: u64,
-    /// Radius of the closing that its class map went through, m.
+    /// Radius of the closing applied to its class map, m.
     closing_radius_m: f64,
 }
 
 impl StraightJob {
-    /// What would leave cells to start from, as the class map before its closing tells.
+    /// Advice on how to obtain cells to start from, based on the class map before closing.
     fn advice(&self, work: &Work<'_>, error: &MissionError) -> String {
         let MissionError::NoEligibleStart { border_m, .. } = error else { return String::new() };
         let path = work.parent(&roughness::item(&self.heightfield), roughness::CLASSES_RAW);
@@ -51,18 +51,18 @@ impl StraightJob {
         if percent > 0.0 {
             let radius_m = self.closing_radius_m;
             return format!(
-                "; {percent:.2} % of the surface was low before closing with [roughness] closing_radius_m = {radius_m} m: reduce it if the vehicle is \
-                 smaller"
+                "; {percent:.2} % of the surface was low before closing with [roughness] closing_radius_m = {radius_m} m: reduce the radius if the \
+                 vehicle is smaller"
             );
         }
-        "; every cell is steeper than [roughness] low_max: take a smoother terrain, a narrower `border_m`, or a larger `low_max`".to_owned()
+        "; every cell is steeper than [roughness] low_max: use a smoother terrain, a narrower `border_m` or a larger `low_max`".to_owned()
     }
 }
 
 /// Adds the items of one table.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(
     builder: &mut Builder<'_>,
     entry: &Entry<'_>,
@@ -78,7 +78,7 @@ pub fn add(
     let raw: MissionParameters = read_parameters(params).map_err(|e| entry.refuse(e))?;
     let settings = MissionSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
     if envelope.terrains.is_empty() {
-        return Err(entry.error("terrains", "`terrains` is empty; it names the heightfields to drive on").into());
+        return Err(entry.error("terrains", "`terrains` is empty; name the heightfields to drive on").into());
     }
     let mut heightfields = BTreeSet::new();
     for (k, id) in envelope.terrains.iter().enumerate() {
@@ -107,9 +107,9 @@ pub fn add(
     Ok(())
 }
 
-/// The missions of a heightfield: drawn by itself, or with the draws of the replicates of that number.
+/// The missions of a heightfield, with its own draws or with those shared by all replicates of the same number.
 fn lines(builder: &Builder<'_>, missions: &str, settings: &MissionSettings, heightfield: String) -> Lines {
-    // Draws can be shared only where the cells are known to be the same.
+    // Draws can be shared only if the cells are known to be the same.
     let known = builder.heightfields.get(&heightfield).filter(|field| builder.is_paired() && field.geometry.is_some());
     let shared = known.and_then(|field| field.replicate);
     let item = ItemRef::new(STAGE, &format!("{missions}@{heightfield}"));
@@ -123,7 +123,7 @@ fn lines(builder: &Builder<'_>, missions: &str, settings: &MissionSettings, heig
     }
 }
 
-/// Refuses heightfields with different cells that share draws, as far as that is known before the run.
+/// Refuses heightfields that share draws but have different cells, as far as this is known before the run.
 fn check_geometry(builder: &Builder<'_>, entry: &Entry<'_>, lines: &[Lines]) -> Result<(), BuildError> {
     let mut first: BTreeMap<u64, (&str, Geometry)> = BTreeMap::new();
     for one in lines {
@@ -131,22 +131,22 @@ fn check_geometry(builder: &Builder<'_>, entry: &Entry<'_>, lines: &[Lines]) -> 
         let (Some(number), Some(geometry)) = (one.shared, geometry) else { continue };
         let (id, of_first) = *first.entry(number).or_insert((&one.heightfield, geometry));
         if of_first != geometry {
-            let message = format!("`terrains`: {}", unlike((id, &of_first), (&one.heightfield, &geometry)));
+            let message = format!("`terrains`: {}", different_cells((id, &of_first), (&one.heightfield, &geometry)));
             return Err(entry.error("terrains", message).into());
         }
     }
     Ok(())
 }
 
-/// The sentence on two heightfields that cannot share missions.
-fn unlike((a, of_a): (&str, &Geometry), (b, of_b): (&str, &Geometry)) -> String {
+/// The message on two heightfields that cannot share missions.
+fn different_cells((a, of_a): (&str, &Geometry), (b, of_b): (&str, &Geometry)) -> String {
     let cells = |g: &Geometry| {
         let ([x, y], [dx, dy]) = (g.origin, g.cell);
         format!("{} x {} cells of {dx} x {dy} m from ({x}, {y})", g.rows, g.cols)
     };
     format!(
-        "with `pairing = \"common\"` replicates with the same number share their draws, so their cells must be the same, \
-         but \"{a}\" has {} and \"{b}\" {}; list them in [[missions]] of their own",
+        "with `pairing = \"common\"`, replicates with the same number share their draws and must have the same cells, but \"{a}\" has {} \
+         and \"{b}\" has {}; list them in separate [[missions]]",
         cells(of_a),
         cells(of_b)
     )
@@ -162,7 +162,7 @@ impl Job for StraightJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // The class map, and the indices of its cells twice.
+        // The class map, and twice the indices of its cells.
         (64 << 20) + 17 * self.cells
     }
 

@@ -1,4 +1,4 @@
-//! Missions along the trail that a terrain was given.
+//! Missions along the trail of a terrain.
 
 use super::{MISSIONS, STAGE};
 use crate::builder::{BuildError, Builder};
@@ -17,14 +17,14 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 
-/// Length that a trail is taken for before it is known, m.
+/// Assumed length of a trail before it is known, m.
 const LENGTH_GUESS_M: f64 = 100.0;
 
-/// Which trail is followed, and which way.
+/// The trail to follow, and its direction.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TrailParameters {
-    /// Name of the trail: `trail`, or `trail-2` ... where a terrain has several.
+    /// Name of the trail: `trail`, or `trail-2` ... if a terrain has several.
     pub trail: String,
     /// Follow it from its end to its beginning.
     pub backwards: bool,
@@ -36,12 +36,12 @@ impl Default for TrailParameters {
     }
 }
 
-/// How they are described.
+/// Description of this kind of missions.
 pub fn kind() -> Kind {
     Kind {
         family: "missions",
         kind: "trail",
-        summary: "the trail that a terrain was given, from end to end: one mission on each terrain",
+        summary: "the trail of a terrain from end to end: one mission on each terrain",
         source: "trails: docs/papers/mavs.md; followed by pure pursuit (Coulter, 1992)",
         parameters: schema_of::<TrailParameters>(),
     }
@@ -55,7 +55,7 @@ struct TrailJob {
 /// Adds the items of one table.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(
     builder: &mut Builder<'_>,
     entry: &Entry<'_>,
@@ -64,15 +64,13 @@ pub fn add(
 ) -> Result<(), BuildError> {
     for (key, given) in [("of", envelope.of.is_some()), ("seed", envelope.seed.is_some())] {
         if given {
-            return Err(entry.error(key, format!("`{key}` has no meaning for missions along a trail")).into());
+            return Err(entry.error(key, format!("`{key}` does not apply to missions along a trail")).into());
         }
     }
     entry.check_keys::<MissionsItem>(params, &schema_of::<TrailParameters>())?;
     let parameters: TrailParameters = read_parameters(params).map_err(|e: ParameterError| entry.refuse(e))?;
     if envelope.terrains.is_empty() {
-        return Err(entry
-            .error("terrains", "`terrains` is empty; it names the terrains whose trails are followed")
-            .into());
+        return Err(entry.error("terrains", "`terrains` is empty; name the terrains whose trails to follow").into());
     }
     let mut ids = BTreeSet::new();
     for (k, id) in envelope.terrains.iter().enumerate() {
@@ -80,7 +78,9 @@ pub fn add(
         for one in builder.family(entry, &key, id)? {
             let made = builder.heightfields.get(&one).is_some_and(|field| field.item.stage == terrain::STAGE);
             if !made {
-                return Err(entry.error(&key, format!("\"{one}\" has no trail; `compose` gives terrains one")).into());
+                return Err(entry
+                    .error(&key, format!("\"{one}\" has no trail; name a terrain of kind `compose` with a trail"))
+                    .into());
             }
             ids.insert(one);
         }

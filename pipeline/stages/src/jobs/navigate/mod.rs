@@ -1,4 +1,4 @@
-//! Stage `navigate`: teams in formation along the routes of each terrain.
+//! Stage `navigate`: leads teams in formation along the routes of each terrain.
 
 mod recorded;
 
@@ -34,7 +34,7 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "navigate";
-/// Most vertices of a roadmap in a recording; of more, every second, third, ... is drawn.
+/// Maximum number of roadmap vertices in a recording; of more, only every second, third, ... is recorded.
 const VERTICES_MAX: usize = 5000;
 
 /// The formations.
@@ -43,8 +43,8 @@ pub fn kinds() -> Vec<Kind> {
         let summary = match shape {
             Shape::Column => "members one behind the other",
             Shape::Line => "members side by side",
-            Shape::Wedge => "members back from the leader on both sides",
-            Shape::Custom => "members in slots that the study gives",
+            Shape::Wedge => "members staggered back from the leader on both sides",
+            Shape::Custom => "members in slots given by the study",
         };
         let source = "Bayrak (2008), Algorithms 6 to 9, corrected";
         Kind { family: "formation", kind: shape.name(), summary, source, parameters: schema_of::<TeamParameters>() }
@@ -52,20 +52,20 @@ pub fn kinds() -> Vec<Kind> {
     Shape::ALL.map(kind).into()
 }
 
-/// What is led: the same on every terrain.
+/// A team with its settings, the same on every terrain.
 struct Lead {
     /// Id; runs are named `<id>-0001-01`.
     id: String,
     /// Swept parameters.
     variant: Option<String>,
     parameters: TeamParameters,
-    /// Runs along each route.
+    /// Number of runs along each route.
     count: u32,
     head: StudyHead,
 }
 
 struct NavigateJob {
-    /// The same on every terrain, of which there may be many.
+    /// Shared by all terrains, of which there may be many.
     lead: Arc<Lead>,
     routes: Routes,
     field: Heightfield,
@@ -75,7 +75,7 @@ struct NavigateJob {
 /// Adds the items of `[[navigate]]`.
 ///
 /// # Errors
-/// A wrong item.
+/// An invalid item.
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     builder.each(STAGE, add_table)
 }
@@ -107,11 +107,11 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     Ok(())
 }
 
-/// Refuses the id of a swept route, which stands for several searches.
+/// Refuses the id of a swept route, which refers to several searches.
 fn one_search(entry: &Entry<'_>, routes: &[Routes]) -> Result<(), StudyError> {
     let Some(other) = routes.iter().find(|one| one.search != routes[0].search) else { return Ok(()) };
     let message = format!(
-        "`route` names a swept item; name one of its searches, as \"{}\" or \"{}\"",
+        "`route` names a swept item; name one of its searches, such as \"{}\" or \"{}\"",
         routes[0].search, other.search
     );
     Err(entry.error("route", message))
@@ -128,7 +128,7 @@ fn add_one(
     let Some(field) = builder.heightfields.get(terrain).cloned() else { return Ok(()) };
     let shared = field.replicate.filter(|_| builder.is_paired() && field.geometry.is_some());
     let word = shared.map_or_else(|| terrain.clone(), common);
-    // Named by the table, not by the swept part, so that every value of a sweep has the same draws.
+    // Named after the table without its swept part, so that every value of a sweep has the same draws.
     let streams = builder.streams(STAGE, &format!("{}@{word}", envelope.id), envelope.seed, shared.unwrap_or(0));
     let draws = lead.parameters.drawn_losses + lead.parameters.drawn_obstacles > 0;
     let stream = draws.then(|| streams.label());
@@ -138,7 +138,7 @@ fn add_one(
     builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
 }
 
-/// What all runs on a terrain share.
+/// Data shared by all runs on a terrain.
 struct Site<'a> {
     ground: &'a TeamGround<'a>,
     planned: &'a PlannedRoutes,
@@ -148,7 +148,7 @@ struct Site<'a> {
     place: Place,
 }
 
-/// One run: its rows, and its recording, which is on disk.
+/// The results of one run: its rows, and its recording, which is already on disk.
 struct Led {
     products: Vec<Product>,
     row: FormationRow,
@@ -199,7 +199,7 @@ impl NavigateJob {
         Ok(draw(&parameters, &line, members, &streams))
     }
 
-    /// What is known of a run before it.
+    /// The columns of a run that are known before it starts.
     fn row(&self, id: &str, route: &PlannedRoute, parameters: &TeamParameters) -> FormationRow {
         let members = parameters.formation().map_or(0, |formation| formation.slots().len());
         FormationRow {
@@ -296,7 +296,7 @@ impl NavigateJob {
         Ok(products)
     }
 
-    /// Records that a viewer of one file needs to know where it came from.
+    /// Metadata that states the origin of a recording that is read on its own.
     fn metadata(
         &self,
         row: &FormationRow,
@@ -323,7 +323,7 @@ impl NavigateJob {
         .into()
     }
 
-    /// Vertices of the roadmap that the routes were searched on, thinned; none for other methods.
+    /// Vertices of the roadmap on which the routes were searched, thinned; empty for other methods.
     fn vertices_m(&self, map: &TravelMap) -> Result<Vec<[f64; 3]>, JobError> {
         let [dx, dy] = map.cell_m();
         let settings = self.routes.parameters.settings(dx.max(dy)).map_err(JobError::new)?;
@@ -360,7 +360,7 @@ impl Job for NavigateJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, steps, components and the search of a detour; samples of the runs at hand; what each of them has seen, and its search.
+        // Heights, steps, components and the search for a detour; samples of the current runs; the cells seen by each run, and its search.
         let seen = self.lead.parameters.sensing_radius_m.map_or(0, |_| 60 * rayon::current_num_threads() as u64);
         (256 << 20) + (60 + seen) * self.field.cells
     }
@@ -374,7 +374,7 @@ impl Job for NavigateJob {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let planned = route::read(work, &self.routes.item)?;
         let heights = dem::read(&work.parent(&self.routes.item, route::GROUND)?).map_err(input_error)?.grid;
-        let whole: Grid = heights.clone();
+        let copy: Grid = heights.clone();
         let [up_deg, down_deg] = planned.limits_deg;
         let limits = SlopeLimits::new(up_deg, down_deg).map_err(JobError::new)?;
         let map = TravelMap::new(heights, limits).map_err(JobError::new)?;
@@ -384,9 +384,9 @@ impl Job for NavigateJob {
             ground: &ground,
             planned: &planned,
             vertices_m: &self.vertices_m(&map)?,
-            view: &TerrainView::new(&whole, None).map_err(JobError::new)?,
-            heights_sha256: &digest::heights(&whole),
-            place: Place::read(&work.parent(&self.field.item, PLACE)?, &whole.geometry)?,
+            view: &TerrainView::new(&copy, None).map_err(JobError::new)?,
+            heights_sha256: &digest::heights(&copy),
+            place: Place::read(&work.parent(&self.field.item, PLACE)?, &copy.geometry)?,
         };
         let found = planned.routes.iter().filter(|route| route.points_m.len() > 1);
         let runs: Vec<(&PlannedRoute, u32)> =
@@ -394,7 +394,7 @@ impl Job for NavigateJob {
         let led: Result<Vec<Led>, JobError> =
             runs.into_par_iter().map(|(route, run)| self.lead(work, &site, route, run)).collect();
         let mut led = led?;
-        // Ids are texts: 10000 comes before 9999.
+        // Ids sort as text: 10000 comes before 9999.
         led.sort_by(|a, b| a.row.run_id.cmp(&b.row.run_id));
         let products = led.iter_mut().flat_map(|led| std::mem::take(&mut led.products)).collect();
         let mut outcome = Outcome { products, notes: notes(&led, &planned) };
@@ -405,16 +405,13 @@ impl Job for NavigateJob {
     }
 }
 
-/// Sentences on runs that did not arrive, and on routes that do not exist.
+/// Notes on runs that did not arrive, and on pairs without a route.
 fn notes(led: &[Led], planned: &PlannedRoutes) -> Vec<String> {
     let missing = planned.routes.iter().filter(|route| route.points_m.is_empty()).count();
     let count = |outcome: &str| led.iter().filter(|led| led.row.outcome == outcome).count();
     let runs = led.len();
     let notes = [
-        (
-            missing,
-            format!("{missing} of {} pairs of start and goal have no route to lead a team along", planned.routes.len()),
-        ),
+        (missing, format!("{missing} of {} start-goal pairs have no route for a team to follow", planned.routes.len())),
         (count("stuck"), format!("{} of {runs} teams got stuck", count("stuck"))),
         (count("timeout"), format!("{} of {runs} teams ran out of time", count("timeout"))),
         (count("no_room"), format!("{} of {runs} teams found no room at the start", count("no_room"))),

@@ -1,4 +1,4 @@
-//! A team's run as recording and rows.
+//! The recording and the table rows of a team's run.
 
 use super::{PlannedRoute, Site};
 use crate::operations::routes::distances_m;
@@ -12,7 +12,7 @@ use sastrugi_schemas::topics::{
     TeamRecording,
 };
 
-/// Samples of a run as it goes on.
+/// Collects the samples of a run.
 pub struct Recorder<'a> {
     map: &'a TravelMap,
     parameters: TeamParameters,
@@ -29,7 +29,7 @@ impl<'a> Recorder<'a> {
         self.samples.push((team.time_s(), team.samples()));
     }
 
-    /// A point on the ground, m. Members stay on the map; obstacles that leave it go on at its lowest height.
+    /// A point on the ground, m. Members stay on the map; obstacles that leave it continue at its lowest height.
     fn on_ground(&self, [x, y]: [f64; 2]) -> [f64; 3] {
         let lowest_m = || self.map.heights().range().map_or(0.0, |(low, _)| low);
         [x, y, self.map.height_at_m(self.map.point_at([x, y])).unwrap_or_else(lowest_m)]
@@ -54,7 +54,7 @@ impl<'a> Recorder<'a> {
     }
 }
 
-/// The recording of a run that is over.
+/// The recording of a finished run.
 pub fn recording(team: &Team<'_>, recorder: &Recorder<'_>, site: &Site<'_>, route: &PlannedRoute) -> TeamRecording {
     let TeamParameters { radius_m, sample_rate_hz, obstacles, .. } = &recorder.parameters;
     let member = |k: usize| Member {
@@ -89,7 +89,7 @@ pub fn recording(team: &Team<'_>, recorder: &Recorder<'_>, site: &Site<'_>, rout
         boxes: boxes.collect(),
         obstacles: site.planned.obstacles.clone(),
         moving: obstacles.iter().map(disc).collect(),
-        events: team.events().iter().flat_map(|event| told(event, members, &set_out(recorder, route))).collect(),
+        events: team.events().iter().flat_map(|event| described(event, members, &departure(recorder, route))).collect(),
     }
 }
 
@@ -105,19 +105,21 @@ fn planned(team: &Team<'_>, recorder: &Recorder<'_>, route: &PlannedRoute) -> Ve
     own.collect()
 }
 
-/// What a team sets out on, after "4 members set out ".
-fn set_out(recorder: &Recorder<'_>, route: &PlannedRoute) -> String {
+/// How a team starts; continues the sentence "4 members set out ".
+fn departure(recorder: &Recorder<'_>, route: &PlannedRoute) -> String {
     let length_m = distances_m(&route.points_m).last().copied().unwrap_or(0.0);
     match recorder.parameters.sensing_radius_m {
         None => format!("along {length_m:.1} m"),
         Some(radius_m) => {
-            format!("without a route and see {radius_m} m far; the one that they do not know has {length_m:.1} m")
+            format!(
+                "without a route, with a sensing radius of {radius_m} m; the route unknown to them is {length_m:.1} m long"
+            )
         }
     }
 }
 
-/// An event with its sentence; a run that ends badly has two.
-fn told(event: &Event, members: usize, set_out: &str) -> Vec<TeamEvent> {
+/// An event with its text; a run that ends without arriving has two.
+fn described(event: &Event, members: usize, departure: &str) -> Vec<TeamEvent> {
     let one = |kind: TeamEventKind, member: Option<u32>, text: String| TeamEvent {
         time_s: event.time_s,
         kind,
@@ -127,22 +129,22 @@ fn told(event: &Event, members: usize, set_out: &str) -> Vec<TeamEvent> {
     let own = |kind: TeamEventKind, text: &str| vec![one(kind, event.member, text.to_owned())];
     let end = |text: String| one(TeamEventKind::End, None, text);
     match &event.kind {
-        EventKind::Start => own(TeamEventKind::Start, &format!("{members} members set out {set_out}")),
+        EventKind::Start => own(TeamEventKind::Start, &format!("{members} members set out {departure}")),
         EventKind::Wait => own(TeamEventKind::Wait, "waits"),
         EventKind::Dodge => own(TeamEventKind::Dodge, "leaves the straight line to its target"),
         EventKind::Lost => own(TeamEventKind::Lost, "is lost and stays as an obstacle"),
         EventKind::Rearranged { slot } => own(TeamEventKind::Rearranged, &format!("takes slot {slot}")),
         EventKind::Squeezed { waypoint } => {
-            own(TeamEventKind::Squeezed, &format!("waypoint {} has too little room for the formation", waypoint + 1))
+            own(TeamEventKind::Squeezed, &format!("waypoint {} leaves too little room for the formation", waypoint + 1))
         }
-        EventKind::Replanned => own(TeamEventKind::Replanned, "makes for its goal by another way"),
-        EventKind::Arrived => own(TeamEventKind::Arrived, "is at its last target"),
+        EventKind::Replanned => own(TeamEventKind::Replanned, "replans its route to the goal"),
+        EventKind::Arrived => own(TeamEventKind::Arrived, "reaches its last target"),
         EventKind::End(outcome) => {
             let time_s = event.time_s;
             match outcome {
                 Outcome::Arrived => vec![end(format!("arrived after {time_s:.1} s"))],
                 Outcome::Stuck { member } => vec![
-                    one(TeamEventKind::Stuck, Some(*member), "comes no nearer to its target".to_owned()),
+                    one(TeamEventKind::Stuck, Some(*member), "makes no progress towards its target".to_owned()),
                     end(format!("stuck after {time_s:.1} s")),
                 ],
                 Outcome::Timeout => vec![

@@ -1,14 +1,14 @@
-//! The cell size of a cloud for which none is given: about the smallest at which three quarters of the cells inside the
-//! cloud hold a point, among 1, 2 and 5 times the powers of ten.
+//! Default cell size of a cloud: approximately the smallest size, among 1, 2 and 5 times powers of ten, at which three quarters
+//! of the cells inside the cloud hold a point.
 //!
-//! Inside means: in a block of 4 x 4 cells that holds points, as do its eight neighbours; so neither the outline of the
-//! cloud nor its large holes count. The sizes are tried from coarse to fine, from well above the size that evenly spread
+//! A cell is inside if its block of 4 x 4 cells and the eight neighbouring blocks all hold points, so that neither the outline of
+//! the cloud nor its large holes count. Sizes are tried from coarse to fine, starting well above the size that evenly distributed
 //! points would need,
 //!
 //! $$ 1 - e^{-n c^2 / A} = 3/4, \qquad c_0 = \sqrt{\ln 4 \; A / n}, $$
 //!
-//! with n points in a bounding box of area A. Where the share s of held cells passes three quarters between two sizes,
-//! the nearer one in the logarithm (s linear in between) is taken: the finer one if the two shares sum to more than 3/2.
+//! with n points in a bounding box of area A. If the share s of occupied cells passes three quarters between two sizes, the
+//! nearer one in the logarithm (s linear in between) is taken: the finer one if the two shares sum to more than 3/2.
 //!
 //! Cost: one pass over the points for every five sizes; one bit per cell.
 
@@ -16,18 +16,18 @@ use super::lattice::Lattice;
 use super::survey::{Chosen, Survey};
 use crate::dem::raster::{MAX_CELLS, Refusal};
 
-/// Share of cells with points that is sought.
+/// Target share of cells with points.
 const SHARE: f64 = 0.75;
 /// ln 4 = -ln(1 - 3/4).
 const POINTS_PER_CELL: f64 = 1.386_294_361_119_890_6;
 /// Sizes tried in one pass.
 const AT_A_TIME: i32 = 5;
-/// Sizes above the first guess where the search starts.
+/// Number of sizes above the first guess at which the search starts.
 const START: i32 = 4;
-/// Cells to the side of a block.
+/// Cells along the side of a block.
 const SIDE: usize = 4;
 
-/// The cell size, and a sentence that states it.
+/// The cell size, and a note that states it.
 pub(super) fn choose(chosen: &Chosen<'_>, survey: &Survey) -> Result<(f64, String), Refusal> {
     let guess = first_guess(survey);
     let mut coarser: Option<(i32, f64)> = None;
@@ -38,7 +38,7 @@ pub(super) fn choose(chosen: &Chosen<'_>, survey: &Survey) -> Result<(f64, Strin
             break;
         }
         for (k, share) in sizes.iter().zip(shares(chosen, survey, &sizes)?) {
-            // A cloud of few coarse cells has no inside.
+            // A cloud with few, coarse cells has no inside.
             let Some(share) = share.or((*k <= guess).then_some(0.0)) else { continue };
             match coarser {
                 Some((best, above)) if share + above <= 2.0 * SHARE => return Ok(stated(best, Some(above))),
@@ -55,10 +55,10 @@ pub(super) fn choose(chosen: &Chosen<'_>, survey: &Survey) -> Result<(f64, Strin
 fn stated(k: i32, share: Option<f64>) -> (f64, String) {
     let size = size(k);
     let why = share.map_or_else(
-        || "their number over the area".to_owned(),
+        || "from the number of points per area".to_owned(),
         |share| format!("{:.0} % of the cells inside the cloud hold a point", 100.0 * share),
     );
-    (size, format!("no cell size was given; {size} m was chosen for the points ({why})"))
+    (size, format!("no cell size was given; {size} m was chosen ({why})"))
 }
 
 /// 1, 2, 5, 10, 20 ... for k = 0, 1, 2, 3, 4 ...
@@ -70,7 +70,7 @@ fn size(k: i32) -> f64 {
     if power < 0 { digit / ten } else { digit * ten }
 }
 
-/// The first size that would do if the points were spread evenly over their bounding box (or along a line).
+/// The first size that would suffice if the points were evenly distributed over their bounding box (or along a line).
 fn first_guess(survey: &Survey) -> i32 {
     let [width, height] = [0, 1].map(|axis| survey.high[axis] - survey.low[axis]);
     let n = survey.points as f64;
@@ -88,7 +88,7 @@ fn fits(survey: &Survey, k: i32) -> bool {
     Lattice::new(survey, size(k)).is_ok_and(|lattice| lattice.rows * lattice.cols <= MAX_CELLS as usize)
 }
 
-/// Share of the cells inside the cloud that hold a point, for several sizes; `None` where there is no inside.
+/// Share of the cells inside the cloud that hold a point, for several sizes; `None` if no cell is inside.
 fn shares(chosen: &Chosen<'_>, survey: &Survey, sizes: &[i32]) -> Result<Vec<Option<f64>>, Refusal> {
     let lattices = sizes.iter().map(|k| Lattice::new(survey, size(*k)));
     let mut maps: Vec<Blocks> = lattices.map(|lattice| lattice.map(Blocks::new)).collect::<Result<_, _>>()?;
@@ -99,7 +99,7 @@ fn shares(chosen: &Chosen<'_>, survey: &Survey, sizes: &[i32]) -> Result<Vec<Opt
     Ok(maps.iter().map(Blocks::share).collect())
 }
 
-/// Which cells hold points: one bit each, 4 x 4 to a number.
+/// Occupied cells, as one bit each, 4 x 4 per number.
 struct Blocks {
     lattice: Lattice,
     rows: usize,

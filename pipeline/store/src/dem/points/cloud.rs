@@ -1,7 +1,7 @@
 //! A LAS or LAZ file as a stream of points.
 //!
-//! Points of LAS have a fixed length and are read as they are; those of LAZ are decoded in `laszip`. Neither sees a file before [`DeclaredSize`] found
-//! its numbers possible, and a panic of the decoder is an error.
+//! Points of LAS have a fixed length and are read directly; those of LAZ are decoded in `laszip`. Both run only after
+//! [`DeclaredSize`] has validated the numbers of the header, and a panic of the decoder is turned into an error.
 
 use super::crs;
 use super::header::{Compression, DeclaredSize, unreadable};
@@ -21,11 +21,11 @@ const CHUNK_BYTES: u64 = 1 << 22;
 const NOISE: [u8; 2] = [7, 18];
 const GROUND: u8 = 2;
 
-/// A file whose header was checked.
+/// A point cloud file with a checked header.
 #[derive(Debug)]
 pub(super) struct Cloud {
     path: PathBuf,
-    /// What the header says.
+    /// Contents of the header.
     pub declared: DeclaredSize,
     /// Coordinate reference system.
     pub crs: Crs,
@@ -33,7 +33,7 @@ pub(super) struct Cloud {
     compression: Option<Compression>,
 }
 
-/// A point as it is stored.
+/// A stored point.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Point {
     /// Coordinates before scale and offset.
@@ -55,7 +55,7 @@ impl Point {
         }
     }
 
-    /// True for points that their producer withdrew or marked as noise.
+    /// True for points that the producer withheld or marked as noise.
     pub fn is_noise(&self) -> bool {
         self.withheld || NOISE.contains(&self.class)
     }
@@ -67,7 +67,7 @@ impl Point {
 }
 
 impl Cloud {
-    /// Opens a file and checks what its header says.
+    /// Opens a file and checks its header.
     pub fn open(path: &Path, file: File) -> Result<Self, Refusal> {
         let mut file = BufReader::new(file);
         let declared = DeclaredSize::read(&mut file)?;
@@ -77,7 +77,7 @@ impl Cloud {
         Ok(Self { path: path.to_owned(), declared, crs, compression })
     }
 
-    /// The coordinate that a stored number stands for.
+    /// The coordinate of a stored number.
     pub fn coordinate(&self, axis: usize, stored: f64) -> f64 {
         stored * self.declared.scale[axis] + self.declared.offset[axis]
     }
@@ -92,7 +92,7 @@ impl Cloud {
         let declared = &self.declared;
         let mut source = BufReader::new(crate::file::open(&self.path).map_err(|e| unreadable(&e))?);
         if DeclaredSize::read(&mut source)? != *declared {
-            return Err(Refusal::new("changed while it was read"));
+            return Err(Refusal::new("changed while it was being read"));
         }
         source.seek(SeekFrom::Start(declared.data_start)).map_err(|e| unreadable(&e))?;
         let mut points = match &self.compression {
@@ -113,7 +113,7 @@ impl Cloud {
     }
 }
 
-/// Where points come from.
+/// Source of points.
 enum Points {
     Plain(BufReader<File>),
     Packed(laszip::Points),
@@ -133,7 +133,7 @@ fn guarded<T>(decode: impl FnOnce() -> Result<T, LasZipError>) -> Result<T, Refu
     match catch_unwind(AssertUnwindSafe(decode)) {
         Ok(Ok(decoded)) => Ok(decoded),
         Ok(Err(LasZipError::IoError(error))) => Err(unreadable(&error)),
-        Ok(Err(error)) => Err(Refusal::new(format!("is damaged or breaks off: {error}"))),
-        Err(_) => Err(Refusal::new("is damaged: the decoder of its points gave up")),
+        Ok(Err(error)) => Err(Refusal::new(format!("is damaged or truncated: {error}"))),
+        Err(_) => Err(Refusal::new("is damaged: its points cannot be decoded")),
     }
 }

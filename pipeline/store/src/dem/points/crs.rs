@@ -1,7 +1,7 @@
 //! Coordinate reference systems of point clouds: GeoTIFF keys (LAS 1.4, "Georeferencing Information using GeoTIFF") or
-//! OGC well-known text (versions 1 and 2), brought to the form of the rasters.
+//! OGC well-known text (versions 1 and 2), converted to the form used for rasters.
 //!
-//! Of well-known text, the name, the EPSG code and the units of the horizontal and the vertical system are kept.
+//! From well-known text, the name, the EPSG code and the units of the horizontal and the vertical system are kept.
 
 use super::header::{PROJECTION, Record};
 use crate::dem::crs::{Crs, GeoKey};
@@ -20,13 +20,13 @@ const LINEAR_UNITS: u16 = 3076;
 const VERTICAL_UNITS: u16 = 4099;
 const MODEL_PROJECTED: u16 = 1;
 const MODEL_GEOCENTRIC: u16 = 3;
-/// Nodes of well-known text within each other, at most.
+/// Maximum nesting depth of well-known text.
 const DEPTH: usize = 24;
 
-/// The system that records name: the default (a local plane in metres) where it names none.
+/// The system named by the records; the default (a local plane in metres) if they name none.
 ///
 /// # Errors
-/// Coordinates that are degrees, or geocentric.
+/// Coordinates in degrees, or geocentric coordinates.
 pub(super) fn of_records(records: &[Record], well_known_text: bool) -> Result<Crs, Refusal> {
     let of = |id: u16| {
         let wanted = |record: &&Record| record.user.eq_ignore_ascii_case(PROJECTION) && record.id == id;
@@ -42,16 +42,16 @@ pub(super) fn of_records(records: &[Record], well_known_text: bool) -> Result<Cr
     let crs = crs.unwrap_or_default();
     let geocentric = crs.keys.contains(&(MODEL_TYPE, GeoKey::Short(MODEL_GEOCENTRIC)));
     if crs.geographic || geocentric {
-        let kind = if geocentric { "geocentric" } else { "degrees of longitude and latitude" };
+        let kind = if geocentric { "geocentric" } else { "in degrees of longitude and latitude" };
         let code = crs.epsg.map_or_else(String::new, |code| format!(" (EPSG:{code})"));
         return Err(Refusal::new(format!(
-            "its coordinates are {kind}{code}; a point cloud must be projected to metres before it can be gridded"
+            "its coordinates are {kind}{code}; project the point cloud to metres before gridding"
         )));
     }
     Ok(crs)
 }
 
-/// The keys of a directory of numbers, with its tables of doubles and of text.
+/// The keys of a GeoTIFF directory, with its tables of doubles and text.
 fn geotiff_keys(directory: &[u8], doubles: &[u8], texts: &[u8]) -> Option<Vec<(u16, GeoKey)>> {
     let words: Vec<u16> = directory.as_chunks().0.iter().map(|word| u16::from_le_bytes(*word)).collect();
     let count = usize::from(*words.get(3)?);
@@ -105,7 +105,7 @@ const GEOCENTRIC: [&str; 1] = ["GEOCCS"];
 #[derive(Debug, Default)]
 struct Node<'a> {
     word: &'a str,
-    /// Texts, numbers and bare words, in their order.
+    /// Texts, numbers and bare words, in order.
     values: Vec<&'a str>,
     nodes: Vec<Node<'a>>,
 }
@@ -119,14 +119,14 @@ impl Node<'_> {
         self.values.first().copied().unwrap_or_default()
     }
 
-    /// The node's own code, not that of a part of it.
+    /// The code of the node itself, not of a child.
     fn epsg(&self) -> Option<u16> {
         let authority = self.nodes.iter().find(|node| node.is(&["AUTHORITY", "ID"]))?;
         let [kind, code, ..] = authority.values.as_slice() else { return None };
         if kind.eq_ignore_ascii_case("EPSG") { code.parse().ok() } else { None }
     }
 
-    /// EPSG code of the unit of length, where it is known: metre, foot or US survey foot.
+    /// EPSG code of the unit of length, if known: metre, foot or US survey foot.
     fn unit(&self) -> Option<u16> {
         let axis = || self.nodes.iter().filter(|n| n.is(&["AXIS"])).flat_map(|n| &n.nodes);
         let unit = self.nodes.iter().chain(axis()).find(|node| node.is(&["UNIT", "LENGTHUNIT"]))?;
@@ -137,7 +137,7 @@ impl Node<'_> {
     }
 }
 
-/// Reads a node and returns it with the text after it.
+/// Parses a node and returns it with the remaining text.
 fn node(text: &str, depth: usize) -> Option<(Node<'_>, &str)> {
     let depth = depth.checked_sub(1)?;
     let open = text.find(['[', '(', '"', ',', ']', ')'])?;

@@ -1,18 +1,18 @@
 //! Filling of small gaps between cells with data.
 //!
-//! A void cell is a gap, and is filled, when it lies within `reach` cells of data (along rows, columns and diagonals) and
-//! no square of 2 `reach` + 1 cells to the side that is free of data covers it: the morphological closing of the cells with
-//! data (Serra, Image Analysis and Mathematical Morphology, 1982). So channels up to 2 `reach` cells wide are bridged,
-//! while a straight or bulging outline of the data stays where it is.
+//! An empty cell counts as a gap, and is filled, if it lies within `reach` cells of data (along rows, columns and diagonals) and
+//! is not covered by any data-free square of 2 `reach` + 1 cells per side. This is the morphological closing of the cells with
+//! data (Serra, Image Analysis and Mathematical Morphology, 1982). It bridges channels up to 2 `reach` cells wide and leaves a
+//! straight or convex outline of the data unchanged.
 //!
-//! Heights come from repeated steps: in each, every void cell beside data (8 neighbours) takes the mean of those of them
-//! that had a height before the step.
+//! Heights are computed in repeated steps: in each, every empty cell with data among its 8 neighbours takes the mean of the
+//! neighbours that had a height before the step.
 //!
-//! Cost: O(cells) for the closing, at most 9 additions per void cell and step; 2 bytes per cell and its margin of `reach`.
+//! Cost: O(cells) for the closing, at most 9 additions per empty cell and step; 2 bytes per cell, including a margin of `reach`.
 
 use crate::dem::raster::{MAX_CELLS, Refusal};
 
-/// Fills gaps of a grid, row by row, and returns their number of cells.
+/// Fills the gaps of a row-major grid and returns the number of filled cells.
 ///
 /// # Errors
 /// A margin of `reach` cells around the grid would take more memory than [`MAX_CELLS`] allows.
@@ -22,7 +22,9 @@ pub(super) fn fill(values: &mut [f64], rows: usize, cols: usize, reach: u32) -> 
     }
     let margin = reach as usize;
     if (rows + 2 * margin) as u64 * (cols + 2 * margin) as u64 > 2 * MAX_CELLS {
-        return Err(Refusal::new(format!("gaps of {rows} x {cols} cells cannot be filled {reach} cells far")));
+        return Err(Refusal::new(format!(
+            "gaps in {rows} x {cols} cells cannot be filled up to {reach} cells: not enough memory"
+        )));
     }
     let closed = closing(values, rows, cols, margin);
     let mut spread = values.to_vec();
@@ -41,7 +43,7 @@ pub(super) fn fill(values: &mut [f64], rows: usize, cols: usize, reach: u32) -> 
     Ok(filled)
 }
 
-/// One step; false when nothing changed.
+/// One step; false if nothing changed.
 fn step(values: &mut [f64], rows: usize, cols: usize) -> bool {
     let mut found = vec![];
     for row in 0..rows {
@@ -64,7 +66,7 @@ fn step(values: &mut [f64], rows: usize, cols: usize) -> bool {
     !found.is_empty()
 }
 
-/// Cells that no square free of data covers.
+/// Cells that are not covered by any data-free square.
 fn closing(values: &[f64], rows: usize, cols: usize, margin: usize) -> Vec<bool> {
     let (tall, wide) = (rows + 2 * margin, cols + 2 * margin);
     let mut cells = vec![false; tall * wide];
@@ -73,8 +75,8 @@ fn closing(values: &[f64], rows: usize, cols: usize, margin: usize) -> Vec<bool>
             cells[(row + margin) * wide + col + margin] = values[row * cols + col].is_finite();
         }
     }
-    // Beyond the margin nothing holds data: dilation sees `false` there. Erosion must not see it: the dilation of the
-    // endless plane reaches as far as the margin, and no cell of the grid looks further than the margin.
+    // Beyond the margin there is no data, which dilation treats as `false`. Erosion must ignore it: the dilation of the
+    // unbounded plane extends to the margin, and no cell of the grid looks beyond the margin.
     for target in [true, false] {
         cells = along_rows(&cells, wide, margin, target);
         cells = transposed(&cells, tall, wide);
@@ -118,7 +120,7 @@ mod tests {
     use super::*;
     use proptest::prelude::*;
 
-    /// The definition, cell by cell.
+    /// Reference: the definition, cell by cell.
     fn slow(values: &[f64], rows: usize, cols: usize, reach: isize) -> Vec<f64> {
         let held = |r: isize, c: isize| {
             let inside = r >= 0 && c >= 0 && r < rows as isize && c < cols as isize;
@@ -152,12 +154,12 @@ mod tests {
 
     #[test]
     fn val_a_gap_is_bridged_and_an_outline_stays() {
-        const VOID: f64 = f64::NAN;
-        let mut values = [VOID, 1.0, 1.0, VOID, 3.0, 3.0, VOID, 1.0, 1.0, VOID, 3.0, 3.0];
+        const EMPTY: f64 = f64::NAN;
+        let mut values = [EMPTY, 1.0, 1.0, EMPTY, 3.0, 3.0, EMPTY, 1.0, 1.0, EMPTY, 3.0, 3.0];
         assert_eq!(fill(&mut values, 2, 6, 1).unwrap(), 2);
         assert!(values[0].is_nan() && values[6].is_nan());
         assert_eq!((values[3], values[9]), (2.0, 2.0));
-        let mut single = [VOID, 5.0, VOID];
+        let mut single = [EMPTY, 5.0, EMPTY];
         assert_eq!(fill(&mut single, 1, 3, 2).unwrap(), 0);
     }
 
@@ -165,7 +167,7 @@ mod tests {
         #![proptest_config(ProptestConfig::with_cases(200))]
 
         #[test]
-        fn prop_filling_is_as_defined(rows in 1usize..14, cols in 1usize..14, reach in 1u32..5, seed in prop::collection::vec(0u8..100, 196), share in 1u8..60) {
+        fn prop_filling_agrees_with_the_definition(rows in 1usize..14, cols in 1usize..14, reach in 1u32..5, seed in prop::collection::vec(0u8..100, 196), share in 1u8..60) {
             let values: Vec<f64> = seed[..rows * cols].iter().map(|&v| if v < share { f64::from(v) } else { f64::NAN }).collect();
             let mut fast = values.clone();
             let filled = fill(&mut fast, rows, cols, reach).unwrap();

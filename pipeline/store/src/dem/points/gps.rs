@@ -1,9 +1,11 @@
-//! Times of points in LASzip's item `GPSTIME11`, version 2.
+//! Decoder for the times of points in LASzip's item `GPSTIME11`, version 2.
 //!
-//! Isenburg, "LASzip: lossless compression of LiDAR data", Photogrammetric Engineering and Remote Sensing 79(2), 2013, and the LASzip sources.
-//! A time continues one of four sequences; a code may switch to another sequence before it. A writer switches once at most, to the sequence
-//! that the time belongs to. `laz` decodes a switch by calling itself, so that a damaged file with millions of them overflows the stack, which
-//! nothing can catch: here a second switch in a row is an error.
+//! Source: Isenburg, "LASzip: lossless compression of LiDAR data", Photogrammetric Engineering and Remote Sensing 79(2), 2013, and
+//! the LASzip sources.
+//!
+//! A time continues one of four sequences; a code may switch to another sequence before it. A writer switches at most once, to the
+//! sequence of the time. `laz` decodes switches recursively, so that a damaged file with millions of them overflows the stack, which
+//! cannot be caught. Here a second switch in a row is an error.
 
 use laz::decoders::ArithmeticDecoder;
 use laz::decompressors::{IntegerDecompressor, IntegerDecompressorBuilder};
@@ -11,17 +13,17 @@ use laz::models::{ArithmeticModel, ArithmeticModelBuilder};
 use laz::record::FieldDecompressor;
 use std::io::{self, Read};
 
-/// Largest and least multiple of the last step that a code stands for.
+/// Largest and smallest multiple of the last step that a code can represent.
 const MULTIPLE_MAX: i32 = 500;
 const MULTIPLE_MIN: i32 = -10;
-/// Codes after those of the multiples: the same time, a time in full, and switches.
+/// Codes after those of the multiples: same time, full time, and switches.
 const SAME: i32 = MULTIPLE_MAX - MULTIPLE_MIN + 1;
 const FULL: i32 = SAME + 1;
 const CODES: u32 = FULL as u32 + 4;
-/// Codes after a step of zero: the same time, a step, a time in full, and switches.
+/// Codes after a step of zero: same time, a step, full time, and switches.
 const CODES_STANDING: u32 = 6;
 const SEQUENCES: usize = 4;
-/// So many steps unlike the last one in a row change what is expected.
+/// After more than this many deviating steps in a row, the expected step changes.
 const UNLIKE_MAX: u32 = 3;
 
 /// Contexts of the integers.
@@ -42,22 +44,22 @@ mod context {
 struct Sequence {
     /// Bits of the last time.
     time: i64,
-    /// The step that is expected.
+    /// The expected step.
     step: i32,
-    /// Steps in a row that were unlike it.
+    /// Deviating steps in a row.
     unlike: u32,
 }
 
-/// What a code says of a time.
+/// Meaning of a code.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Code {
     Same,
     /// A step from zero.
     FirstStep,
-    /// About this multiple of the step that is expected.
+    /// Approximate multiple of the expected step.
     Multiple(i32),
     Full,
-    /// So many sequences on.
+    /// Number of sequences to advance.
     Switch(usize),
 }
 
@@ -69,7 +71,7 @@ pub(super) struct GpsTimes {
     sequences: [Sequence; SEQUENCES],
     /// The sequence of the last time.
     last: usize,
-    /// The sequence that was begun last.
+    /// The sequence started last.
     newest: usize,
 }
 
@@ -118,7 +120,7 @@ impl GpsTimes {
             Code::Multiple(multiple) => self.step(decoder, multiple)?,
             Code::Full => self.full(decoder)?,
             Code::Switch(_) => {
-                return Err(io::Error::new(io::ErrorKind::InvalidData, "times that switch sequences twice"));
+                return Err(io::Error::new(io::ErrorKind::InvalidData, "times switch sequences twice in a row"));
             }
         }
         Ok(self.sequences[self.last].time)
@@ -157,7 +159,7 @@ impl GpsTimes {
         Ok(())
     }
 
-    /// A sequence begins.
+    /// Starts a sequence.
     fn full<R: Read>(&mut self, decoder: &mut ArithmeticDecoder<R>) -> io::Result<()> {
         let expected = (self.sequences[self.last].time >> 32) as i32;
         let high = self.integers.decompress(decoder, expected, context::HIGH_WORD)?;
@@ -216,7 +218,7 @@ mod tests {
         (0..count).map(|_| decompressor.decompress_next(&mut time).map(|()| f64::from_le_bytes(time))).collect()
     }
 
-    /// Steps of flight lines that are mixed: the same, repeated, several times longer, backwards, and jumps.
+    /// Steps of interleaved flight lines: equal, repeated, several times longer, backwards, and jumps.
     fn times() -> impl Strategy<Value = Vec<f64>> {
         let step = prop_oneof![
             Just(0.0),
@@ -243,17 +245,17 @@ mod tests {
     }
 
     proptest! {
-        /// Times come back as they were written, as they do from `laz`.
+        /// Times are read back as written, here and by `laz`.
         #[test]
-        fn prop_times_come_back(times in times()) {
+        fn prop_times_are_read_back(times in times()) {
             let bytes = packed(&times);
             prop_assert_eq!(&unpacked(&bytes, times.len(), GpsTimes::default()).unwrap(), &times);
             prop_assert_eq!(&unpacked(&bytes, times.len(), GpsTimeDecompressor::default()).unwrap(), &times);
         }
 
-        /// Any bytes are times or an error.
+        /// Decoding any bytes ends with times or an error.
         #[test]
-        fn prop_any_bytes_end(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
+        fn prop_decoding_any_bytes_ends(bytes in prop::collection::vec(any::<u8>(), 0..2000)) {
             let _ = std::panic::catch_unwind(|| unpacked(&bytes, 5000, GpsTimes::default()));
         }
     }

@@ -5,13 +5,13 @@ use super::settings::{MAX_RANKED_POINTS, Statistic};
 use super::survey::Chosen;
 use crate::dem::raster::Refusal;
 
-/// Heights (`NaN` without points) and numbers of points, cell by cell.
+/// Heights (`NaN` without points) and numbers of points for each cell.
 pub(super) struct Cells {
     pub heights: Vec<f64>,
     pub counts: Vec<u32>,
 }
 
-/// Height of every cell; `points` is the number of points chosen.
+/// Height of every cell; `points` is the number of selected points.
 pub(super) fn cells(
     chosen: &Chosen<'_>,
     lattice: &Lattice,
@@ -41,7 +41,7 @@ fn height(chosen: &Chosen<'_>, stored: f64) -> f64 {
 
 fn means(chosen: &Chosen<'_>, lattice: &Lattice) -> Result<Cells, Refusal> {
     let mut counts = vec![0_u32; lattice.rows * lattice.cols];
-    // Fewer than 2^32 points of 32 bits: a sum fits.
+    // Fewer than 2^32 points of 32 bits each: the sum fits.
     let mut sums = vec![0_i64; counts.len()];
     for_each_height(chosen, lattice, |cell, z| {
         counts[cell] += 1;
@@ -65,10 +65,10 @@ fn extremes(chosen: &Chosen<'_>, lattice: &Lattice, further: fn(i32, i32) -> i32
 fn percentiles(chosen: &Chosen<'_>, lattice: &Lattice, percentile: f64, points: u64) -> Result<Cells, Refusal> {
     if points > MAX_RANKED_POINTS {
         return Err(Refusal::new(format!(
-            "holds {points} points; a median or percentile is taken of at most {MAX_RANKED_POINTS}"
+            "has {points} points; medians and percentiles are limited to {MAX_RANKED_POINTS}"
         )));
     }
-    // Cell and height in one number that sorts by cell, then height.
+    // Cell and height packed into one number that sorts by cell, then by height.
     let mut keys = Vec::with_capacity(points as usize);
     for_each_height(chosen, lattice, |cell, z| keys.push((cell as u64) << 32 | u64::from(z.cast_unsigned() ^ SIGN)))?;
     keys.sort_unstable();
@@ -82,7 +82,7 @@ fn percentiles(chosen: &Chosen<'_>, lattice: &Lattice, percentile: f64, points: 
     Ok(Cells { heights, counts })
 }
 
-/// The bit that makes signed integers sort as unsigned ones.
+/// Flipping this bit makes signed integers sort correctly as unsigned ones.
 const SIGN: u32 = 1 << 31;
 
 /// The percentile of sorted keys of one cell.

@@ -1,21 +1,21 @@
-//! What the header of a LAS or LAZ file claims, held against the file's length before a decoder sees it.
+//! Header of a LAS or LAZ file, checked against the file's length before decoding.
 //!
 //! ASPRS, "LAS Specification 1.4 - R15" (2019), tables 3 (public header block), 5 and 6 (variable length records) and
 //! 7 to 17 (point records); Isenburg, "LASzip: lossless compression of LiDAR data", Photogrammetric Engineering and
 //! Remote Sensing 79(2), 2013, and the LASzip sources for the chunk table and the layers of point formats 6 to 10.
 //!
-//! Memory is asked for by numbers found in the file: the length of a record, the number of chunks, the bytes of a layer. Each of them is compared
-//! here with what the file can hold.
+//! Decoders allocate memory according to numbers in the file: the length of a record, the number of chunks, the bytes of a layer.
+//! Each is checked here against what the file can hold.
 
 use crate::dem::raster::Refusal;
 use laz::LazVlr;
 use std::io::{self, Read, Seek, SeekFrom};
 
-/// Longest header of a known version, bytes.
+/// Longest header of a supported version, bytes.
 const HEADER_BYTES: usize = 375;
 /// Header lengths by minor version.
 const HEADER_SIZES: [u16; 5] = [227, 227, 227, 235, 375];
-/// Who writes records that are of use, and longest such record, bytes.
+/// User ids of relevant records, and the longest such record, bytes.
 const USERS: [&str; 2] = [PROJECTION, LASZIP];
 pub(super) const PROJECTION: &str = "LASF_Projection";
 const LASZIP: &str = "laszip encoded";
@@ -25,10 +25,10 @@ const RECORD_HEADER_BYTES: u64 = 54;
 const EXTENDED_RECORD_HEADER_BYTES: u64 = 60;
 /// Bytes of a point by format (LAS 1.4, tables 7 to 17).
 const POINT_BYTES: [u16; 11] = [20, 28, 26, 34, 57, 63, 30, 36, 38, 59, 67];
-/// Points of a compressed file per byte: a million equal points take 7 kB.
+/// Most points per byte of a compressed file: a million equal points take 7 kB.
 const MAX_POINTS_PER_BYTE: u64 = 1 << 10;
 const COMPRESSED: u8 = 0x80;
-/// LASzip's compressors: all points in one chunk, in many, and in chunks of layers.
+/// LASzip compressors: all points in one chunk, in several chunks, and in chunks of layers.
 const POINT_WISE: u16 = 1;
 const CHUNKED: u16 = 2;
 const LAYERED: u16 = 3;
@@ -36,7 +36,7 @@ const LAYERED: u16 = 3;
 /// First bytes of every LAS and LAZ file.
 pub(super) const SIGNATURE: &[u8; 4] = b"LASF";
 
-/// Number, size and scale of the points as the header declares them, held against the length of the file.
+/// Number, size and scale of the points declared by the header, checked against the length of the file.
 #[derive(Clone, Debug, PartialEq)]
 pub(super) struct DeclaredSize {
     /// Number of points, at least 1.
@@ -49,17 +49,17 @@ pub(super) struct DeclaredSize {
     pub compressed: bool,
     /// Factor from stored integers to coordinates, by axis.
     pub scale: [f64; 3],
-    /// Coordinates of the stored zero, by axis.
+    /// Coordinates of a stored zero, by axis.
     pub offset: [f64; 3],
-    /// Extent east-west and north-south that the header states, not checked.
+    /// Extent east-west and north-south according to the header, unchecked.
     pub extent: [f64; 2],
-    /// True when the reference system is well-known text.
+    /// True if the reference system is given as well-known text.
     pub well_known_text: bool,
-    /// Where the points start.
+    /// Offset of the points.
     pub data_start: u64,
-    /// Where the records before them start, and how many there are.
+    /// Offset and number of the records before the points.
     records: (u64, u64),
-    /// Where the records after them start, and how many there are.
+    /// Offset and number of the records after the points.
     extended_records: (u64, u64),
     /// Length of the file.
     file_bytes: u64,
@@ -68,9 +68,9 @@ pub(super) struct DeclaredSize {
 /// A record of a known kind.
 #[derive(Debug)]
 pub(super) struct Record {
-    /// `LASF_Projection` and the like.
+    /// User id, such as `LASF_Projection`.
     pub user: String,
-    /// Kind of record of that user.
+    /// Record id within that user id.
     pub id: u16,
     /// Content.
     pub data: Vec<u8>,
@@ -81,24 +81,24 @@ pub(super) struct Record {
 pub(super) struct Compression {
     /// The LASzip record.
     pub description: LazVlr,
-    /// How they are divided.
+    /// How the points are divided.
     pub chunks: Chunks,
-    /// Where they end: the decoder must not read on from there.
+    /// Offset of their end, beyond which the decoder must not read.
     pub end: u64,
 }
 
 /// How compressed points are divided.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) enum Chunks {
-    /// Formats 0 to 5, all in one.
+    /// Formats 0 to 5, in a single chunk.
     One,
-    /// Formats 0 to 5.
+    /// Formats 0 to 5, in several chunks.
     Many,
     /// Formats 6 to 10: chunks of layers.
     Layered,
 }
 
-/// Little-endian numbers at the places where the specification puts them.
+/// Little-endian numbers at the offsets of the specification.
 struct Header([u8; HEADER_BYTES]);
 
 impl Header {
@@ -129,10 +129,10 @@ impl Header {
     }
 }
 
-/// A failed read of a file that was opened.
+/// Error for a failed read from an open file.
 pub(super) fn unreadable(error: &io::Error) -> Refusal {
     match error.kind() {
-        io::ErrorKind::UnexpectedEof => Refusal::new("the point cloud breaks off"),
+        io::ErrorKind::UnexpectedEof => Refusal::new("the point cloud is truncated"),
         io::ErrorKind::InvalidData => Refusal::new(format!("is damaged: {error}")),
         _ => Refusal::new(format!("cannot be read: {error}")),
     }
@@ -146,7 +146,7 @@ impl DeclaredSize {
         let mut bytes = Vec::with_capacity(HEADER_BYTES);
         file.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut bytes).map_err(|e| unreadable(&e))?;
         if !bytes.starts_with(SIGNATURE) {
-            return Err(Refusal::new("is no LAS or LAZ file: it does not start with \"LASF\""));
+            return Err(Refusal::new("is not a LAS or LAZ file: it does not start with \"LASF\""));
         }
         let mut header = Header([0; HEADER_BYTES]);
         header.0[..bytes.len()].copy_from_slice(&bytes);
@@ -156,17 +156,20 @@ impl DeclaredSize {
     fn check(header: &Header, file_bytes: u64) -> Result<Self, Refusal> {
         let (major, minor) = (header.0[24], header.minor_version());
         let least = HEADER_SIZES.get(usize::from(minor)).copied().filter(|_| major == 1);
-        let least = least.ok_or_else(|| Refusal::new(format!("is LAS {major}.{minor}; 1.0 to 1.4 can be read")))?;
+        let least =
+            least.ok_or_else(|| Refusal::new(format!("is LAS {major}.{minor}; versions 1.0 to 1.4 are supported")))?;
         let header_size = header.u16(94);
         if header_size < least || u64::from(header_size) > file_bytes {
-            return Err(Refusal::new(format!("its LAS header has {header_size} bytes in a file of {file_bytes}")));
+            return Err(Refusal::new(format!(
+                "its LAS header claims {header_size} bytes in a file of {file_bytes} bytes"
+            )));
         }
         let data_start = u64::from(header.u32(96));
         let records = u64::from(header.u32(100));
         let room = data_start.checked_sub(u64::from(header_size)).filter(|_| data_start <= file_bytes);
         if room.is_none_or(|room| records * RECORD_HEADER_BYTES > room) {
             return Err(Refusal::new(format!(
-                "claims {records} records before its points at byte {data_start} of a file of {file_bytes}"
+                "claims {records} records before its points at byte {data_start} in a file of {file_bytes} bytes"
             )));
         }
         let (format, compressed) = point_format(header.0[104])?;
@@ -193,10 +196,12 @@ impl DeclaredSize {
         let least = POINT_BYTES[usize::from(self.format)];
         if self.point_bytes < least {
             let (format, bytes) = (self.format, self.point_bytes);
-            return Err(Refusal::new(format!("its points have {bytes} bytes; point format {format} takes {least}")));
+            return Err(Refusal::new(format!(
+                "its points have {bytes} bytes; point format {format} needs at least {least}"
+            )));
         }
         if self.points == 0 {
-            return Err(Refusal::new("holds no points"));
+            return Err(Refusal::new("has no points"));
         }
         let room = self.file_bytes - self.data_start;
         let most =
@@ -206,7 +211,7 @@ impl DeclaredSize {
             return Err(Refusal::new(format!("claims {points} points in {room} bytes, which hold at most {most}")));
         }
         if self.points > u64::from(u32::MAX) {
-            return Err(Refusal::new(format!("holds {} points; at most {} can be read", self.points, u32::MAX)));
+            return Err(Refusal::new(format!("has {} points; at most {} can be read", self.points, u32::MAX)));
         }
         Ok(())
     }
@@ -218,11 +223,11 @@ impl DeclaredSize {
         }
         let (scale, offset) = (self.scale, self.offset);
         Err(Refusal::new(format!(
-            "its coordinates have scale {scale:?} and offset {offset:?}; finite numbers belong there, and scales above 0"
+            "scale {scale:?} and offset {offset:?} of its coordinates must be finite, and the scale above 0"
         )))
     }
 
-    /// The records that say how coordinates and points are to be understood.
+    /// The records needed to interpret coordinates and points.
     pub fn records(&self, file: &mut (impl Read + Seek)) -> Result<Vec<Record>, Refusal> {
         let mut records = Vec::new();
         let (mut at, count) = self.records;
@@ -234,7 +239,7 @@ impl DeclaredSize {
         for _ in 0..count {
             let room = self.file_bytes.checked_sub(EXTENDED_RECORD_HEADER_BYTES);
             if room.is_none_or(|room| at > room) {
-                return Err(Refusal::new(format!("breaks off before its extended records at byte {at}")));
+                return Err(Refusal::new(format!("is truncated before its extended records at byte {at}")));
             }
             let length = u64_at(file, at + 20)?;
             at = self.take_record(file, at, (EXTENDED_RECORD_HEADER_BYTES, length), self.file_bytes, &mut records)?;
@@ -242,7 +247,7 @@ impl DeclaredSize {
         Ok(records)
     }
 
-    /// Reads the record that starts at a byte, if it is of use, and returns where the next one starts.
+    /// Reads the record at an offset, if it is relevant, and returns the offset of the next one.
     fn take_record(
         &self,
         file: &mut (impl Read + Seek),
@@ -254,7 +259,7 @@ impl DeclaredSize {
         let left = end.saturating_sub(start + head);
         if length > left {
             let kind = if head == RECORD_HEADER_BYTES { "a" } else { "an extended" };
-            return Err(Refusal::new(format!("claims {kind} record of {length} bytes where {left} are left")));
+            return Err(Refusal::new(format!("claims {kind} record of {length} bytes, but only {left} are left")));
         }
         let mut user = [0; 16];
         read_at(file, start + 2, &mut user)?;
@@ -268,10 +273,10 @@ impl DeclaredSize {
         Ok(start + head + length)
     }
 
-    /// How the points of a compressed file are stored: all that the decoder would believe is checked.
+    /// How the points of a compressed file are stored, with all values checked that the decoder would trust.
     pub fn compression(&self, file: &mut (impl Read + Seek), records: &[Record]) -> Result<Compression, Refusal> {
         let record = records.iter().find(|record| record.user.eq_ignore_ascii_case(LASZIP) && record.id == LASZIP_ID);
-        let record = record.ok_or_else(|| Refusal::new("is compressed, but lacks the LASzip record that says how"))?;
+        let record = record.ok_or_else(|| Refusal::new("is compressed but has no LASzip record"))?;
         let layered = self.format >= 6;
         let kind = self.check_items(&record.data, layered)?;
         let description = LazVlr::from_buffer(&record.data)
@@ -280,7 +285,7 @@ impl DeclaredSize {
             return Ok(Compression { description, chunks: Chunks::One, end: self.file_bytes });
         }
         if description.chunk_size() == 0 {
-            return Err(Refusal::new("its LASzip record describes chunks of no points"));
+            return Err(Refusal::new("its LASzip record describes empty chunks"));
         }
         let end = self.chunk_table(file)?;
         if layered {
@@ -289,8 +294,8 @@ impl DeclaredSize {
         Ok(Compression { description, chunks: if layered { Chunks::Layered } else { Chunks::Many }, end })
     }
 
-    /// The fields that the LASzip record lists must be those of the point format, since the decoder takes their sizes
-    /// as they come. Returns the kind of compressor.
+    /// Checks that the LASzip record lists the fields of the point format, because the decoder trusts their sizes. Returns the
+    /// kind of compressor.
     fn check_items(&self, record: &[u8], layered: bool) -> Result<u16, Refusal> {
         let word = |at: usize| record.get(at..at + 2).map(|b| u16::from_le_bytes([b[0], b[1]]));
         let compressors = if layered { LAYERED..=LAYERED } else { POINT_WISE..=CHUNKED };
@@ -304,16 +309,16 @@ impl DeclaredSize {
         )
     }
 
-    /// Where the table of chunks lies.
+    /// Offset of the chunk table.
     fn chunk_table(&self, file: &mut (impl Read + Seek)) -> Result<u64, Refusal> {
         let later = |at: &u64| *at > self.data_start && *at <= i64::MAX as u64;
-        // A writer that could not seek back puts the place at the end of the file.
+        // A writer that cannot seek back stores the offset at the end of the file.
         let places = [self.data_start, self.file_bytes - 8];
         let first = u64_at(file, places[0])?;
         let table = if later(&first) { first } else { u64_at(file, places[1])? };
         let table = Some(table).filter(|at| later(at) && *at <= self.file_bytes - 8);
-        let table = table.ok_or_else(|| Refusal::new("lacks the table of its compressed chunks: it breaks off"))?;
-        // Every chunk starts with a whole point.
+        let table = table.ok_or_else(|| Refusal::new("is truncated: the chunk table is missing"))?;
+        // Every chunk starts with an uncompressed point.
         let chunks = u64::from(u32_at(file, table + 4)?);
         if chunks * u64::from(self.point_bytes) > self.file_bytes {
             return Err(Refusal::new(format!("claims {chunks} chunks of points in {} bytes", self.file_bytes)));
@@ -321,8 +326,8 @@ impl DeclaredSize {
         Ok(table)
     }
 
-    /// Walks the chunks of point formats 6 to 10: a whole point, the number of points, the bytes of each layer, the
-    /// layers, up to the table of chunks.
+    /// Walks the chunks of point formats 6 to 10 up to the chunk table: an uncompressed point, the number of points, the bytes
+    /// of each layer, the layers.
     fn check_layers(&self, file: &mut (impl Read + Seek), table: u64) -> Result<(), Refusal> {
         let mut sizes = vec![0; 4 * laszip_layers(self.format, self.point_bytes)];
         let (mut at, mut points) = (self.data_start + 8, 0);
@@ -345,7 +350,7 @@ impl DeclaredSize {
 }
 
 fn points(header: &Header, minor: u8) -> u64 {
-    // LAS 1.4, "Legacy Number of Point Records": where both are given and differ, the older field counts.
+    // LAS 1.4, "Legacy Number of Point Records": if both are given and differ, the legacy field applies.
     match u64::from(header.u32(107)) {
         0 if minor == 4 => header.u64(247),
         legacy => legacy,
@@ -356,12 +361,12 @@ fn point_format(byte: u8) -> Result<(u8, bool), Refusal> {
     // LASzip marks a compressed file in the two highest bits.
     let (format, compressed) = (byte & 0x3f, byte & COMPRESSED != 0);
     if format > 10 || (!compressed && byte > 10) {
-        return Err(Refusal::new(format!("has the point format {byte}; 0 to 10 can be read")));
+        return Err(Refusal::new(format!("has point format {byte}; 0 to 10 are supported")));
     }
     Ok((format, compressed))
 }
 
-/// LASzip's item types and bytes of a point format.
+/// LASzip item types and sizes of a point format.
 fn laszip_items(format: u8, point_bytes: u16) -> Vec<(u16, u16)> {
     let base: &[(u16, u16)] = match format {
         0 => &[(6, 20)],
@@ -381,8 +386,8 @@ fn laszip_items(format: u8, point_bytes: u16) -> Vec<(u16, u16)> {
     base.iter().copied().chain((extra > 0).then_some((kind, extra))).collect()
 }
 
-/// Number of layers of a chunk of points of format 6 to 10: nine of the point, one of colour, near infrared and wave
-/// packet each, one of every extra byte.
+/// Number of layers in a chunk of point formats 6 to 10: nine for the point, one each for colour, near infrared and wave packet,
+/// one for every extra byte.
 fn laszip_layers(format: u8, point_bytes: u16) -> usize {
     let extra = usize::from(point_bytes - POINT_BYTES[usize::from(format)]);
     let others = match format {

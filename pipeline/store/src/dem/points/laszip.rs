@@ -1,7 +1,7 @@
-//! Points of LASzip files, one after the other.
+//! Sequential decoding of the points in LASzip files.
 //!
-//! The decoder is `laz` 0.13 (Apache-2.0, pure Rust, maintained). Of formats 6 to 10 it decodes the layers that are looked at here, which leaves out
-//! the times; of formats 0 to 5 it decodes all fields but the times, which `gps` does.
+//! The decoder is `laz` 0.13 (Apache-2.0, pure Rust, maintained). For formats 6 to 10 it decodes only the layers used here, which
+//! excludes the times; for formats 0 to 5 it decodes all fields except the times, which `gps` decodes.
 
 use super::gps::GpsTimes;
 use super::header::{Chunks, Compression};
@@ -13,7 +13,7 @@ use std::io::{self, BufReader, Read, Seek, Take};
 
 type Source = BufReader<File>;
 
-/// Decodes points.
+/// Decoder of points.
 pub(super) enum Points {
     /// Formats 0 to 5.
     Sequential(Box<Sequential>),
@@ -21,17 +21,17 @@ pub(super) enum Points {
     Layered(Box<LasZipDecompressor<'static, Source>>),
 }
 
-/// Points that are stored one after the other, in chunks that start anew.
+/// Points stored one after the other; the decoder resets at each chunk.
 pub(super) struct Sequential {
     record: SequentialPointRecordDecompressor<'static, Take<Source>>,
     items: Vec<LazItem>,
-    /// Points of the chunks to come.
+    /// Numbers of points in the remaining chunks.
     sizes: Box<dyn Iterator<Item = u64>>,
     left_in_chunk: u64,
 }
 
 impl Points {
-    /// The points of a source that stands at the first byte of their data.
+    /// Decoder for a source positioned at the first byte of the point data.
     pub fn new(mut source: Source, compression: &Compression) -> Result<Self, LasZipError> {
         let description = &compression.description;
         let sizes: Box<dyn Iterator<Item = u64>> = match compression.chunks {
@@ -54,7 +54,7 @@ impl Points {
         Ok(Self::Sequential(Box::new(Sequential { record, items, sizes, left_in_chunk: 0 })))
     }
 
-    /// Decodes as many points as `records` holds.
+    /// Decodes points until `records` is full.
     pub fn read(&mut self, records: &mut [u8], point_bytes: usize) -> Result<(), LasZipError> {
         match self {
             Self::Sequential(points) => {

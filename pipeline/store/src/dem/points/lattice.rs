@@ -1,13 +1,13 @@
-//! Which cell a point falls in.
+//! Assignment of points to cells.
 
 use super::survey::Survey;
 use crate::dem::raster::{MAX_CELLS, Refusal};
 use sastrugi_numeric::Geometry;
 
-/// Whole numbers up to here are exact.
+/// Integers up to this bound are exact.
 const MAX_INDEX: f64 = 9_007_199_254_740_992.0;
 
-/// The cells over a cloud, from whole multiples of the cell size.
+/// The cells that cover a cloud, aligned to integer multiples of the cell size.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Lattice {
     cell_m: f64,
@@ -21,7 +21,7 @@ pub(super) struct Lattice {
 }
 
 impl Lattice {
-    /// The lattice over all points of a survey.
+    /// The lattice that covers all points of a survey.
     pub fn new(survey: &Survey, cell_m: f64) -> Result<Self, Refusal> {
         let [west, south] = survey.low.map(|low| (low / cell_m).floor());
         let east = (survey.high[0] / cell_m).floor() + 1.0;
@@ -29,11 +29,11 @@ impl Lattice {
         if ![west, south, east, north].iter().all(|border| border.abs() < MAX_INDEX) {
             let (low, high) = (survey.low, survey.high);
             return Err(Refusal::new(format!(
-                "its points lie from {low:?} to {high:?}, too far for cells of {cell_m} m"
+                "its points from {low:?} to {high:?} are too far from the origin for cells of {cell_m} m"
             )));
         }
         let (cols, rows) = (east - west, north - south);
-        // Both are whole and below 2^54: the product is not, but large enough where it matters.
+        // Both are integers below 2^54. Their product may be rounded, but not where it matters.
         if cols * rows > MAX_CELLS as f64 {
             let size = [0, 1].map(|axis| survey.high[axis] - survey.low[axis]);
             return Err(Refusal::new(format!(

@@ -1,21 +1,21 @@
 //! Point clouds (LAS 1.0 to 1.4, LAZ), gridded to a DEM.
 //!
-//! Cell (i, j), i and j whole numbers, covers x from i c to (i + 1) c and y from j c to (j + 1) c, c being the cell size:
-//! clouds of one site that are gridded with one cell size have their cells in common. A point on a border belongs to the
-//! eastern or southern cell, as in `Geometry::cell_at`; points on the southern border of all belong to the last row. The
-//! height of a cell is a [`Statistic`] of its points; a cell without points has none, unless [`GridSettings::fill_cells`]
-//! asks for small gaps to be filled (`fill.rs` says how).
+//! Cell (i, j), i and j integers, covers x from i c to (i + 1) c and y from j c to (j + 1) c, with c the cell size: clouds of
+//! one site gridded with the same cell size share their cells. A point on a border belongs to the eastern or southern cell, as
+//! in `Geometry::cell_at`; points on the southern border of the grid belong to the last row. The height of a cell is a
+//! [`Statistic`] of its points; a cell without points has no data, unless [`GridSettings::fill_cells`] requests filling of
+//! small gaps (see `fill.rs`).
 //!
-//! Statistics are taken of the integers that the file stores, so that a mean is rounded once, whatever the order of the
-//! points. A percentile p of n sorted heights is interpolated at (n - 1) p / 100 (Hyndman and Fan 1996, definition 7, as
-//! numpy does).
+//! Statistics are computed from the integers stored in the file, so that a mean is rounded only once, independently of the order
+//! of the points. A percentile p of n sorted heights is interpolated at (n - 1) p / 100 (Hyndman and Fan 1996, definition 7, as
+//! in numpy).
 //!
-//! Memory: 4 MiB of decoded points and, for LAZ of point formats 6 to 10, one compressed chunk of the file; 20 bytes per
-//! cell, 40 while gaps are filled; for medians and percentiles also 8 bytes per point; while a cell size is sought, up to 64 MiB. The file is decoded
-//! twice, and once or twice more when no cell size is given (3.5 s per pass and 10^7 points of LAZ).
+//! Memory: 4 MiB of decoded points and, for LAZ of point formats 6 to 10, one compressed chunk of the file; 20 bytes per cell, 40
+//! while gaps are filled; for medians and percentiles also 8 bytes per point; while searching for a cell size, up to 64 MiB. The
+//! file is decoded twice, and once or twice more if no cell size is given (3.5 s per pass for 10^7 points of LAZ).
 //!
-//! Heights and coordinates in feet are taken as metres, with a note. The reference system is found in the GeoTIFF keys or
-//! the well-known text of the records before or after the points.
+//! Heights and coordinates in feet are treated as metres, with a note. The reference system is taken from the GeoTIFF keys or the
+//! well-known text in the records before or after the points.
 
 mod cell_size;
 mod cloud;
@@ -49,9 +49,9 @@ use survey::{Chosen, survey};
 /// A gridded cloud.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gridded {
-    /// Heights and what the file says.
+    /// Heights and metadata.
     pub dem: Dem,
-    /// Points of every cell; 0 where a height was filled in.
+    /// Number of points in each cell; 0 where a height was filled in.
     pub counts: Grid<u32>,
     /// Number of cells that were filled.
     pub filled: usize,
@@ -60,14 +60,41 @@ pub struct Gridded {
 /// Reads and grids a point cloud.
 ///
 /// # Errors
-/// [`DemError::Unfit`] for settings out of range; otherwise as [`super::read`]: a file that is damaged, holds no usable point,
-/// lies in degrees, or covers more than [`MAX_CELLS`] cells.
+/// [`DemError::Unfit`] for settings out of range; otherwise as [`super::read`]: a file that is damaged, has no usable points, is in
+/// degrees, or covers more than [`MAX_CELLS`] cells.
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use las::{Builder, Point, Transform, Vector, Writer};
+/// use sastrugi_store::dem::points::{GridSettings, Statistic, read};
+///
+/// let mut builder = Builder::from((1, 4));
+/// let millimetres = Transform { scale: 0.001, offset: 0.0 };
+/// builder.transforms = Vector { x: millimetres, y: millimetres, z: millimetres };
+/// let mut writer = Writer::new(std::io::Cursor::new(vec![]), builder.into_header()?)?;
+/// for (x, y, z) in [(0.2, 0.3, 1.0), (0.8, 0.9, 3.0), (2.5, 0.5, 7.0)] {
+///     writer.write_point(Point { x, y, z, return_number: 1, number_of_returns: 1, ..Point::default() })?;
+/// }
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("cloud.las");
+/// std::fs::write(&path, writer.into_inner()?.into_inner())?;
+///
+/// let gridded = read(&path, &GridSettings { cell_m: Some(1.0), ..GridSettings::default() })?;
+/// assert_eq!(gridded.counts.values, [2, 0, 1]);
+/// assert!((gridded.dem.grid.values[0] - 2.0).abs() < 1e-12 && gridded.dem.grid.values[1].is_nan());
+///
+/// let highest = GridSettings { cell_m: Some(1.0), statistic: Statistic::Max, ..GridSettings::default() };
+/// assert!((read(&path, &highest)?.dem.grid.values[0] - 3.0).abs() < 1e-12);
+/// # Ok(())
+/// # }
+/// ```
 pub fn read(path: &Path, settings: &GridSettings) -> Result<Gridded, DemError> {
     let file = crate::file::open(path).map_err(|e| DemError::reading(path, e))?;
     read_open(path, file, settings)
 }
 
-/// The DEM of a cloud whose file is open. Its cell size is that of the settings, or else that of the options.
+/// The DEM of a cloud whose file is open. The cell size is that of the settings, or else that of the options.
 pub(super) fn read_dem(
     path: &Path,
     file: File,
@@ -82,27 +109,27 @@ pub(super) fn read_dem(
 fn square_cell(options: &ReadOptions) -> Result<Option<f64>, Refusal> {
     match options.cell_m {
         Some([x, y]) if x != y => {
-            Err(Refusal::new(format!("a point cloud is gridded to square cells, not to cells of {x} x {y} m")))
+            Err(Refusal::new(format!("a point cloud can only be gridded to square cells, got {x} x {y} m")))
         }
         cell => Ok(cell.map(|[side, _]| side)),
     }
 }
 
-/// As [`read`], with the file open already.
+/// As [`read`], for a file that is already open.
 fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded, DemError> {
     settings::check(settings).map_err(|reason| DemError::Unfit { path: path.to_owned(), reason })?;
     Cloud::open(path, file).and_then(|cloud| gridded(&cloud, settings)).map_err(|refusal| refusal.about(path))
 }
 
-/// What the header of a cloud says it will be gridded to, with cells of a given size.
+/// Size of the grid according to the header of a cloud, for a given cell size.
 pub(super) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
     let DeclaredSize { points, extent, .. } = DeclaredSize::read(&mut file).ok()?;
     let cells = match cell_m {
         Some(cell) => (extent[0] / cell + 1.0) * (extent[1] / cell + 1.0),
-        // Without a size, three quarters of the cells hold a point.
+        // Without a given size, about three quarters of the cells hold a point.
         None => points as f64 / 0.75,
     };
-    // An extent that is no number is found out when the cloud is read.
+    // A NaN extent is detected when the cloud is read.
     Some(Claimed::size((cells as u64).min(MAX_CELLS), points, cell_m))
 }
 
@@ -127,13 +154,13 @@ fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
     let (held, cells) = (counts.iter().filter(|n| **n > 0).count(), counts.len());
     let statistic = settings.statistic.name();
     notes.push(format!(
-        "{} points were gridded ({statistic} of each cell of {cell_m} m); {held} of {cells} cells hold points",
+        "{} points gridded ({statistic} of each cell of {cell_m} m); {held} of {cells} cells hold points",
         survey.points
     ));
     let geometry = lattice.geometry();
     let filled = fill::fill(&mut heights, geometry.rows, geometry.cols, settings.fill_cells)?;
     if settings.fill_cells > 0 {
-        notes.push(format!("{filled} cells in gaps were filled, up to {} cells from points", settings.fill_cells));
+        notes.push(format!("{filled} gap cells filled, up to {} cells from points", settings.fill_cells));
     }
     let info = DemInfo {
         format: Format::Las,

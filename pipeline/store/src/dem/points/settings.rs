@@ -1,38 +1,47 @@
-//! The settings by which points are gridded, and the limits of these.
+//! Settings for gridding points, and their limits.
 
 use std::str::FromStr;
 
-/// Most points of which a median or a percentile is taken: 2 GiB.
+/// Most points for a median or percentile: 2 GiB.
 pub const MAX_RANKED_POINTS: u64 = 1 << 28;
-/// Furthest that a gap is filled, cells.
+/// Largest distance from points to which a gap is filled, cells.
 pub const MAX_FILL_CELLS: u32 = 100;
 
-/// How points become cells.
+/// How points are gridded.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct GridSettings {
-    /// Side of a cell, m; without it, the size at which about three quarters of the cells hold a point.
+    /// Side of a cell, m; by default the size at which about three quarters of the cells hold a point.
     pub cell_m: Option<f64>,
-    /// Which height a cell takes.
+    /// Statistic that gives the height of a cell.
     pub statistic: Statistic,
-    /// How far from a cell with points a gap is filled, cells; 0 fills none.
+    /// Distance from cells with points up to which gaps are filled, cells; 0 fills none.
     pub fill_cells: u32,
-    /// Take only points of class 2, ground. Withheld points and those of the noise classes 7 and 18 are never taken.
+    /// Use only points of class 2, ground. Withheld points and the noise classes 7 and 18 are never used.
     pub ground_only: bool,
 }
 
-/// The height of a cell, from those of its points.
+/// Height of a cell, from the heights of its points.
+///
+/// # Examples
+/// ```
+/// use sastrugi_store::dem::points::Statistic;
+///
+/// assert_eq!("p90".parse::<Statistic>(), Ok(Statistic::Percentile(90.0)));
+/// assert_eq!("median".parse::<Statistic>(), Ok(Statistic::Median));
+/// assert!("p101".parse::<Statistic>().is_err());
+/// ```
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub enum Statistic {
-    /// Their mean.
+    /// Mean.
     #[default]
     Mean,
-    /// The 50th percentile.
+    /// 50th percentile.
     Median,
-    /// A percentile, 0 to 100.
+    /// Percentile, 0 to 100.
     Percentile(f64),
-    /// The lowest.
+    /// Lowest.
     Min,
-    /// The highest.
+    /// Highest.
     Max,
 }
 
@@ -55,7 +64,7 @@ impl FromStr for Statistic {
 }
 
 impl Statistic {
-    /// What a height is of the points of its cell, in words.
+    /// Name of the statistic, for notes.
     pub(super) fn name(self) -> String {
         match self {
             Self::Mean => "mean".to_owned(),
@@ -70,15 +79,15 @@ impl Statistic {
 /// Refuses settings out of range.
 pub(super) fn check(settings: &GridSettings) -> Result<(), String> {
     if let Some(cell) = settings.cell_m.filter(|cell| !(cell.is_finite() && *cell > 0.0)) {
-        return Err(format!("the cell size is {cell} m; it must be above 0"));
+        return Err(format!("the cell size must be above 0, got {cell} m"));
     }
     if let Statistic::Percentile(p) = settings.statistic
         && !(0.0..=100.0).contains(&p)
     {
-        return Err(format!("the percentile is {p}; it must be 0 to 100"));
+        return Err(format!("the percentile must be from 0 to 100, got {p}"));
     }
     if settings.fill_cells > MAX_FILL_CELLS {
-        return Err(format!("gaps are filled up to {} cells; at most {MAX_FILL_CELLS} can be", settings.fill_cells));
+        return Err(format!("gaps can be filled up to {MAX_FILL_CELLS} cells, got {}", settings.fill_cells));
     }
     Ok(())
 }

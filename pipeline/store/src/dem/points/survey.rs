@@ -1,18 +1,18 @@
-//! Which points of a cloud are gridded, and where they lie.
+//! Selection of the points of a cloud to be gridded, and their extent.
 
 use super::cloud::{Cloud, Point};
 use crate::dem::crs::Crs;
 use crate::dem::raster::Refusal;
 
-/// The points of a cloud that are wanted.
+/// The selected points of a cloud.
 pub(super) struct Chosen<'a> {
     pub cloud: &'a Cloud,
-    /// Only those of class 2, ground.
+    /// Select only points of class 2, ground.
     pub ground_only: bool,
 }
 
 impl Chosen<'_> {
-    /// Calls `f` with every point, in the order of the file.
+    /// Calls `f` with every selected point, in the order of the file.
     pub fn for_each(&self, mut f: impl FnMut(Point)) -> Result<(), Refusal> {
         self.cloud.for_each(|point| {
             if !point.is_noise() && (point.is_ground() || !self.ground_only) {
@@ -22,7 +22,7 @@ impl Chosen<'_> {
     }
 }
 
-/// Where the wanted points lie.
+/// Number and extent of the selected points.
 #[derive(Clone, Copy, Debug)]
 pub(super) struct Survey {
     pub points: u64,
@@ -31,7 +31,7 @@ pub(super) struct Survey {
     pub high: [f64; 2],
 }
 
-/// Looks at every point once; also returns what a user must know of those that are left out.
+/// Surveys all points in one pass; also returns notes on the points left out.
 pub(super) fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refusal> {
     let cloud = chosen.cloud;
     let (mut points, mut noise, mut other) = (0_u64, 0_u64, 0_u64);
@@ -51,22 +51,22 @@ pub(super) fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refus
     })?;
     let total = cloud.declared.points;
     if points == 0 && other > 0 {
-        return Err(Refusal::new(format!("none of its {total} points is of class 2, ground")));
+        return Err(Refusal::new(format!("none of the {total} points is of class 2, ground")));
     }
     if points == 0 {
-        return Err(Refusal::new(format!("all of its {total} points are withheld or noise")));
+        return Err(Refusal::new(format!("all {total} points are withheld or noise")));
     }
     let place = |stored: [i32; 2]| [0, 1].map(|axis| cloud.coordinate(axis, f64::from(stored[axis])));
     let survey = Survey { points, low: place(low), high: place(high) };
     let mut notes = cloud.crs.unit_notes();
     if cloud.crs == Crs::default() {
-        notes.push("the file names no reference system; coordinates are taken as metres".to_owned());
+        notes.push("the file names no reference system; coordinates are treated as metres".to_owned());
     }
     if noise > 0 {
-        notes.push(format!("{noise} points that are withheld or noise (classes 7 and 18) were left out"));
+        notes.push(format!("{noise} points that are withheld or noise (classes 7 and 18) are left out"));
     }
     if other > 0 {
-        notes.push(format!("{other} points of other classes than ground (2) were left out"));
+        notes.push(format!("{other} points of classes other than ground (2) are left out"));
     }
     Ok((survey, notes))
 }

@@ -1,14 +1,14 @@
-//! Gazebo: a model and a world in SDFormat 1.9: a heightmap to look at, and a mesh of the same posts to collide with. Scene
-//! coordinates as they are.
+//! Gazebo: a model and a world in SDFormat 1.9, with a heightmap as the visual and a mesh of the same posts for collisions. Scene
+//! coordinates are unchanged.
 //!
-//! The picture must be square, of 2^n + 1 posts; its first row is the northern one. Level 0 is the model's height, level 65535 that
-//! plus `size` z: the lowest and highest post take them, because loaders scale by the picture's brightest pixel. The renderer
-//! (gz-rendering, `Ogre2Heightmap`) lays 2^n spacings over `size` x and y, and drops the last row and column.
+//! The image must be square, of 2^n + 1 posts; its first row is the northern one. Level 0 is the model's height, level 65535 that
+//! plus `size` z. The lowest and highest post take these levels, because loaders scale by the brightest pixel. The renderer
+//! (gz-rendering, `Ogre2Heightmap`) spreads 2^n spacings over `size` x and y, and drops the last row and column.
 //!
-//! The mesh counts heights from the lowest post, so that single precision keeps small relief high above the sea.
+//! Mesh heights are relative to the lowest post, so that single precision resolves small relief at high elevation.
 //!
-//! Why the physics has a mesh: that of a heightmap divides `size` by 2^n + 1 (gz-physics, `CustomHeightmapShape` of dartsim), and
-//! takes a relief of 1 m where the loader finds no brightest pixel, as gz-common 4 in pictures of 16 bit (`Image::MaxColor`).
+//! Physics uses a mesh because a heightmap collision divides `size` by 2^n + 1 (gz-physics, `CustomHeightmapShape` of dartsim), and
+//! assumes a relief of 1 m if the loader finds no brightest pixel, as gz-common 4 does for 16-bit images (`Image::MaxColor`).
 
 use super::levels::Levels;
 use super::parts::{Parts, SAME};
@@ -19,7 +19,7 @@ use crate::dem::{mesh, png};
 use serde_json::json;
 
 const COLLISION: &str = "collision.obj";
-/// Posts a side.
+/// Posts per side.
 pub(super) const SIZES: [usize; 6] = [129, 257, 513, 1025, 2049, 4097];
 
 pub(super) fn parts(posts: &Posts, decimation: Option<&Decimation>) -> Result<Parts, Refusal> {
@@ -45,10 +45,10 @@ pub(super) fn parts(posts: &Posts, decimation: Option<&Decimation>) -> Result<Pa
         }),
         steps: vec![
             "`gz sim world.sdf` in this folder shows the terrain.".to_owned(),
-            "For a world of your own, put this folder where `GZ_SIM_RESOURCE_PATH` points and include `model.sdf`; its pose places \
-             the ground."
+            "For your own world, put this folder in `GZ_SIM_RESOURCE_PATH` and include `model.sdf`; its pose positions the ground."
                 .to_owned(),
-            "The visual is the height map; the collision is a mesh of the same posts, whose heights no loader scales.".to_owned(),
+            "The visual is the height map; the collision is a mesh of the same posts, whose heights are not rescaled by loaders."
+                .to_owned(),
         ],
     })
 }
@@ -80,7 +80,7 @@ fn world(model: &str) -> String {
 
 fn model(posts: &Posts) -> String {
     let numbers = |[x, y, z]: [f64; 3]| format!("{x} {y} {z}");
-    // The mesh is in scene coordinates across, wherever the model stands, and above its height as the model is.
+    // The mesh is in scene coordinates horizontally, whatever the model's position, and relative to the model's height vertically.
     let [x, y] = posts.centre_m();
     let back = [0.0 - x, 0.0 - y, 0.0];
     format!(

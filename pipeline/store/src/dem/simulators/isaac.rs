@@ -1,5 +1,5 @@
-//! Isaac Sim, and other programs that read OpenUSD: a mesh in metres, z up, whose own triangles collide. Scene coordinates as
-//! they are; cells without data are holes.
+//! Isaac Sim, and other programs that read OpenUSD: a mesh in metres, z up, that collides by its own triangles. Scene coordinates
+//! are unchanged; cells without data are holes.
 
 use super::parts::{Parts, SAME};
 use super::posts::Posts;
@@ -24,8 +24,8 @@ pub(super) fn parts(posts: &Posts, decimation: Option<&Decimation>) -> Result<Pa
             "collision": "triangles of the mesh (physics:approximation = none)",
         }),
         steps: vec![
-            format!("File, Open `{SCENE}`, or Add Reference in a stage of metres with z up: the prim is /Terrain."),
-            "The mesh collides by its own triangles; a physics scene and a material are the stage's.".to_owned(),
+            format!("File, Open `{SCENE}`, or Add Reference in a stage in metres with z up: the prim is /Terrain."),
+            "The mesh collides by its own triangles; add a physics scene and a material in the stage.".to_owned(),
         ],
     })
 }

@@ -8,7 +8,7 @@ use serde_json::{Value, json};
 pub(super) struct Levels {
     /// Height of level 0, m.
     pub offset_m: f64,
-    /// Height from one level to the next, m.
+    /// Height difference between levels, m.
     pub step_m: f64,
 }
 
@@ -23,13 +23,13 @@ impl Levels {
     }
 }
 
-/// A number of few digits, such as a person types, that is not below `value` (above 0) and above it by less than 3e-5 of it.
+/// A number with few digits, easy to type, that is not below `value` (above 0) and exceeds it by less than a share of 3e-5.
 pub(super) fn rounded_up(value: f64) -> f64 {
-    // Six digits are off by half of 1e-5 at most.
+    // Rounding to six digits is off by at most half of 1e-5.
     format!("{:.5e}", value * (1.0 + 1e-5)).parse().unwrap_or(value)
 }
 
-/// To whole millimetres; never the zero that is written with a minus.
+/// Rounded to whole millimetres, without negative zero.
 pub(super) fn to_millimetres(value: f64) -> f64 {
     (value * 1000.0).round() / 1000.0 + 0.0
 }

@@ -1,13 +1,13 @@
-//! Folders to import into simulators: the heights in a form that the program takes, `import.json` with every number that its
-//! import asks for, and `README.md` with the steps.
+//! Folders for import into simulators: the heights in a supported format, `import.json` with all values that the import requires,
+//! and `README.md` with the steps.
 //!
-//! Cell centres are posts: the ground reaches from the outer centres to the outer centres, `(cols - 1) x (rows - 1)` cells, and no
-//! height is made up beyond. Scene coordinates (x east, y north, z up, m) are the DEM's less its south-west corner, because
-//! simulators count in single precision; for most generated terrains without `origin_m` they are the terrain's own. `scene_to_target`
-//! in `import.json` takes them to those of the program, in whose axes and units all other numbers are.
+//! Posts are cell centres: the ground extends between the outer centres, `(cols - 1) x (rows - 1)` cells, and is not extrapolated.
+//! Scene coordinates (x east, y north, z up, m) are the DEM's minus its south-west corner, because simulators use single precision;
+//! for most generated terrains without `origin_m` they are the terrain's own. `scene_to_target` in `import.json` converts them to the
+//! coordinates of the simulator, in whose axes and units all other numbers are.
 //!
-//! Where a program takes certain sizes only, the DEM is resampled or cropped ([`Fit`]), and `import.json` says how; a larger DEM is
-//! refused, not thinned.
+//! If a simulator only supports certain sizes, the DEM is resampled or cropped ([`Fit`]), as recorded in `import.json`; a DEM that
+//! is too large is refused, not thinned.
 
 mod gazebo;
 mod isaac;
@@ -36,17 +36,17 @@ use std::{fs, io};
 const IMPORT: &str = "import.json";
 const README: &str = "README.md";
 
-/// What an export takes.
+/// Cost of an export.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Cost {
-    /// Rough peak of the working memory beside the DEM, bytes.
+    /// Approximate peak memory in addition to the DEM, bytes.
     pub memory_bytes: u64,
-    /// Rough length of the files, bytes.
+    /// Approximate size of the files, bytes.
     pub file_bytes: u64,
 }
 
 impl Cost {
-    /// Of so many posts, measured, rounded up: heights, levels or vertices, and the text of a mesh where there is one.
+    /// Cost for a number of posts, from measurements, rounded up: heights, levels or vertices, and the text of a mesh if any.
     fn of(simulator: Simulator, posts: u64) -> Self {
         let (memory, files) = match simulator {
             Simulator::Unreal | Simulator::Unity => (24, 2),
@@ -58,27 +58,27 @@ impl Cost {
     }
 }
 
-/// How a DEM of another size is fitted to a simulator that takes certain sizes only.
+/// How a DEM is fitted to a simulator that only supports certain sizes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
 pub enum Fit {
-    /// The smallest size that is large enough, laid over the same ground, bilinear between the cell centres: nothing is cut off,
-    /// peaks lose height.
+    /// Resample to the smallest size that is large enough, over the same ground, bilinear between the cell centres: nothing is cut
+    /// off, but peaks lose height.
     #[default]
     Resample,
-    /// The largest size that the DEM has, in its middle: every height stays.
+    /// Crop to the largest size that fits, in the middle of the DEM: heights are unchanged.
     Crop,
 }
 
-/// What to import into a simulator.
+/// Files to import into a simulator.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Export {
     /// Files of the folder: name and bytes.
     pub files: Vec<(String, Vec<u8>)>,
-    /// Sentences a user must know.
+    /// Notes for the user.
     pub notes: Vec<String>,
 }
 
-/// The sides, in posts, of which a simulator takes square terrains only; ascending.
+/// Supported sides in posts, ascending, of a simulator that only takes square terrains of certain sizes.
 const fn sizes(simulator: Simulator) -> Option<&'static [usize]> {
     match simulator {
         Simulator::Unreal => Some(&unreal::SIZES),
@@ -88,26 +88,26 @@ const fn sizes(simulator: Simulator) -> Option<&'static [usize]> {
     }
 }
 
-/// What an export of a DEM of this size takes.
+/// Cost of exporting a DEM of this size.
 ///
 /// # Errors
-/// [`DemError::Unfit`] for fewer than two rows or columns; more, or for a crop fewer, than the program takes.
+/// [`DemError::Unfit`] for fewer than two rows or columns, for more than the simulator supports, or for a crop, for fewer.
 pub fn check_size(geometry: &Geometry, simulator: Simulator, fit: Fit) -> Result<Cost, DemError> {
     let side = size(geometry, simulator, fit).map_err(|refusal| refusal.unfit(Path::new(simulator.name())))?;
     Ok(Cost::of(simulator, side.map_or(geometry.len(), |side| side * side) as u64))
 }
 
-/// What to do about a DEM that is too large.
+/// Advice for a DEM that is too large.
 const SMALLER: &str = "choose a smaller size, or cut a window";
 
-/// Posts a side where the simulator takes certain sizes only.
+/// Posts per side, if the simulator only supports certain sizes.
 fn size(g: &Geometry, simulator: Simulator, fit: Fit) -> Result<Option<usize>, Refusal> {
     let cells = format!("{} x {} cells", g.cols, g.rows);
     if g.rows < 2 || g.cols < 2 {
-        return Err(Refusal::new(format!("{cells} are no surface, which takes two rows and two columns at least")));
+        return Err(Refusal::new(format!("a surface needs at least 2 x 2 cells, got {} x {}", g.cols, g.rows)));
     }
     if simulator == Simulator::Isaac && g.len() > mesh::MAX_CELLS {
-        return Err(Refusal::new(format!("{cells} are more than the {} of a mesh; {SMALLER}", mesh::MAX_CELLS)));
+        return Err(Refusal::new(format!("{cells} exceed the {} of a mesh; {SMALLER}", mesh::MAX_CELLS)));
     }
     let Some(sizes) = sizes(simulator) else { return Ok(None) };
     let (smallest, largest) = (sizes[0], sizes[sizes.len() - 1]);
@@ -118,24 +118,24 @@ fn size(g: &Geometry, simulator: Simulator, fit: Fit) -> Result<Option<usize>, R
         ),
         Fit::Crop => (
             sizes.iter().rfind(|&&size| size <= g.cols.min(g.rows)),
-            format!("{cells} are fewer than {smallest} posts a side, of which a crop is made; leave --crop out"),
+            format!("{cells} are fewer than {smallest} posts a side, the smallest crop; omit --crop"),
         ),
     };
     fitting.copied().ok_or_else(|| Refusal::new(refusal)).map(Some)
 }
 
-/// The files for a simulator, of heights in metres. The same heights give the same bytes. Where the folder holds
-/// a mesh, `limits` decimate it.
+/// The files for a simulator, from heights in metres. The same heights give the same bytes. `limits` decimate the mesh, if the
+/// folder contains one.
 ///
 /// # Errors
-/// [`DemError::Unfit`] as [`check_size`], for cells without data where the program has no holes, and for heights beyond single
-/// precision.
+/// [`DemError::Unfit`] as [`check_size`], for cells without data if the simulator does not support holes, and for heights beyond
+/// single precision.
 pub fn export(grid: &Grid, simulator: Simulator, fit: Fit, limits: Option<&MeshLimits>) -> Result<Export, DemError> {
     export_posts(simulator, posts(grid, simulator, fit), limits)
 }
 
-/// As [`export`], of a DEM that was brought from degrees to metres: its own coordinates are not those of the scene shifted, and the
-/// files say so.
+/// As [`export`], for a DEM converted from degrees to metres: the scene is not just a shift of its own coordinates, and the files
+/// say so.
 ///
 /// # Errors
 /// As [`export`].
@@ -148,7 +148,7 @@ pub fn export_from_degrees(
     export_posts(simulator, posts(grid, simulator, fit).map(Posts::of_degrees), limits)
 }
 
-/// True for simulators whose folder holds a mesh, which may be decimated.
+/// True for simulators whose folder contains a mesh, which may be decimated.
 pub const fn has_mesh(simulator: Simulator) -> bool {
     matches!(simulator, Simulator::Gazebo | Simulator::Isaac)
 }
@@ -173,20 +173,20 @@ fn export_posts(
     Ok(Export { files, notes: mesh::with_decimation(notes, decimation.as_ref()) })
 }
 
-/// Refuses a folder that holds something else than an export for this simulator, which is what [`write()`] would overwrite.
+/// Refuses a folder with files other than an export for this simulator, which [`write()`] would overwrite.
 ///
 /// # Errors
-/// [`DemError::Unfit`] for such a folder, [`DemError::Io`] when it cannot be read.
+/// [`DemError::Unfit`] for such a folder, [`DemError::Io`] if it cannot be read.
 pub fn check_folder(folder: &Path, simulator: Simulator) -> Result<(), DemError> {
     if is_vacant(folder).map_err(|source| DemError::Io { path: folder.to_owned(), source })? || holds(folder, simulator)
     {
         return Ok(());
     }
-    let reason = format!("is a folder with files, but without an export for {}; name a new folder", simulator.name());
+    let reason = format!("the folder has files but no export for {}; choose a new folder", simulator.name());
     Err(Refusal::new(reason).unfit(folder))
 }
 
-/// True where there is no folder, or one without a file; what runs write at this moment does not count.
+/// True if the folder does not exist or is empty; temporary files of running processes do not count.
 fn is_vacant(folder: &Path) -> io::Result<bool> {
     match fs::read_dir(folder) {
         Err(e) if e.kind() == io::ErrorKind::NotFound => Ok(true),
@@ -199,7 +199,7 @@ fn is_vacant(folder: &Path) -> io::Result<bool> {
     }
 }
 
-/// True for a folder whose `import.json` is this program's, whatever its version, for this simulator.
+/// True for a folder whose `import.json` was written by any version of this program for this simulator.
 fn holds(folder: &Path, simulator: Simulator) -> bool {
     let name = |program: &str| program.split('/').next().map(str::to_owned);
     let text = fs::read(folder.join(IMPORT)).unwrap_or_default();
@@ -208,17 +208,17 @@ fn holds(folder: &Path, simulator: Simulator) -> bool {
     program == name(crate::PROGRAM) && found["target"] == simulator.name()
 }
 
-/// Writes the files of an export to a folder, which is made where there is none. See [`check_folder`] for one that is there.
+/// Writes the files of an export to a folder, which is created if missing. See [`check_folder`] for an existing one.
 ///
 /// # Errors
-/// [`DemError::Io`] when a file cannot be written.
+/// [`DemError::Io`] if a file cannot be written.
 pub fn write(folder: &Path, export: &Export) -> Result<(), DemError> {
     atomic::clear_leftovers(&folder.join(IMPORT));
     let at = |name: &str| folder.join(name);
     let (first, others): (Vec<_>, Vec<_>) = export.files.iter().partition(|(name, _)| name == IMPORT);
     let put = |(name, bytes): &(String, Vec<u8>)| save((&at(name)).into(), bytes);
-    // `import.json` first: by it a later run may complete the folder of a killed one. Then what an earlier export left there goes, so that
-    // such a folder lacks files rather than holding those of another terrain.
+    // `import.json` first, so that a later run can complete the folder of a killed one. Then files of an earlier export are removed: after
+    // a kill the folder may be incomplete, but does not mix terrains.
     first.into_iter().try_for_each(put)?;
     for (name, _) in &others {
         match fs::remove_file(at(name)) {
@@ -257,7 +257,7 @@ fn import_json(posts: &Posts, parts: &Parts, simulator: Simulator) -> String {
         "target": simulator.name(),
         "scene": {
             "axes": "x east, y north, z up, m",
-            // None where the DEM's own coordinates are degrees.
+            // Null if the DEM's own coordinates are degrees.
             "dem_minus_scene_m": (!posts.from_degrees).then_some(posts.shift_m),
             "south_west_post_m": posts.south_west_m(),
             "ground_m": posts.ground_m(),
@@ -276,23 +276,27 @@ fn import_json(posts: &Posts, parts: &Parts, simulator: Simulator) -> String {
 }
 
 fn readme(posts: &Posts, parts: &Parts) -> String {
-    let (g, [east, north]) = (posts.geometry(), posts.ground_m());
+    let (g, [east, north]) = (posts.geometry(), posts.ground_m().map(readable));
+    let [spacing_x, spacing_y] = g.cell.map(readable);
     let mut text = format!("# Terrain for {}\n\n", parts.title);
     // Writing to a string cannot fail.
     let _ = write!(
         text,
-        "Ground: {east} m east-west by {north} m north-south between the outer posts, heights {} to {} m. {} x {} posts, {} x {} m \
-         apart; every post is a point of the ground, not a cell.",
-        posts.low_m, posts.high_m, g.cols, g.rows, g.cell[0], g.cell[1]
+        "Ground: {east} m east-west by {north} m north-south between the outer posts, heights from {} to {} m. {} x {} posts, \
+         {spacing_x} x {spacing_y} m apart; a post is a point on the ground, not a cell.",
+        readable(posts.low_m),
+        readable(posts.high_m),
+        g.cols,
+        g.rows
     );
     let _ = match posts.sentence() {
         Some(sentence) => write!(text, " {sentence}.\n\n"),
-        None => write!(text, " They are the cell centres of the DEM.\n\n"),
+        None => write!(text, " The posts are the cell centres of the DEM.\n\n"),
     };
     let _ = write!(
         text,
-        "Scene coordinates (x east, y north, z up, m) {}; `scene_to_target` in `import.json` takes them to those of {}: {}. The \
-         numbers below stand there too.\n\n",
+        "Scene coordinates (x east, y north, z up, m) {}; `scene_to_target` in `import.json` converts them to those of {}: {}. The \
+         numbers below are also in `import.json`.\n\n",
         scene(posts),
         parts.title,
         parts.axes
@@ -303,10 +307,15 @@ fn readme(posts: &Posts, parts: &Parts) -> String {
     text
 }
 
-/// What the scene counts from.
+/// A number to read or type, rounded to six decimals, which hides rounding errors such as 50.400000000000006.
+fn readable(value: f64) -> f64 {
+    (value * 1e6).round() / 1e6 + 0.0
+}
+
+/// Origin of the scene coordinates, in words.
 fn scene(posts: &Posts) -> String {
     match posts.shift_m {
-        _ if posts.from_degrees => "count from the south-west corner of the DEM, which is in degrees".to_owned(),
-        [x, y] => format!("are the DEM's less ({x}, {y})"),
+        _ if posts.from_degrees => "are relative to the south-west corner of the DEM, which is in degrees".to_owned(),
+        [x, y] => format!("are the DEM's minus ({x}, {y})"),
     }
 }

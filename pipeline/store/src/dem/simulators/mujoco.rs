@@ -1,7 +1,7 @@
-//! MuJoCo: an MJCF file with a height field in MuJoCo's own binary form (XML reference, `asset/hfield`): rows and columns as
-//! int32, then float32 from the south-western post, rows northwards. Scene coordinates as they are.
+//! MuJoCo: an MJCF file with a height field in MuJoCo's own binary format (XML reference, `asset/hfield`): rows and columns as
+//! int32, then float32 from the south-western post, rows northwards. Scene coordinates are unchanged.
 //!
-//! The compiler scales the numbers to 0 to 1; `size` turns them into metres above the geom.
+//! The compiler scales the numbers to the range 0 to 1; `size` converts them to metres above the geom.
 
 use super::parts::{Parts, SAME};
 use super::posts::Posts;
@@ -14,7 +14,7 @@ const HEIGHTS: &str = "heights.hfield";
 pub(super) fn parts(posts: &Posts) -> Parts {
     let g = posts.geometry();
     let mut field: Vec<u8> = [g.rows, g.cols].iter().flat_map(|&n| (n as i32).to_le_bytes()).collect();
-    // Above the lowest post: single precision counts the relief, not the height above the sea.
+    // Above the lowest post, so that single precision resolves the relief rather than the elevation above sea level.
     let above = |z: &f64| ((z - posts.low_m) as f32).to_le_bytes();
     field.extend(Posts::rows_from_south(&posts.heights).flatten().flat_map(above));
     let ([east, north], [x, y]) = (posts.ground_m(), posts.centre_m());
@@ -36,8 +36,8 @@ pub(super) fn parts(posts: &Posts) -> Parts {
         settings: json!({ "hfield": HEIGHTS, "size_m": size, "position_m": position }),
         steps: vec![
             "`mujoco.MjModel.from_xml_path(\"terrain.xml\")`, or open `terrain.xml` in `simulate`.".to_owned(),
-            "For a model of your own, copy the elements `hfield` and `geom`, or attach `terrain.xml`.".to_owned(),
-            "MuJoCo lays two triangles between four posts; their common side runs from south-west to north-east."
+            "For your own model, copy the elements `hfield` and `geom`, or attach `terrain.xml`.".to_owned(),
+            "MuJoCo places two triangles between four posts; their common side runs from south-west to north-east."
                 .to_owned(),
         ],
     }

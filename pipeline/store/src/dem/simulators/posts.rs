@@ -6,15 +6,15 @@ use sastrugi_numeric::resample::stretch;
 use sastrugi_numeric::{Geometry, Grid};
 use serde_json::{Value, json};
 
-/// Heights whose cell centres are posts.
+/// Heights at posts, which are cell centres.
 pub(super) struct Posts {
     /// Heights, m; row 0 is north. The geometry is in scene coordinates.
     pub heights: Grid,
-    /// What to add to scene coordinates to get the DEM's, m.
+    /// Offset from scene coordinates to the DEM's, m.
     pub shift_m: [f64; 2],
     /// Columns and rows of the DEM.
     pub source: [usize; 2],
-    /// True for a DEM that was brought from degrees to metres: `shift_m` knows nothing of its place then.
+    /// True for a DEM converted from degrees to metres, for which `shift_m` does not apply.
     pub from_degrees: bool,
     /// Lowest post, m.
     pub low_m: f64,
@@ -23,18 +23,18 @@ pub(super) struct Posts {
     how: How,
 }
 
-/// How the posts came from the DEM's cell centres.
+/// How the posts derive from the DEM's cell centres.
 enum How {
-    /// They are the same.
+    /// All cell centres.
     Same,
-    /// They are those in the middle.
+    /// The cell centres in the middle.
     Middle,
-    /// They are others on its bilinear surface; their own is off by so much at most at the cell centres, m.
+    /// Resampled from the bilinear surface; with the largest deviation at the DEM's cell centres, m.
     Bilinear(f64),
 }
 
 impl Posts {
-    /// The cell centres.
+    /// Posts at all cell centres.
     pub fn of(grid: &Grid) -> Result<Self, Refusal> {
         let g = grid.geometry;
         let heights = Grid { geometry: Geometry { origin: [0.0; 2], ..g }, values: grid.values.clone() };
@@ -48,31 +48,31 @@ impl Posts {
         Ok(Self { heights, shift_m: g.origin, source: [g.cols, g.rows], from_degrees: false, low_m, high_m, how })
     }
 
-    /// The same, of a DEM that was brought from degrees to metres.
+    /// Marks the DEM as converted from degrees to metres.
     pub fn of_degrees(self) -> Self {
         Self { from_degrees: true, ..self }
     }
 
-    /// As [`Self::of`], for programs whose terrain has no holes.
+    /// As [`Self::of`], for simulators whose terrain cannot have holes.
     pub fn without_holes(grid: &Grid) -> Result<Self, Refusal> {
         check_holes(grid)?;
         Self::of(grid)
     }
 
-    /// This many posts a side, over the same ground.
+    /// `size` posts per side, over the same ground.
     pub fn resampled(grid: &Grid, size: usize) -> Result<Self, Refusal> {
-        let whole = Self::without_holes(grid)?;
-        let [cols, rows] = whole.source;
-        if [size; 2] == whole.source {
-            return Ok(whole);
+        let full = Self::without_holes(grid)?;
+        let [cols, rows] = full.source;
+        if [size; 2] == full.source {
+            return Ok(full);
         }
-        let heights = stretch(&whole.heights, size, size);
+        let heights = stretch(&full.heights, size, size);
         let back = stretch(&heights, rows, cols);
-        let errors = back.values.iter().zip(&whole.heights.values).map(|(a, b)| (a - b).abs());
+        let errors = back.values.iter().zip(&full.heights.values).map(|(a, b)| (a - b).abs());
         Self::at(heights, grid, How::Bilinear(errors.fold(0.0, f64::max)))
     }
 
-    /// The middle of the DEM, this many posts a side, which it has at least.
+    /// The middle of the DEM, `size` posts per side; the DEM must have at least that many.
     pub fn cropped(grid: &Grid, size: usize) -> Result<Self, Refusal> {
         let (rows, cols) = (grid.rows(), grid.cols());
         let mut heights = grid.window((rows - size) / 2, (cols - size) / 2, size, size);
@@ -86,7 +86,7 @@ impl Posts {
         &self.heights.geometry
     }
 
-    /// From the first to the last post, east-west and north-south, m.
+    /// Distance from the first to the last post, east-west and north-south, m.
     pub fn ground_m(&self) -> [f64; 2] {
         let g = self.geometry();
         [(g.cols - 1) as f64 * g.cell[0], (g.rows - 1) as f64 * g.cell[1]]
@@ -103,7 +103,7 @@ impl Posts {
         [south_west[0] + 0.5 * ground[0], south_west[1] + 0.5 * ground[1]]
     }
 
-    /// From the lowest to the highest height, m; 1 for a plane, which has no height to scale.
+    /// Relief, m; 1 for a level surface, which has no relief to scale by.
     pub fn relief_m(&self) -> f64 {
         if self.high_m > self.low_m { self.high_m - self.low_m } else { 1.0 }
     }
@@ -113,7 +113,7 @@ impl Posts {
         (0..grid.rows()).rev().map(|row| grid.row(row))
     }
 
-    /// How the posts came from the DEM's cell centres.
+    /// How the posts derive from the DEM's cell centres, as JSON.
     pub fn fitting(&self) -> Value {
         match self.how {
             How::Same => json!({ "method": "none" }),
@@ -122,16 +122,16 @@ impl Posts {
         }
     }
 
-    /// The same as a sentence, where there is something to say.
+    /// How the posts derive from the DEM's cell centres, as a sentence; `None` if they are the same.
     pub fn sentence(&self) -> Option<String> {
         let ([cols, rows], size) = (self.source, self.geometry().cols);
         let of = format!("{cols} x {rows} cell centres of the DEM");
         match self.how {
             How::Same => None,
-            How::Middle => Some(format!("The {size} x {size} posts are the middle of the {of}, as they are")),
+            How::Middle => Some(format!("The {size} x {size} posts are the middle of the {of}, unchanged")),
             How::Bilinear(error) => Some(format!(
-                "The {size} x {size} posts are bilinear between the {of}, whose outer ones they keep; at the cell centres their \
-                 surface is off by {error:.3e} m at most"
+                "The {size} x {size} posts are bilinear between the {of} and cover the same ground; at those centres the surface of \
+                 the posts deviates by at most {error:.3e} m"
             )),
         }
     }
@@ -143,5 +143,5 @@ fn check_holes(grid: &Grid) -> Result<(), Refusal> {
         return Ok(());
     }
     let advice = "fill them (`sastrugi texture FIT.json --fill DEM`) or cut a window without them";
-    Err(Refusal::new(format!("{holes} cells hold no data, and a height map has no holes; {advice}")))
+    Err(Refusal::new(format!("{holes} cells hold no data, but a height map cannot have holes; {advice}")))
 }

@@ -1,7 +1,7 @@
 use super::*;
 use proptest::prelude::*;
 
-/// Heights that differ under every turn and mirror.
+/// Heights that differ under every rotation and reflection.
 fn slanted(rows: usize, cols: usize) -> Grid {
     let geometry = Geometry { rows, cols, cell: [0.5, 0.25], origin: [1000.0, -20.0] };
     let height = |r: usize, c: usize| 100.0 + 0.3 * c as f64 - 0.7 * r as f64 + 0.01 * (r * c) as f64;
@@ -17,7 +17,7 @@ fn numbers(export: &Export) -> Value {
     serde_json::from_slice(bytes).unwrap()
 }
 
-/// A size that the program takes is neither resampled nor stretched; any other keeps its ground.
+/// A supported size is not resampled; any other keeps the extent of its ground.
 #[test]
 fn val_sizes_that_fit_are_not_resampled() {
     for (simulator, fitting, smallest) in
@@ -37,9 +37,53 @@ fn val_sizes_that_fit_are_not_resampled() {
     }
 }
 
-/// A crop is the middle, at its place in the scene; one that the DEM does not hold is refused.
+/// Levels in the files are the heights of the posts, to half a level: Unreal's image starts in the north, Unity's numbers in the south.
+/// MuJoCo's are heights above the lowest post, in single precision, from the south.
 #[test]
-fn val_crops_keep_heights_and_place() {
+fn val_files_hold_the_heights_of_the_posts() {
+    let bytes_of = |export: &Export, name: &str| {
+        let (_, bytes) = export.files.iter().find(|(file, _)| file == name).unwrap();
+        bytes.clone()
+    };
+    let of_levels = |export: &Export, levels: Vec<f64>| {
+        let found = numbers(export)["settings"]["height_of_level"].clone();
+        let [offset, step] = ["offset_m", "step_m"].map(|key| found[key].as_f64().unwrap());
+        (levels.into_iter().map(|level| offset + step * level).collect::<Vec<f64>>(), step)
+    };
+    let agree = |heights: &[f64], grid: &Grid, tolerance: f64, south_first: bool| {
+        assert_eq!(heights.len(), grid.values.len());
+        for (k, height) in heights.iter().enumerate() {
+            let (r, c) = (k / grid.cols(), k % grid.cols());
+            let expected = grid.at(if south_first { grid.rows() - 1 - r } else { r }, c);
+            assert!((height - expected).abs() <= tolerance, "{r} {c}: {height} {expected}");
+        }
+    };
+    let grid = slanted(127, 127);
+    let export = resampled(&grid, Simulator::Unreal).unwrap();
+    let image = crate::dem::png::parse(&bytes_of(&export, "heightmap.png"), &Default::default()).unwrap();
+    let (heights, step) = of_levels(&export, image.grid.values);
+    agree(&heights, &grid, 0.5001 * step, false);
+
+    let grid = slanted(65, 65);
+    let export = resampled(&grid, Simulator::Unity).unwrap();
+    let raw = bytes_of(&export, "heightmap.raw");
+    let levels = raw.chunks_exact(2).map(|level| f64::from(u16::from_le_bytes([level[0], level[1]]))).collect();
+    let (heights, step) = of_levels(&export, levels);
+    agree(&heights, &grid, 0.5001 * step, true);
+
+    let grid = slanted(30, 20);
+    let field = bytes_of(&resampled(&grid, Simulator::Mujoco).unwrap(), "heights.hfield");
+    let word = |at: usize| [field[at], field[at + 1], field[at + 2], field[at + 3]];
+    assert_eq!([word(0), word(4)].map(i32::from_le_bytes), [30, 20]);
+    let (low, _) = grid.range().unwrap();
+    let heights: Vec<f64> =
+        (8..field.len()).step_by(4).map(|at| low + f64::from(f32::from_le_bytes(word(at)))).collect();
+    agree(&heights, &grid, 1e-5, true);
+}
+
+/// A crop is the middle of the DEM, at its position in the scene; a crop larger than the DEM is refused.
+#[test]
+fn val_crops_keep_heights_and_position() {
     let grid = slanted(140, 131);
     for (simulator, size) in [(Simulator::Unreal, 127), (Simulator::Gazebo, 129), (Simulator::Unity, 129)] {
         let made = export(&grid, simulator, Fit::Crop, None).unwrap();
@@ -58,9 +102,9 @@ fn val_crops_keep_heights_and_place() {
     assert_eq!(fits, resampled(&slanted(127, 127), Simulator::Unreal).unwrap());
 }
 
-/// One sentence each, which names the program and says what would be right.
+/// Each refusal is one sentence that names the simulator and the remedy.
 #[test]
-fn val_what_cannot_be_exported_is_refused() {
+fn val_unsuitable_dems_are_refused() {
     let refusal = |grid: &Grid, simulator| resampled(grid, simulator).unwrap_err().to_string();
     let mut holed = slanted(10, 10);
     holed.values[17] = f64::NAN;
@@ -82,7 +126,7 @@ fn val_what_cannot_be_exported_is_refused() {
     assert!(check_size(&Geometry::square(4097, 4097, 1.0), Simulator::Isaac, Fit::Resample).is_err());
 }
 
-/// A plane has no relief to scale by.
+/// A level surface has no relief to scale by.
 #[test]
 fn val_planes_are_exported() {
     let plane = Grid::filled(Geometry::square(129, 129, 0.5), -3.25);
@@ -92,7 +136,7 @@ fn val_planes_are_exported() {
     }
 }
 
-/// The cell centres of the triangles' corners, for three formats: counter-clockwise from above, holes left out.
+/// Triangle corners at cell centres, in three formats: counter-clockwise from above, without holes.
 #[test]
 fn val_meshes_leave_holes_out() {
     let mut grid = slanted(3, 3);
@@ -109,10 +153,10 @@ fn val_meshes_leave_holes_out() {
     grid.values[2..].fill(f64::NAN);
     let meshes = [mesh::usda, mesh::glb, mesh::obj];
     assert!(meshes.iter().all(|mesh| mesh(&grid, None).is_err()), "no triangle is left");
-    assert!(meshes.iter().all(|mesh| mesh(&slanted(20, 1), None).is_err()), "a line is no surface");
+    assert!(meshes.iter().all(|mesh| mesh(&slanted(20, 1), None).is_err()), "a line is not a surface");
 }
 
-/// A decimated mesh has the vertices and triangles that it states, in all formats and folders, and says so; others have no word of it.
+/// A decimated mesh has the stated numbers of vertices and triangles in all formats and folders; others do not mention decimation.
 #[test]
 fn val_decimated_meshes_state_their_error() {
     let grid = slanted(129, 129);
@@ -142,7 +186,7 @@ fn val_decimated_meshes_state_their_error() {
     assert_eq!(export(&grid, Simulator::Unreal, Fit::Resample, Some(&limits)).unwrap(), unreal);
 }
 
-/// Limits that make no sense, and fewer triangles than the outline takes.
+/// Invalid limits, and fewer triangles than the outline needs.
 #[test]
 fn val_limits_of_meshes_are_checked() {
     let grid = slanted(20, 30);
@@ -154,10 +198,10 @@ fn val_limits_of_meshes_are_checked() {
     assert!(refused(None, Some(1)).contains("take 2 triangles"));
     let both = MeshLimits { error_max_m: Some(1e-6), triangles_max: Some(40) };
     let sentence = Decimation::new(&grid, &both).unwrap().sentence();
-    assert!(sentence.ends_with("; 0.000001 m would take more triangles"), "{sentence}");
+    assert!(sentence.ends_with("; an error of 0.000001 m would take more triangles"), "{sentence}");
 }
 
-/// Beyond single precision no file is written, whose numbers would be infinite; nor where the relief alone is.
+/// Heights or a relief beyond single precision, which would be written as infinite, are refused.
 #[test]
 fn val_heights_beyond_single_precision_are_refused() {
     for high in [1e300, 3e38] {
@@ -179,7 +223,7 @@ fn val_heights_beyond_single_precision_are_refused() {
     }
 }
 
-/// Millimetres of relief far above the sea are in Gazebo's collision mesh, which stands where the picture does.
+/// Gazebo's collision mesh keeps millimetres of relief at high elevation, and is aligned with the heightmap.
 #[test]
 fn val_small_relief_high_up_is_kept() {
     let geometry = Geometry { rows: 50, cols: 65, cell: [0.5; 2], origin: [1000.0, -20.0] };
@@ -199,9 +243,9 @@ fn val_small_relief_high_up_is_kept() {
     assert!(poses.iter().all(|pose| text("model.sdf").contains(pose)), "{}", text("model.sdf"));
 }
 
-/// An export over an older one that breaks off leaves nothing of the older one, and a folder that can be completed.
+/// An interrupted export over an older one leaves no old files, and a folder that can be completed.
 #[test]
-fn val_broken_exports_hold_nothing_old() {
+fn val_interrupted_exports_leave_no_old_files() {
     let folder = tempfile::tempdir().unwrap();
     let [old, new] = [4, 5].map(|side| resampled(&slanted(side, side), Simulator::Mujoco).unwrap());
     write(folder.path(), &old).unwrap();
@@ -219,9 +263,9 @@ fn val_broken_exports_hold_nothing_old() {
     write(folder.path(), &new).unwrap();
 }
 
-/// A folder is written to again for the same simulator; no other is, and none with files of somebody else.
+/// A folder is reused only for the same simulator, and never if it has unrelated files.
 #[test]
-fn val_folders_of_others_are_refused() {
+fn val_folders_with_other_files_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let out = folder.path().join("out");
     let refused = |simulator| check_folder(&out, simulator).err().map(|e| e.to_string());
@@ -231,7 +275,7 @@ fn val_folders_of_others_are_refused() {
     assert_eq!(refused(Simulator::Isaac), None, "a file under construction");
     fs::write(out.join(README), b"mine").unwrap();
     let found = refused(Simulator::Isaac).unwrap_or_default();
-    assert!(found.ends_with("is a folder with files, but without an export for isaac; name a new folder"), "{found}");
+    assert!(found.ends_with("the folder has files but no export for isaac; choose a new folder"), "{found}");
     for other in ["[]", "{\"program\": \"blender/4\", \"target\": \"isaac\"}", "{\"target\": \"isaac\"}"] {
         fs::write(out.join(IMPORT), other).unwrap();
         assert!(refused(Simulator::Isaac).is_some(), "{other}");
@@ -244,7 +288,7 @@ fn val_folders_of_others_are_refused() {
     assert_eq!(refused(Simulator::Isaac), None, "another version");
 }
 
-/// What is counted is posts, not the cells of the DEM.
+/// Costs are computed from posts, not from the cells of the DEM.
 #[test]
 fn val_costs_count_posts() {
     let cost =
@@ -256,12 +300,12 @@ fn val_costs_count_posts() {
         let grid = slanted(129, 129);
         let files: usize = resampled(&grid, simulator).unwrap().files.iter().map(|(_, bytes)| bytes.len()).sum();
         let stated = cost(129, 129, simulator).file_bytes as f64;
-        // Beside the heights there are the texts.
+        // Text files add to the heights.
         assert!((files as f64) < 1.1 * stated + 8e3 && files as f64 > 0.3 * stated, "{}: {files}", simulator.name());
     }
 }
 
-/// The scene of a DEM in degrees is not the DEM's coordinates shifted, and the files say so.
+/// The scene of a DEM in degrees is not a shift of the DEM's coordinates, and the files say so.
 #[test]
 fn val_degrees_have_no_shift() {
     let grid = slanted(4, 4);
@@ -274,9 +318,9 @@ fn val_degrees_have_no_shift() {
 }
 
 proptest! {
-    /// Any heights: levels span what they must, and a number that a person types is not below what is needed.
+    /// For any heights, levels cover the full range, and rounded scales are large enough.
     #[test]
-    fn prop_levels_hold_every_height(
+    fn prop_levels_cover_every_height(
         heights in prop::collection::vec(-9e3f64..9e3, 9), scale in 1e-3f64..1.0,
     ) {
         let grid = Grid::new(Geometry::square(3, 3, 0.1), heights.iter().map(|z| z * scale).collect());

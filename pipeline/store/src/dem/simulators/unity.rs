@@ -1,20 +1,21 @@
-//! Unity: a raw heightmap of a terrain. Left-handed: x east, y up, z north, in metres; the first row of the file is the southern
-//! one, which lies at the smallest z (no vertical flip).
+//! Unity: raw heightmap of a terrain. Left-handed: x east, y up, z north, in metres; the first row of the file is the southern
+//! one, at the smallest z (no vertical flip).
 //!
-//! The editor's import divides levels by 65536 and multiplies them with the terrain's height (class ImportRawHeightmap of
-//! Unity's C# reference source); the engine keeps them in steps of 1/32766 of that height (`TerrainData`).
+//! The editor's import divides levels by 65536 and multiplies them by the terrain's height (class ImportRawHeightmap of Unity's
+//! C# reference source); the engine stores them in steps of 1/32766 of that height (`TerrainData`).
 
 use super::levels::{Levels, rounded_up, to_millimetres};
 use super::parts::Parts;
 use super::posts::Posts;
+use super::readable;
 use serde_json::json;
 
-/// Posts a side.
+/// Posts per side.
 pub(super) const SIZES: [usize; 8] = [33, 65, 129, 257, 513, 1025, 2049, 4097];
 const LEVELS: f64 = 65536.0;
 
 pub(super) fn parts(posts: &Posts) -> Parts {
-    // Not above the lowest height.
+    // Rounded so as not to exceed the lowest height.
     let base_m = to_millimetres(posts.low_m - 0.0005);
     let height_m = rounded_up(LEVELS / 65535.0 * (posts.low_m - base_m + posts.relief_m()));
     let levels = Levels { offset_m: base_m, step_m: height_m / LEVELS };
@@ -22,6 +23,7 @@ pub(super) fn parts(posts: &Posts) -> Parts {
     let raw = Posts::rows_from_south(&grid).flatten().flat_map(|level| level.to_le_bytes()).collect();
     let ([east, north], [x, z]) = (posts.ground_m(), posts.south_west_m());
     let size = posts.geometry().cols;
+    let ([width, length], [left, front]) = ([east, north].map(readable), [x, z].map(readable));
     Parts {
         title: "Unity",
         files: vec![("heightmap.raw".to_owned(), raw)],
@@ -39,16 +41,16 @@ pub(super) fn parts(posts: &Posts) -> Parts {
         }),
         steps: vec![
             format!(
-                "GameObject, 3D Object, Terrain; in its settings, Mesh Resolution: Terrain Width {east}, Terrain Length {north}, \
+                "GameObject, 3D Object, Terrain; in its settings, Mesh Resolution: Terrain Width {width}, Terrain Length {length}, \
                  Terrain Height {height_m}."
             ),
             format!(
                 "Texture Resolutions, Heightmap: Import Raw, `heightmap.raw`, Depth 16 bit, Resolution {size}, Byte Order Windows, \
-                 Flip Vertically off, Terrain Size {east}, {height_m}, {north}."
+                 Flip Vertically off, Terrain Size {width}, {height_m}, {length}."
             ),
-            format!("Transform, Position: {x}, {base_m}, {z}: the south-west post at the height of level 0."),
+            format!("Transform, Position: {left}, {base_m}, {front}: the south-west post, at the height of level 0."),
             format!(
-                "Unity keeps heights in steps of 1/32766 of the terrain's height: {:.3e} m here.",
+                "Unity stores heights in steps of 1/32766 of the terrain's height: {:.3e} m here.",
                 height_m / 32766.0
             ),
         ],

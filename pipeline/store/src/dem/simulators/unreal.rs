@@ -1,27 +1,28 @@
-//! Unreal Engine: a heightmap of a landscape. Left-handed: X east, Y south, Z up, in centimetres; the first row of the picture is
-//! the northern one, which lies at the smallest Y.
+//! Unreal Engine: heightmap of a landscape. Left-handed: X east, Y south, Z up, in centimetres; the first row of the image is the
+//! northern one, at the smallest Y.
 //!
-//! Landscapes are of whole components; the sizes are those of the table "Recommended Landscape Sizes" in Epic Games, "Landscape
-//! Technical Guide" (Unreal Engine 5). Level 32768 is height 0, and one level is 1/128 of the scale in centimetres (ibid., at
-//! scale 100 the levels reach from -256 to 256 m).
+//! Landscapes consist of whole components; the sizes are those of the table "Recommended Landscape Sizes" in Epic Games, "Landscape
+//! Technical Guide" (Unreal Engine 5). Level 32768 is height 0, and one level is 1/128 of the scale in centimetres (ibid.: at scale
+//! 100, levels range from -256 to 256 m).
 
 use super::levels::{Levels, rounded_up, to_millimetres};
 use super::parts::Parts;
 use super::posts::Posts;
+use super::readable;
 use crate::dem::png;
 use crate::dem::raster::Refusal;
 use serde_json::json;
 
-/// Posts a side.
+/// Posts per side.
 pub(super) const SIZES: [usize; 7] = [127, 253, 505, 1009, 2017, 4033, 8129];
 const ZERO_LEVEL: f64 = 32768.0;
-/// Levels for one unit of the scale's Z in metres: 128 for a hundredth of a metre.
+/// Levels per metre at a Z scale of 1: 128 per centimetre.
 const LEVELS_PER_SCALE: f64 = 12800.0;
 
 pub(super) fn parts(posts: &Posts) -> Result<Parts, Refusal> {
     let middle_m = to_millimetres(0.5 * (posts.low_m + posts.high_m));
     let reach_m = (posts.high_m - middle_m).max(middle_m - posts.low_m);
-    // Levels 1 to 65535; a plane takes any scale.
+    // Levels 1 to 65535; a level surface works with any scale.
     let scale_z = if reach_m > 0.0 { rounded_up(reach_m / 32767.0 * LEVELS_PER_SCALE) } else { 1.0 };
     let step_m = scale_z / LEVELS_PER_SCALE;
     let levels = Levels { offset_m: middle_m - ZERO_LEVEL * step_m, step_m };
@@ -30,8 +31,8 @@ pub(super) fn parts(posts: &Posts) -> Result<Parts, Refusal> {
     let scale = [100.0 * g.cell[0], 100.0 * g.cell[1], scale_z];
     let (section, per_component) = if g.cols == 8129 { (127, 254) } else { (63, 126) };
     let components = (g.cols - 1) / per_component;
-    let [sx, sy, sz] = scale;
-    let [x, y, z] = north_west;
+    let [scale_x, scale_y] = [scale[0], scale[1]].map(readable);
+    let [x, y, z] = north_west.map(readable);
     Ok(Parts {
         title: "Unreal Engine",
         files: vec![("heightmap.png".to_owned(), png::levels(&levels.of(posts))?)],
@@ -50,15 +51,15 @@ pub(super) fn parts(posts: &Posts) -> Result<Parts, Refusal> {
             "Landscape mode, Manage, New, Import from File: choose `heightmap.png`.".to_owned(),
             format!(
                 "Section Size {section} x {section} quads, 2 x 2 sections per component, {components} x {components} components \
-                 (Fit to Data finds them); Overall Resolution must read {0} x {0}.",
+                 (Fit to Data sets them); Overall Resolution must read {0} x {0}.",
                 g.cols
             ),
-            format!("Scale X = {sx}, Y = {sy}, Z = {sz}. Import."),
+            format!("Scale X = {scale_x}, Y = {scale_y}, Z = {scale_z}. Import."),
             format!(
-                "In the Details of the Landscape actor set Location X = {x}, Y = {y}, Z = {z}: its north-west post at the height of \
+                "In the Details of the Landscape actor set Location X = {x}, Y = {y}, Z = {z}: the north-west post, at the height of \
                  level 32768."
             ),
-            "A yaw of the scene (counter-clockwise from east) is the negative yaw in Unreal.".to_owned(),
+            "A yaw in the scene (counter-clockwise from east) has the opposite sign in Unreal.".to_owned(),
         ],
     })
 }

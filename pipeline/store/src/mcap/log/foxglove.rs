@@ -1,13 +1,13 @@
-//! Foxglove's messages and our own, in protobuf.
+//! Reading of Foxglove's messages and our own, in protobuf.
 
-use super::{Decoder, Said, Transform};
+use super::{Content, Decoder, Transform};
 use foxglove::messages as fox;
 use foxglove::messages::{Pose, Quaternion, Timestamp, Vector3};
 use prost::Message;
 use sastrugi_schemas::log::{TimedForce, TimedPose};
 use sastrugi_schemas::topics;
 
-/// How the messages of a schema are read.
+/// Decoder for the messages of a schema.
 pub(super) fn decoder(schema: &str) -> Option<Decoder> {
     match schema {
         _ if schema == topics::state::TOPIC.schema => Some(vehicle_state),
@@ -21,7 +21,7 @@ pub(super) fn decoder(schema: &str) -> Option<Decoder> {
     }
 }
 
-/// The stamp of a message, or the log's time where there is none.
+/// The stamp of a message, or the time of the log if there is none.
 fn stamp(timestamp: Option<Timestamp>, time_ns: i64) -> i64 {
     let of = |t: Timestamp| i64::from(t.sec()) * 1_000_000_000 + i64::from(t.nsec());
     timestamp.map(of).filter(|&t| t != 0).unwrap_or(time_ns)
@@ -38,31 +38,31 @@ fn posed(time_ns: i64, pose: Option<Pose>) -> TimedPose {
     }
 }
 
-/// Zeros where there is none.
+/// The quaternion, or zeros if there is none.
 fn quaternion(q: Option<Quaternion>) -> [f64; 4] {
     q.map_or([0.0; 4], |q| [q.x, q.y, q.z, q.w])
 }
 
-fn pose_in_frame(data: &[u8], time_ns: i64) -> Option<Said> {
+fn pose_in_frame(data: &[u8], time_ns: i64) -> Option<Content> {
     let message = fox::PoseInFrame::decode(data).ok()?;
     let pose = posed(stamp(message.timestamp, time_ns), message.pose);
-    Some(Said::Pose { frame: message.frame_id, body: String::new(), pose })
+    Some(Content::Pose { frame: message.frame_id, body: String::new(), pose })
 }
 
-fn odometry(data: &[u8], time_ns: i64) -> Option<Said> {
+fn odometry(data: &[u8], time_ns: i64) -> Option<Content> {
     let message = fox::Odometry::decode(data).ok()?;
     let mut pose = posed(stamp(message.timestamp, time_ns), message.pose);
     pose.angular_velocity_rad_s = message.angular_velocity.map(|Vector3 { x, y, z }| [x, y, z]);
-    Some(Said::Pose { frame: message.frame_id, body: message.body_frame_id, pose })
+    Some(Content::Pose { frame: message.frame_id, body: message.body_frame_id, pose })
 }
 
-fn transforms(data: &[u8], time_ns: i64) -> Option<Said> {
+fn transforms(data: &[u8], time_ns: i64) -> Option<Content> {
     let all = fox::FrameTransforms::decode(data).ok()?.transforms;
-    Some(Said::Transforms(all.into_iter().map(|t| link(t, time_ns)).collect()))
+    Some(Content::Transforms(all.into_iter().map(|t| link(t, time_ns)).collect()))
 }
 
-fn transform(data: &[u8], time_ns: i64) -> Option<Said> {
-    Some(Said::Transforms(vec![link(fox::FrameTransform::decode(data).ok()?, time_ns)]))
+fn transform(data: &[u8], time_ns: i64) -> Option<Content> {
+    Some(Content::Transforms(vec![link(fox::FrameTransform::decode(data).ok()?, time_ns)]))
 }
 
 fn link(message: fox::FrameTransform, time_ns: i64) -> Transform {
@@ -79,9 +79,9 @@ fn link(message: fox::FrameTransform, time_ns: i64) -> Transform {
     }
 }
 
-fn event(data: &[u8], time_ns: i64) -> Option<Said> {
+fn event(data: &[u8], time_ns: i64) -> Option<Content> {
     let message = fox::Log::decode(data).ok()?;
-    Some(Said::Event(stamp(message.timestamp, time_ns), message.name))
+    Some(Content::Event(stamp(message.timestamp, time_ns), message.name))
 }
 
 /// `sastrugi.VehicleState`: the fields of [`topics::state`], from number 2 on.
@@ -138,7 +138,7 @@ fn own_stamp(timestamp: Option<prost_types::Timestamp>, time_ns: i64) -> i64 {
 const MAP: &str = "map";
 const BASE: &str = "base_link";
 
-fn vehicle_state(data: &[u8], time_ns: i64) -> Option<Said> {
+fn vehicle_state(data: &[u8], time_ns: i64) -> Option<Content> {
     let state = VehicleState::decode(data).ok()?;
     let pose = TimedPose {
         time_ns: own_stamp(state.timestamp, time_ns),
@@ -146,15 +146,15 @@ fn vehicle_state(data: &[u8], time_ns: i64) -> Option<Said> {
         orientation: [state.qx, state.qy, state.qz, state.qw],
         angular_velocity_rad_s: Some([state.roll_rate, state.pitch_rate, state.yaw_rate]),
     };
-    Some(Said::Pose { frame: MAP.to_owned(), body: BASE.to_owned(), pose })
+    Some(Content::Pose { frame: MAP.to_owned(), body: BASE.to_owned(), pose })
 }
 
-fn imu(data: &[u8], time_ns: i64) -> Option<Said> {
+fn imu(data: &[u8], time_ns: i64) -> Option<Content> {
     let imu = Imu::decode(data).ok()?;
     let sample = TimedForce {
         time_ns: own_stamp(imu.timestamp, time_ns),
         angular_velocity_rad_s: [imu.roll_rate, imu.pitch_rate, imu.yaw_rate].map(f64::from),
         specific_force_m_s2: [imu.force_x, imu.force_y, imu.force_z].map(f64::from),
     };
-    Some(Said::Imu { frame: BASE.to_owned(), sample })
+    Some(Content::Imu { frame: BASE.to_owned(), sample })
 }

@@ -1,7 +1,7 @@
-//! Logs of any origin: poses, transforms, inertial measurements and events out of an MCAP file.
+//! Logs of any origin: reads poses, transforms, inertial measurements and events from an MCAP file.
 //!
-//! Read are our own messages and Foxglove's (protobuf), and those of ROS 2 (CDR); see [`decode`]. The file is streamed, with
-//! its chunks' checksums; memory holds one record and what is kept. A file that breaks off is read up to there.
+//! Our own messages and Foxglove's (protobuf) and those of ROS 2 (CDR) are read; see [`decoder`]. The file is streamed, with
+//! validation of chunk checksums; memory holds one record and the extracted data. A truncated file is read up to its end.
 
 mod foxglove;
 mod ros2;
@@ -14,22 +14,22 @@ use std::collections::BTreeMap;
 use std::io::Read;
 use std::path::Path;
 
-/// Longest record of any file, bytes: more than any message that is read here, less than harm.
+/// Longest record of any file, bytes: larger than any message read here, but small enough to be safe.
 const RECORD_MAX: u64 = 1 << 30;
 /// Longest record of a small file, bytes.
 const RECORD_MAX_SMALL: u64 = 1 << 26;
-/// Bytes of a record per byte of file beyond that: messages do not compress better.
+/// Bytes of a record per byte of a larger file: messages do not compress better.
 const EXPANSION_MAX: u64 = 1 << 10;
-/// Bytes that are read at once: a record takes memory only as far as the file has it.
+/// Bytes read at once, so that a record only takes memory for bytes that the file actually has.
 const READ_BYTES: usize = 1 << 20;
 
-/// What one message says.
-enum Said {
-    /// A pose in a frame, of a body (empty where the message does not say).
+/// Content of one message.
+enum Content {
+    /// A pose in a frame, of a body (empty if not stated).
     Pose { frame: String, body: String, pose: TimedPose },
     /// Poses of children in parents.
     Transforms(Vec<Transform>),
-    /// A measurement in a frame.
+    /// An inertial measurement in a frame.
     Imu { frame: String, sample: TimedForce },
     /// An event by name.
     Event(i64, String),
@@ -42,10 +42,10 @@ struct Transform {
     pose: TimedPose,
 }
 
-/// Decodes a message; `None` for bytes that are no such message. The time is that of the log, for messages without a stamp.
-type Decoder = fn(&[u8], i64) -> Option<Said>;
+/// Decodes a message; `None` for bytes that are not such a message. The given time is that of the log, for messages without a stamp.
+type Decoder = fn(&[u8], i64) -> Option<Content>;
 
-/// How messages of a schema in an encoding are read; `None` for those that say nothing about motion.
+/// Decoder for messages of a schema in an encoding; `None` for messages that are not about motion.
 fn decoder(schema: &str, encoding: &str) -> Option<Decoder> {
     match encoding {
         "protobuf" => foxglove::decoder(schema),
@@ -54,17 +54,16 @@ fn decoder(schema: &str, encoding: &str) -> Option<Decoder> {
     }
 }
 
-/// True for messages that are read in their usual encoding.
+/// True for messages that can be read in their usual encoding.
 fn is_known(schema: &str) -> bool {
     foxglove::decoder(schema).is_some() || ros2::decoder(schema).is_some()
 }
 
-/// Reads a log: a file, or the folder of a ROS 2 bag, whose files follow each other.
+/// Reads a log: a file, or the folder of a ROS 2 bag, whose files are read in sequence.
 ///
 /// # Errors
-/// [`McapError::Io`]; [`McapError::Unusable`] for a file that is no MCAP, whose checksums are wrong, or that holds a message
-/// that does not decode as its schema says, and for a folder that is no bag of MCAP files. A file that only ends too early is no
-/// error: see [`Log::broken`].
+/// [`McapError::Io`]; [`McapError::Unusable`] for a file that is not MCAP, has wrong checksums, or has a message that does not match
+/// its schema, and for a folder that is not a bag of MCAP files. A truncated file is not an error: see [`Log::broken`].
 pub fn read_log(path: &Path) -> Result<Log, McapError> {
     if !path.is_dir() {
         let mut gathered = Gathered::default();
@@ -75,7 +74,7 @@ pub fn read_log(path: &Path) -> Result<Log, McapError> {
     for file in bag_files(path)? {
         read_file(&file, &mut gathered)?;
         if let Some(broken) = &mut gathered.log.broken {
-            // What follows a gap of unknown length is no part of the drive.
+            // Data after a gap of unknown length does not belong to the drive.
             let name = file.file_name().unwrap_or_default().to_string_lossy();
             *broken = format!("{name}: {broken}");
             break;
@@ -113,7 +112,7 @@ fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
                 break;
             }
             Err(mcap::McapError::BadMagic | mcap::McapError::UnexpectedEof) => {
-                return Err(unusable("this is no MCAP file".to_owned()));
+                return Err(unusable("not an MCAP file".to_owned()));
             }
             Err(error) => {
                 return Err(unusable(format!("the file is damaged after {} messages: {error}", gathered.messages)));
@@ -128,7 +127,7 @@ struct Known {
     topic: String,
     schema: String,
     decoder: Decoder,
-    /// Where its poses or measurements are kept.
+    /// Index of the stream of its poses or measurements.
     place: Option<usize>,
 }
 
@@ -142,20 +141,20 @@ struct Gathered {
     last_ns: u64,
     schemas: BTreeMap<u16, String>,
     channels: BTreeMap<u16, Known>,
-    /// Places of the files before, by topic and schema.
+    /// Streams of the files before, by topic and schema.
     places: Vec<(String, String, usize)>,
     /// Transforms by topic, parent and child.
     links: BTreeMap<(String, String, String), usize>,
 }
 
 impl Gathered {
-    /// Where the file breaks off.
+    /// Describes where the file is truncated.
     fn broken(&self) -> String {
         let seconds = self.last_ns.saturating_sub(self.first_ns.unwrap_or(self.last_ns)) as f64 * 1e-9;
-        format!("the file breaks off after {} messages, {seconds:.3} s after the first", self.messages)
+        format!("the file is truncated after {} messages, {seconds:.3} s after the first", self.messages)
     }
 
-    /// Makes ready for the next file of a bag, which numbers its channels anew and goes on with their streams.
+    /// Prepares for the next file of a bag, which renumbers the channels and continues their streams.
     fn next_file(&mut self) {
         self.begun = false;
         self.schemas.clear();
@@ -163,7 +162,7 @@ impl Gathered {
         self.places.extend(channels.filter_map(|known| Some((known.topic, known.schema, known.place?))));
     }
 
-    /// Where a stream of the files before is kept; each goes on in one channel.
+    /// Index of a stream of the files before; each is continued by one channel.
     fn place_of(&mut self, topic: &str, schema: &str) -> Option<usize> {
         let found = self.places.iter().position(|(t, s, _)| t == topic && s == schema)?;
         Some(self.places.remove(found).2)
@@ -208,12 +207,12 @@ impl Gathered {
     fn message(&mut self, channel: u16, log_time: u64, data: &[u8]) -> Result<(), String> {
         let Some(known) = self.channels.get_mut(&channel) else { return Ok(()) };
         let time_ns = i64::try_from(log_time).unwrap_or(i64::MAX);
-        let said = (known.decoder)(data, time_ns).ok_or_else(|| {
-            format!("message {} on {} does not decode as a {}", self.messages, known.topic, known.schema)
+        let content = (known.decoder)(data, time_ns).ok_or_else(|| {
+            format!("message {} on {} cannot be decoded as {}", self.messages, known.topic, known.schema)
         })?;
         let Log { poses, transforms, imus, events, .. } = &mut self.log;
-        match said {
-            Said::Pose { frame, body, pose } => {
+        match content {
+            Content::Pose { frame, body, pose } => {
                 let place = *known.place.get_or_insert_with(|| {
                     let (topic, schema) = (known.topic.clone(), known.schema.clone());
                     poses.push(PoseStream { topic, schema, frame, body, poses: Vec::new() });
@@ -221,7 +220,7 @@ impl Gathered {
                 });
                 poses[place].poses.push(pose);
             }
-            Said::Imu { frame, sample } => {
+            Content::Imu { frame, sample } => {
                 let place = *known.place.get_or_insert_with(|| {
                     let (topic, schema) = (known.topic.clone(), known.schema.clone());
                     imus.push(ImuStream { topic, schema, frame, samples: Vec::new() });
@@ -229,7 +228,7 @@ impl Gathered {
                 });
                 imus[place].samples.push(sample);
             }
-            Said::Transforms(all) => {
+            Content::Transforms(all) => {
                 for Transform { parent, child, pose } in all {
                     let key = (known.topic.clone(), parent, child);
                     let place = *self.links.entry(key).or_insert_with_key(|(topic, parent, child)| {
@@ -240,7 +239,7 @@ impl Gathered {
                     transforms[place].poses.push(pose);
                 }
             }
-            Said::Event(time_ns, name) => events.push((time_ns, name)),
+            Content::Event(time_ns, name) => events.push((time_ns, name)),
         }
         Ok(())
     }

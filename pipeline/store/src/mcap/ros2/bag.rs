@@ -1,4 +1,4 @@
-//! `metadata.yaml` of a bag, in the format of version 5 ("Humble"), which later distributions read too.
+//! `metadata.yaml` of a bag, in the format of version 5 ("Humble"), which later distributions also read.
 
 use super::super::{ChannelSummary, McapSummary};
 use sastrugi_schemas::topics::Topic;
@@ -6,14 +6,14 @@ use sastrugi_schemas::topics::ros2::{
     MEMBER_PATH, ROVER_MARKERS, ROVER_PATH, TEAM_MARKERS, TEAM_ROUTE, TERRAIN, TERRAIN_POINTS, TF_STATIC,
 };
 
-/// Topics with one message, at the start.
+/// Topics with a single message, at the start.
 const LASTING: [&Topic; 8] =
     [&TF_STATIC, &TERRAIN, &TERRAIN_POINTS, &TEAM_ROUTE, &TEAM_MARKERS, &MEMBER_PATH, &ROVER_PATH, &ROVER_MARKERS];
 
-/// What a bag's player offers for a topic. What is said once at the start stays for those who come late.
+/// Quality of service offered for a topic on playback. Messages sent once at the start are transient local, for late subscribers.
 pub(super) fn quality_of_service(topic: &Topic) -> String {
     let lasting = LASTING.contains(&topic);
-    // history 1: keep last; reliability 1: reliable; durability 1: transient local, 2: volatile; the rest is without limit.
+    // history 1: keep last; reliability 1: reliable; durability 1: transient local, 2: volatile; no other limits.
     let durability = if lasting { 1 } else { 2 };
     let depth = if lasting { 1 } else { 10 };
     let forever = "\n    sec: 9223372036\n    nsec: 854775807";
@@ -23,7 +23,7 @@ pub(super) fn quality_of_service(topic: &Topic) -> String {
     )
 }
 
-/// The text of `metadata.yaml` beside one file of messages.
+/// The text of `metadata.yaml` for a bag of one file.
 pub(in super::super) fn metadata(file: &str, summary: &McapSummary) -> String {
     let duration_ns = summary.end_ns.saturating_sub(summary.start_ns);
     let (start_ns, messages) = (summary.start_ns, summary.messages);
@@ -37,8 +37,8 @@ pub(in super::super) fn metadata(file: &str, summary: &McapSummary) -> String {
     )
 }
 
-/// Names of the files of messages in a `metadata.yaml`, in order: the list below `relative_file_paths`, one a line, as bags of ROS 2
-/// have it.
+/// Names of the message files in a `metadata.yaml`, in order: the list below `relative_file_paths`, one per line, as ROS 2 writes
+/// it.
 pub(in super::super) fn names(metadata: &str) -> Vec<String> {
     let mut lines = metadata.lines().map(str::trim).skip_while(|line| *line != "relative_file_paths:");
     lines.next();

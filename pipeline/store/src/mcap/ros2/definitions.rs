@@ -1,7 +1,7 @@
-//! Definitions of the messages, as ROS 2 "Humble" has them (`common_interfaces`, `geometry2`, `rcl_interfaces`, `grid_map`): the fields
-//! and constants of each .msg file with their packages written out. Later distributions read the same bytes.
+//! Message definitions of ROS 2 "Humble" (`common_interfaces`, `geometry2`, `rcl_interfaces`, `grid_map`): fields and constants of
+//! each .msg file, with packages written out. Later distributions read the same bytes.
 
-/// Name and fields of every message used, also those inside of others.
+/// Name and fields of every message used, including nested ones.
 const DEFINITIONS: [(&str, &str); 34] = [
     (
         "builtin_interfaces/Time",
@@ -249,11 +249,11 @@ const DEFINITIONS: [(&str, &str); 34] = [
     ("visualization_msgs/MarkerArray", "visualization_msgs/Marker[] markers"),
 ];
 
-/// What stands between two definitions.
+/// Separator between two definitions.
 const SEPARATOR: &str = "================================================================================";
 
-/// The definition of a message with those of all messages inside of it, as an MCAP file embeds it (`ros2msg`); `None` for a
-/// message that is not listed. The schema's name has the form `nav_msgs/msg/Odometry`.
+/// The definition of a message with those of all nested messages, as embedded in MCAP files (`ros2msg`); `None` for a message that
+/// is not listed. Schema names have the form `nav_msgs/msg/Odometry`.
 pub(super) fn of_schema(schema: &str) -> Option<String> {
     let name = schema.replacen("/msg/", "/", 1);
     let mut parts = vec![find(&name)?];

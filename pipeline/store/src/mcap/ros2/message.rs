@@ -1,23 +1,23 @@
-//! The messages as they stand in CDR, for writing and for reading. Structures are flat where a message holds another one: CDR
-//! aligns numbers, not structures, so that nesting leaves no trace in the bytes.
+//! Messages in CDR, for writing and reading. Nested messages may be flattened, because CDR aligns numbers, not structures, so
+//! that nesting does not affect the bytes.
 
 use super::super::McapError;
 use byteorder::{BigEndian, LittleEndian};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 
-/// What says that little-endian plain CDR follows.
+/// Encapsulation header for plain little-endian CDR.
 const LITTLE_ENDIAN: [u8; 4] = [0, 1, 0, 0];
 
-/// A message behind the four bytes that tell the encoding.
+/// Encodes a message after its four-byte encapsulation header.
 pub(in super::super) fn encode<T: Serialize>(message: &T) -> Result<Vec<u8>, McapError> {
     let mut out = LITTLE_ENDIAN.to_vec();
     let body = cdr_encoding::to_vec::<T, LittleEndian>(message);
-    out.extend(body.map_err(|e| McapError::unfit(format!("a message does not go into CDR: {e}")))?);
+    out.extend(body.map_err(|e| McapError::unfit(format!("a message cannot be encoded in CDR: {e}")))?);
     Ok(out)
 }
 
-/// A message behind the four bytes that tell the encoding: plain CDR, big or little endian.
+/// Decodes a message after its four-byte encapsulation header: plain CDR, big or little endian.
 pub(in super::super) fn decode<T: DeserializeOwned>(data: &[u8]) -> Option<T> {
     let (header, body) = data.split_at_checked(4)?;
     match header[..2] {
@@ -42,7 +42,7 @@ pub(in super::super) struct Pose {
     pub orientation: [f64; 4],
 }
 
-/// `geometry_msgs/PoseStamped`, and the beginning of one with covariance.
+/// `geometry_msgs/PoseStamped`, and the start of `PoseWithCovarianceStamped`.
 #[derive(Serialize, Deserialize)]
 pub(in super::super) struct PoseStamped {
     pub header: Header,
@@ -177,7 +177,7 @@ pub(in super::super) struct Path {
     pub poses: Vec<PoseStamped>,
 }
 
-/// The shapes of a [`Marker`] that are used, by their numbers.
+/// The [`Marker`] types in use, with their numbers.
 #[derive(Clone, Copy)]
 pub(in super::super) enum MarkerKind {
     Cube = 1,
@@ -215,7 +215,7 @@ pub(in super::super) struct Marker {
 }
 
 impl Marker {
-    /// A marker of one colour without points, the only one of its name, at the origin of its frame and there until it is replaced.
+    /// A single-colour marker without points, with id 0, at the origin of its frame, displayed until it is replaced.
     pub(in super::super) fn new(header: Header, kind: MarkerKind, ns: &str, scale: [f64; 3], rgb: [u8; 3]) -> Self {
         let [r, g, b] = rgb.map(|v| f32::from(v) / 255.0);
         Self {

@@ -1,7 +1,7 @@
-//! ROS 2 flavour: CDR messages with their definitions, and the `metadata.yaml` that makes a bag of a folder.
+//! ROS 2 flavour: CDR messages with their definitions, and the `metadata.yaml` that makes the folder a bag.
 //!
-//! Frames: `map` (the terrain's own coordinates, double precision), `base_link`, the wheels, and `terrain`, a point near the
-//! terrain's corner from which the cloud's single-precision points count. Values are those of the recording, not rounded.
+//! Frames: `map` (the terrain's own coordinates, double precision), `base_link`, the wheels, and `terrain`, whose origin near the
+//! terrain's corner is the reference of the cloud's single-precision points. Values are those of the recording, not rounded.
 
 mod bag;
 mod definitions;
@@ -29,7 +29,7 @@ use std::collections::BTreeMap;
 pub(super) const FLAVOUR: Flavour =
     Flavour { profile: "ros2", message_encoding: "cdr", schema_encoding: "ros2msg", schema, channel_metadata };
 
-/// Frame that the points of the cloud count from.
+/// Frame of the cloud's points.
 pub(super) const TERRAIN: &str = "terrain";
 /// Most cells along a side of the grid map.
 const GRID_CELLS: usize = 128;
@@ -37,7 +37,7 @@ const GRID_CELLS: usize = 128;
 const POINT_BYTES: u32 = 16;
 /// `sensor_msgs/PointField`: single precision.
 const FLOAT32: u8 = 7;
-/// Covariances of zero: the simulation knows no error. Readers of `sensor_msgs/Imu` take them for unknown ones.
+/// Zero covariance: the simulation has no measurement error. Readers of `sensor_msgs/Imu` interpret it as unknown.
 pub(super) const EXACT: Covariance = [[0.0; 6]; 6];
 
 fn schema(topic: &Topic) -> Result<Vec<u8>, McapError> {
@@ -53,7 +53,7 @@ fn channel_metadata(topic: &Topic) -> BTreeMap<String, String> {
     ])
 }
 
-/// Puts all messages of a mission on the timeline.
+/// Adds all messages of a mission to the timeline.
 pub(super) fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), McapError> {
     let recording = mission.recording;
     terrain_messages(mission.terrain, &corridor(mission), out)?;
@@ -74,7 +74,7 @@ pub(super) fn messages(mission: &MissionMcap, out: &mut Timeline) -> Result<(), 
     recording.events.iter().try_for_each(|event| out.add(&ros2::EVENTS, event.time_s, |t| encode(&log(event, t)?)))
 }
 
-/// Puts the terrain on the timeline, its cloud in full wherever one of the squares lies.
+/// Adds the terrain to the timeline, its cloud at full resolution wherever one of the squares lies.
 pub(super) fn terrain_messages(
     terrain: &TerrainView<'_>,
     near: &[Square],
@@ -88,7 +88,9 @@ pub(super) fn terrain_messages(
 /// Seconds and nanoseconds of a time in ns.
 pub(super) fn stamp(log_time: u64) -> Result<(i32, u32), McapError> {
     let seconds = i32::try_from(log_time / 1_000_000_000);
-    let seconds = seconds.map_err(|_| McapError::unfit(format!("{log_time} ns is beyond the year 2038 of ROS 2")))?;
+    let seconds = seconds.map_err(|_| {
+        McapError::unfit(format!("a time of {log_time} ns is beyond the year 2038, the limit of ROS 2"))
+    })?;
     Ok((seconds, (log_time % 1_000_000_000) as u32))
 }
 
@@ -129,7 +131,7 @@ fn transforms(
 }
 
 fn odometry(state: &StateSample, log_time: u64) -> Result<Odometry, McapError> {
-    // Of unit length to the recording's steps only.
+    // The recorded quaternion has unit length only to the recording's resolution.
     let length = state.orientation.iter().map(|c| c * c).sum::<f64>().sqrt();
     let [x, y, z, w] = state.orientation.map(|c| c / length);
     Ok(Odometry {
@@ -182,7 +184,7 @@ fn log(event: &Event, log_time: u64) -> Result<Log, McapError> {
     Ok(Log { sec, nanosec, level, name, msg, file: String::new(), function: String::new(), line: 0 })
 }
 
-/// The corners of `/terrain/mesh`: every cell along the path, coarser elsewhere.
+/// The vertices of `/terrain/mesh`: every cell along the path, coarser elsewhere.
 fn terrain_points(terrain: &TerrainView<'_>, near: &[Square], log_time: u64) -> Result<PointCloud2, McapError> {
     let TerrainView { dem, classes, .. } = terrain;
     let origin = terrain.origin_m();
@@ -205,7 +207,7 @@ fn terrain_points(terrain: &TerrainView<'_>, near: &[Square], log_time: u64) -> 
         header: header(TERRAIN, log_time)?,
         height: 1,
         width: points,
-        // By custom a colour stands as the four bytes of a float.
+        // By convention a colour is stored in the four bytes of a float.
         fields: [("x", 0), ("y", 4), ("z", 8), ("rgb", 12)].map(field).into(),
         is_bigendian: false,
         point_step: POINT_BYTES,
@@ -215,14 +217,14 @@ fn terrain_points(terrain: &TerrainView<'_>, near: &[Square], log_time: u64) -> 
     })
 }
 
-/// The terrain as a grid map, without its time: layers `elevation` (m) and, where there are classes, `class` (code); NaN
-/// where there is no data. A grid map has square cells; its rows run from north-east to west, its columns to the south.
+/// The terrain as a grid map without a timestamp: layers `elevation` (m) and, if there are classes, `class` (code); NaN where there
+/// is no data. A grid map has square cells; it starts at the north-east, with rows towards the west and columns towards the south.
 pub(super) fn grid_map(dem: &Grid, classes: Option<&Grid<u8>>) -> GridMap {
     let g = &dem.geometry;
     let [width, height] = g.size();
     let cell = g.cell[0].max(g.cell[1]);
     let resolution = cell * (width.max(height) / (cell * GRID_CELLS as f64)).ceil().max(1.0);
-    // Half a hundredth of a cell is rounding, not ground.
+    // Half a hundredth of a cell is rounding error, not extra ground.
     let [nx, ny] = [width, height].map(|size| ((size / resolution + 0.005).floor() as usize).max(1));
     let north = g.origin[1] + height;
     let layer = |value: &dyn Fn(f64, f64) -> f64| {
@@ -242,7 +244,7 @@ pub(super) fn grid_map(dem: &Grid, classes: Option<&Grid<u8>>) -> GridMap {
         let row = ((north - y) / g.cell[1]) as usize;
         (row.min(g.rows - 1), col.min(g.cols - 1))
     };
-    // Centres on the outer half cells have no bilinear height.
+    // Centres in the outer half cells have no bilinear height.
     let elevation = layer(&|x, y| {
         let (row, col) = nearest(x, y);
         dem.height(x, y).unwrap_or_else(|| dem.at(row, col))

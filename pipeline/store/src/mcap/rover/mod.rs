@@ -1,4 +1,4 @@
-//! Recordings of rovers: who writes them, and what both flavours draw alike.
+//! Recordings of rovers: writers, and parts common to both flavours.
 
 mod ros2;
 mod viewer;
@@ -21,29 +21,29 @@ const PATH_STEP: usize = 10;
 const STEPS_PER_M: f64 = 1024.0;
 /// Height of drawn areas and plans above the plane of the body, m.
 const LIFT_M: f64 = 0.02;
-/// Radius of a wheel over the distance of the axles from the centre: 65 mm, the paper's, for our axles.
+/// Wheel radius over the distance of the axles from the centre: with our axles it gives the paper's 65 mm.
 const WHEEL: f64 = 0.26;
 /// Diameter of the spheres at start and goal, m.
 const END_M: f64 = 0.3;
-/// Areas and rays of a hazard.
+/// Colour of areas and rays with a hazard.
 const HAZARD: [u8; 3] = [0xd6, 0x27, 0x28];
-/// Areas and rays without.
+/// Colour of areas and rays without a hazard.
 const CLEAR: [u8; 3] = [0x2c, 0xa0, 0x2c];
-/// Rays that met nothing.
+/// Colour of rays without a hit.
 const MISSED: [u8; 3] = [0x9a, 0x9a, 0x94];
-/// The body.
+/// Colour of the body.
 const BODY: [u8; 3] = [0xd8, 0xb0, 0x20];
-/// Its wheels.
+/// Colour of the wheels.
 const WHEELS: [u8; 3] = [0x28, 0x28, 0x28];
 
-/// A drive of a rover to write.
+/// A rover's drive to write.
 #[derive(Clone, Copy, Debug)]
 pub struct RoverMcap<'a> {
     /// Messages and their encoding.
     pub flavour: McapFlavour,
-    /// What happened.
+    /// Recording.
     pub recording: &'a RoverRecording,
-    /// The ground around the way.
+    /// The ground around the path.
     pub terrain: &'a TerrainView<'a>,
     /// Start, m.
     pub start_m: [f64; 2],
@@ -81,15 +81,15 @@ pub fn encode_rover(rover: &RoverMcap) -> Result<(Vec<u8>, McapSummary), McapErr
 fn check(rover: &RoverMcap) -> Result<(), McapError> {
     let recording = rover.recording;
     if recording.states.is_empty() {
-        return Err(McapError::unfit("it holds no state"));
+        return Err(McapError::unfit("it has no states"));
     }
     let finite = |what: &str, time_s: f64, values: &[f64]| match values.iter().find(|value| !value.is_finite()) {
         Some(value) => {
-            Err(McapError::unfit(format!("{what} at {time_s} s holds {value}, every number must be finite")))
+            Err(McapError::unfit(format!("{what} at {time_s} s contains {value}; every number must be finite")))
         }
         None => Ok(()),
     };
-    finite("the start or the goal", 0.0, &[rover.start_m, rover.goal_m].concat())?;
+    finite("the start or goal", 0.0, &[rover.start_m, rover.goal_m].concat())?;
     for state in &recording.states {
         finite("a state", state.time_s, &[&[state.time_s][..], &state.position_m, &state.orientation].concat())?;
     }
@@ -112,14 +112,14 @@ fn level(kind: RoverEventKind) -> u8 {
     }
 }
 
-/// States of the driven path: every tenth, and the last.
+/// States of the driven path: every tenth, plus the last.
 fn path_states(recording: &RoverRecording) -> Vec<&StateSample> {
     let states = &recording.states;
     let last = states.last().filter(|_| !(states.len() - 1).is_multiple_of(PATH_STEP));
     states.iter().step_by(PATH_STEP).chain(last).collect()
 }
 
-/// Where the terrain is drawn in full: under the body and what the rover sees of it.
+/// Where the terrain is drawn at full resolution: under the body and in the areas that the rover sees.
 fn corridor(rover: &RoverMcap) -> Vec<Square> {
     let [dx, dy] = rover.terrain.dem.geometry.cell;
     let RoverRecording { axle_m, track_m, states, cycles, .. } = rover.recording;
@@ -129,20 +129,20 @@ fn corridor(rover: &RoverMcap) -> Vec<Square> {
     under.chain(seen.map(|corner| Square { centre: [corner[0], corner[1]], half_side: dx.max(dy) })).collect()
 }
 
-/// Size and centre of the body's box in base_link, m.
+/// Size and centre of the body box in base_link, m.
 fn body(recording: &RoverRecording) -> [[f64; 3]; 2] {
     let radius_m = WHEEL * recording.axle_m;
     [[2.0 * recording.axle_m, 1.6 * recording.track_m, 1.5 * radius_m], [0.0, 0.0, 2.75 * radius_m]]
 }
 
-/// Centres of the wheels in base_link, m, with their radius and width.
+/// Wheel centres in base_link, m, with wheel radius and width, m.
 fn wheels(recording: &RoverRecording) -> ([[f64; 3]; 4], f64, f64) {
     let RoverRecording { axle_m: a, track_m: t, .. } = *recording;
     let radius_m = WHEEL * a;
     ([[a, t, radius_m], [a, -t, radius_m], [-a, t, radius_m], [-a, -t, radius_m]], radius_m, 0.8 * radius_m)
 }
 
-/// A point from the terrain's origin, in steps.
+/// A point relative to the terrain's origin, rounded to steps.
 fn relative(rover: &RoverMcap, [x, y, z]: [f64; 3]) -> [f64; 3] {
     let [x0, y0, z0] = rover.terrain.origin_m();
     [x - x0, y - y0, z - z0].map(|v| (v * STEPS_PER_M).round() / STEPS_PER_M)
@@ -152,25 +152,25 @@ fn lifted(rover: &RoverMcap, [x, y, z]: [f64; 3]) -> [f64; 3] {
     relative(rover, [x, y, z + LIFT_M])
 }
 
-/// A point of the plane on the ground, in the map frame.
+/// A plan position projected onto the ground, in the map frame.
 fn on_ground(rover: &RoverMcap, [x, y]: [f64; 2]) -> [f64; 3] {
     let height_m = rover.terrain.dem.height(x, y).filter(|z| z.is_finite());
     [x, y, height_m.unwrap_or(rover.terrain.range_m.0)]
 }
 
-/// Triangles of areas with, or without, a hazard, from the terrain's origin.
+/// Triangles of the areas with or without a hazard, relative to the terrain's origin.
 fn area_triangles(rover: &RoverMcap, cycle: &RoverCycle, hazard: bool) -> Vec<[f64; 3]> {
     let areas = cycle.areas.iter().filter(|area| area.hazard == hazard);
     areas
         .flat_map(|area| {
             let [a, b, c, d] = area.corners_m.map(|corner| lifted(rover, corner));
-            // Counterclockwise from above for corners near right, near left, far left, far right.
+            // Counter-clockwise from above, for corners in the order near right, near left, far left, far right.
             [a, c, b, a, d, c]
         })
         .collect()
 }
 
-/// Rays of a kind as pairs of ends, from the terrain's origin.
+/// Rays of one colour as pairs of end points, relative to the terrain's origin.
 fn ray_lines(rover: &RoverMcap, cycle: &RoverCycle, rgb: [u8; 3]) -> Vec<[f64; 3]> {
     let rays = cycle.rays.iter().filter(|ray| ray_rgb(ray) == rgb);
     rays.flat_map(|ray| [relative(rover, ray.from_m), relative(rover, ray.to_m)]).collect()

@@ -1,4 +1,4 @@
-//! ROS 2 flavour of rovers: the topics of `sastrugi_schemas::topics::ros2::ROVER_ROS2` in CDR.
+//! ROS 2 flavour of rovers: the topics of `sastrugi_schemas::topics::ros2::ROVER_ROS2`, in CDR.
 
 use super::super::frames::{BASE, GOAL, IDENTITY, MAP, START, rotated};
 use super::super::ros2::message::{Log, Marker, MarkerKind, Odometry, Path, Pose, PoseStamped, TwistStamped, encode};
@@ -18,7 +18,7 @@ const RAY_M: f64 = 0.005;
 /// Opacity of areas.
 const AREA: f32 = 0.35;
 
-/// Puts all messages of a drive on the timeline.
+/// Adds all messages of a drive to the timeline.
 pub(super) fn messages(rover: &RoverMcap, out: &mut Timeline) -> Result<(), McapError> {
     let recording = rover.recording;
     terrain_messages(rover.terrain, &corridor(rover), out)?;
@@ -48,11 +48,11 @@ pub(super) fn messages(rover: &RoverMcap, out: &mut Timeline) -> Result<(), Mcap
     recording.events.iter().try_for_each(|event| out.add(&ROVER_EVENTS, event.time_s, |t| encode(&log(event, t)?)))
 }
 
-/// The turn, then the drive of a cycle; a stand where it does neither.
+/// Commands of a cycle: the turn, then the drive; or a stop if there is neither.
 fn commands(cycle: &RoverCycle, out: &mut Timeline) -> Result<(), McapError> {
     let [turn_s, drive_s] = cycle.durations_s;
     let [turn_rad, drive_m] = cycle.moved;
-    let mut say = |time_s: f64, speed_m_s: f64, rate_rad_s: f64| {
+    let mut command = |time_s: f64, speed_m_s: f64, rate_rad_s: f64| {
         out.add(&ROVER_CMD_VEL, time_s, |t| {
             encode(&TwistStamped {
                 header: header(BASE, t)?,
@@ -62,12 +62,12 @@ fn commands(cycle: &RoverCycle, out: &mut Timeline) -> Result<(), McapError> {
         })
     };
     if turn_s > 0.0 {
-        say(cycle.time_s, 0.0, turn_rad / turn_s)?;
+        command(cycle.time_s, 0.0, turn_rad / turn_s)?;
     }
     if drive_s > 0.0 {
-        say(cycle.time_s + turn_s, drive_m / drive_s, 0.0)?;
+        command(cycle.time_s + turn_s, drive_m / drive_s, 0.0)?;
     }
-    if turn_s > 0.0 || drive_s > 0.0 { Ok(()) } else { say(cycle.time_s, 0.0, 0.0) }
+    if turn_s > 0.0 || drive_s > 0.0 { Ok(()) } else { command(cycle.time_s, 0.0, 0.0) }
 }
 
 fn odometry(state: &StateSample, log_time: u64) -> Result<Odometry, McapError> {
@@ -113,7 +113,7 @@ fn markers(rover: &RoverMcap, log_time: u64) -> Result<Vec<Marker>, McapError> {
     Ok(all)
 }
 
-/// Areas and rays. A kind that is not there is taken away: RViz warns of markers without points.
+/// Areas and rays. A kind without points is deleted, because RViz warns about markers without points.
 fn view(rover: &RoverMcap, cycle: &RoverCycle, log_time: u64) -> Result<Vec<Marker>, McapError> {
     const DELETE: i32 = 2;
     let areas = [("hazards", true, HAZARD), ("clear", false, CLEAR)];

@@ -18,7 +18,7 @@ fn ground() -> (Grid, Grid<u8>) {
     (heights, Grid { geometry, values: codes })
 }
 
-/// Two cycles, the second with a hazard and a ray that met nothing.
+/// Two cycles, the second with a hazard and a ray without a hit.
 fn recording() -> RoverRecording {
     let area = |left: f64, hazard: bool| SeenArea {
         corners_m: [[0.5, left, 0.0], [0.5, left + 0.2, 0.0], [1.0, left + 0.2, 0.1], [1.0, left, 0.1]],
@@ -110,7 +110,7 @@ fn val_every_topic_of_the_viewer_flavour_is_read_back() {
         .into_iter()
         .map(|(_, data)| fox::SceneUpdate::decode(data).unwrap().entities.remove(0))
         .collect();
-    // A clear look: two areas in one list, two rays in one; then one area and one ray of each kind.
+    // First a clear view: two areas in one list, two rays in one; then one area and one ray of each kind.
     assert_eq!(views.iter().map(|v| (v.triangles.len(), v.lines.len())).collect::<Vec<_>>(), [(1, 1), (2, 2)]);
     assert!(views[1].triangles.iter().all(|list| list.points.len() == 6));
     assert_eq!(views[0].triangles[0].points.len(), 12);
@@ -157,24 +157,24 @@ fn val_every_topic_of_the_ros_flavour_is_read_back() {
 
 #[test]
 fn val_unfit_recordings_are_refused() {
-    let said = |recording: &RoverRecording| encoded(McapFlavour::Viewer, recording).unwrap_err().to_string();
-    assert!(said(&RoverRecording { states: vec![], ..recording() }).contains("it holds no state"));
+    let message = |recording: &RoverRecording| encoded(McapFlavour::Viewer, recording).unwrap_err().to_string();
+    assert!(message(&RoverRecording { states: vec![], ..recording() }).contains("it has no states"));
     let mut wrong = recording();
     wrong.cycles[1].rays[0].to_m[2] = f64::NAN;
-    assert!(said(&wrong).contains("a cycle at 6.5 s holds NaN"), "{}", said(&wrong));
+    assert!(message(&wrong).contains("a cycle at 6.5 s contains NaN"), "{}", message(&wrong));
 }
 
 #[test]
-fn prop_bytes_follow_from_the_recording_alone() {
+fn prop_bytes_depend_on_the_recording_alone() {
     for flavour in [McapFlavour::Viewer, McapFlavour::Ros2] {
         let [a, b] = [0; 2].map(|_| encoded(flavour, &recording()).unwrap());
         assert_eq!(a, b);
     }
 }
 
-/// Topics and fields that the layout's panels of a rover name are there.
+/// Topics and fields named in the rover panels of the layout are recorded.
 #[test]
-fn val_the_layout_shows_a_rover() {
+fn val_the_layout_matches_a_rover() {
     let layout: serde_json::Value = serde_json::from_str(crate::mcap::VIEWER_LAYOUT).unwrap();
     let panels = &layout["configById"];
     let topic = |name: &str| ROVER_VIEWER.into_iter().find(|t| t.name == name).unwrap_or_else(|| panic!("{name}"));
@@ -182,7 +182,9 @@ fn val_the_layout_shows_a_rover() {
     shown.keys().for_each(|name| assert_eq!(topic(name).name, name));
     assert_eq!(shown.len(), 7);
     for plot in ["Plot!rover-goal", "Plot!rover-attitude", "Plot!rover-command"] {
-        for path in panels[plot]["paths"].as_array().unwrap() {
+        let paths = panels[plot]["paths"].as_array().unwrap();
+        assert!(!paths.is_empty(), "{plot}");
+        for path in paths {
             let (name, field) = path["value"].as_str().unwrap().split_once('.').unwrap();
             assert!(topic(name).fields.iter().any(|f| f.name == field), "{path}");
         }

@@ -1,4 +1,4 @@
-//! Viewer flavour of rovers: the topics of `sastrugi_schemas::topics::ROVER_VIEWER` in protobuf.
+//! Viewer flavour of rovers: the topics of `sastrugi_schemas::topics::ROVER_VIEWER`, in protobuf.
 
 use super::super::frames::{BASE, GOAL, IDENTITY, MAP, START};
 use super::super::protobuf::{self, Value};
@@ -20,12 +20,12 @@ use sastrugi_schemas::topics::{
 
 /// Width of rays, pixels.
 const LINE_PX: f64 = 1.5;
-/// Steps per unit of lengths and angles that are not poses.
+/// Quantisation of lengths and angles other than poses, steps per unit.
 const FINE: f64 = 1024.0;
 /// Opacity of areas.
 const AREA: f64 = 0.35;
 
-/// Puts all messages of a drive on the timeline.
+/// Adds all messages of a drive to the timeline.
 pub(super) fn messages(rover: &RoverMcap, out: &mut Timeline) -> Result<(), McapError> {
     let recording = rover.recording;
     out.add(&mesh_topic::TOPIC, 0.0, |t| {
@@ -56,7 +56,7 @@ fn shape(rover: &RoverMcap, time: Timestamp) -> fox::SceneUpdate {
     let (hubs_m, radius_m, width_m) = wheels(rover.recording);
     let half = std::f64::consts::FRAC_1_SQRT_2;
     let wheel = |hub_m: [f64; 3]| fox::CylinderPrimitive {
-        // A cylinder stands along z; turned by a right angle about x it lies along the axle.
+        // A cylinder's axis is z; rotated by a right angle about x it lies along the axle.
         pose: Some(pose(hub_m, [half, 0.0, 0.0, half])),
         size: Some(vector([2.0 * radius_m, 2.0 * radius_m, width_m])),
         bottom_scale: 1.0,
@@ -110,7 +110,7 @@ fn pose_in_map(state: &StateSample, time: Timestamp) -> fox::PoseInFrame {
     fox::PoseInFrame { timestamp: Some(time), frame_id: MAP.to_owned(), pose: Some(at) }
 }
 
-/// Areas and rays; the entity replaces that of the cycle before.
+/// Areas and rays; the entity replaces that of the previous cycle.
 fn view(rover: &RoverMcap, cycle: &RoverCycle, time: Timestamp) -> fox::SceneUpdate {
     let from_origin = || Some(pose(rover.terrain.origin_m(), IDENTITY));
     let triangles = [(true, HAZARD), (false, CLEAR)].map(|(hazard, rgb)| fox::TriangleListPrimitive {

@@ -1,4 +1,4 @@
-//! What a recording of a team must be before it is written.
+//! Validation of a team recording before it is written.
 
 use super::super::McapError;
 use super::super::frames::MAP;
@@ -8,7 +8,7 @@ use super::drawing::moving_name;
 use sastrugi_schemas::topics::{Member, MemberState, TeamRecording};
 use std::collections::BTreeSet;
 
-/// Refuses what has no place in the messages.
+/// Refuses recordings that cannot be expressed in the messages.
 pub(super) fn recording(team: &TeamMcap) -> Result<(), McapError> {
     let recording = team.recording;
     let times = times(recording)?;
@@ -26,23 +26,23 @@ pub(super) fn recording(team: &TeamMcap) -> Result<(), McapError> {
         disc.states.iter().try_for_each(|s| finite(&format!("{name} at {} s", s.time_s), &s.position_m))?;
     }
     finite("the sampling rate", &[recording.sample_rate_hz])?;
-    finite("the start or the goal", &[team.start_m, team.goal_m].concat())?;
+    finite("the start or goal", &[team.start_m, team.goal_m].concat())?;
     lines(recording)?;
     events(recording)
 }
 
-/// Times of all states: those of the first member.
+/// Times of all states, taken from the first member.
 fn times(recording: &TeamRecording) -> Result<Vec<f64>, McapError> {
-    let first = recording.members.first().ok_or_else(|| McapError::unfit("the team has no member"))?;
+    let first = recording.members.first().ok_or_else(|| McapError::unfit("the team has no members"))?;
     if first.states.is_empty() {
-        return Err(McapError::unfit(format!("{} has no state", first.name)));
+        return Err(McapError::unfit(format!("{} has no states", first.name)));
     }
     let times: Vec<f64> = first.states.iter().map(|state| state.time_s).collect();
     finite(&format!("a time of {}", first.name), &times)?;
     Ok(times)
 }
 
-/// Names serve as frames and in names of topics; ROS 2 takes letters, digits and underscores, a letter first.
+/// Names are used as frames and in topic names; ROS 2 allows letters, digits and underscores, starting with a letter.
 fn names(recording: &TeamRecording) -> Result<(), McapError> {
     let mut frames = BTreeSet::from([MAP.to_owned(), TERRAIN.to_owned()]);
     frames.extend((0..recording.moving.len()).map(moving_name));
@@ -51,14 +51,14 @@ fn names(recording: &TeamRecording) -> Result<(), McapError> {
         let fit = name.chars().all(|c| c.is_ascii_alphanumeric() || c == '_');
         if !fit || !name.starts_with(|c: char| c.is_ascii_alphabetic()) {
             return Err(McapError::unfit(format!(
-                "the member's name \"{name}\" must start with a letter and hold letters, digits and underscores only"
+                "member name \"{name}\" must start with a letter and contain only letters, digits and underscores"
             )));
         }
         if !frames.insert(name.clone()) {
-            return Err(McapError::unfit(format!("the member's name \"{name}\" is taken by another frame")));
+            return Err(McapError::unfit(format!("member name \"{name}\" is already used by another frame")));
         }
         if *number < 1 || !numbers.insert(*number) {
-            return Err(McapError::unfit(format!("the number of {name}, {number}, must be at least 1 and its own")));
+            return Err(McapError::unfit(format!("the number of {name} must be at least 1 and unique, got {number}")));
         }
     }
     Ok(())
@@ -74,14 +74,14 @@ fn radius(name: &str, radius_m: f64) -> Result<(), McapError> {
 fn same_times(name: &str, times: &[f64], own: impl ExactSizeIterator<Item = f64>) -> Result<(), McapError> {
     if own.len() != times.len() {
         return Err(McapError::unfit(format!(
-            "{name} must have as many states as the first member, {}, got {}",
+            "{name} must have the same number of states as the first member, {}, got {}",
             times.len(),
             own.len()
         )));
     }
     match own.zip(times).find(|(own, time)| own != *time) {
         Some((own, time)) => {
-            Err(McapError::unfit(format!("{name} has a state at {own} s where the first member has one at {time} s")))
+            Err(McapError::unfit(format!("{name} has a state at {own} s, but the first member has one at {time} s")))
         }
         None => Ok(()),
     }
@@ -100,14 +100,17 @@ fn lines(recording: &TeamRecording) -> Result<(), McapError> {
             &[route.points_m.as_flattened(), &[route.time_s]].concat(),
         )?;
     }
-    finite("the path of the search", recording.search_path_m.as_flattened())?;
+    finite("the search path", recording.search_path_m.as_flattened())?;
     finite("the roadmap", recording.vertices_m.as_flattened())?;
     for one in &recording.boxes {
         finite(&format!("the box at {} s", one.time_s), &[one.corners_m.as_flattened(), &[one.time_s]].concat())?;
     }
     for (ring, number) in recording.obstacles.iter().zip(1..) {
         if ring.len() < 3 {
-            return Err(McapError::unfit(format!("obstacle {number} needs at least 3 corners, got {}", ring.len())));
+            return Err(McapError::unfit(format!(
+                "obstacle {number} must have at least 3 corners, got {}",
+                ring.len()
+            )));
         }
         finite(&format!("obstacle {number}"), ring.as_flattened())?;
     }
@@ -128,7 +131,7 @@ fn events(recording: &TeamRecording) -> Result<(), McapError> {
 
 fn finite(what: &str, values: &[f64]) -> Result<(), McapError> {
     match values.iter().find(|value| !value.is_finite()) {
-        Some(value) => Err(McapError::unfit(format!("{what} holds {value}, every number must be finite"))),
+        Some(value) => Err(McapError::unfit(format!("{what} contains {value}; every number must be finite"))),
         None => Ok(()),
     }
 }

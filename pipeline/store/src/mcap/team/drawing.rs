@@ -1,6 +1,6 @@
-//! What both flavours show of a team: bodies, lines on the ground, walls, and where the terrain is drawn in full.
+//! Drawing of a team, common to both flavours: bodies, lines on the ground, walls, and where the terrain is drawn at full resolution.
 //!
-//! Points of lines and walls count from a point near the terrain's corner and the lowest height, so that viewers can hold them in
+//! Points of lines and walls are relative to a point near the terrain's corner and lowest height, so that viewers can store them in
 //! single precision.
 
 use super::super::TerrainView;
@@ -10,7 +10,7 @@ use sastrugi_numeric::{Grid, Surface};
 use sastrugi_schemas::topics::{FormationBox, MemberState, TeamRecording};
 use std::f64::consts::TAU;
 
-/// Most points between the given ones of a line on the ground.
+/// Most points inserted between the given points of a line on the ground.
 const LAID_POINTS: usize = 8192;
 /// Most vertices of the roadmap.
 const VERTICES: usize = 16384;
@@ -58,7 +58,7 @@ pub(super) struct Body {
     pub number: Option<i64>,
 }
 
-/// Members, then moving obstacles.
+/// Members, followed by moving obstacles.
 pub(super) fn bodies(recording: &TeamRecording) -> Vec<Body> {
     let members = recording.members.iter().zip(PALETTE.into_iter().cycle()).map(|(member, rgb)| Body {
         name: member.name.clone(),
@@ -88,24 +88,24 @@ pub(super) fn poses(recording: &TeamRecording, sample: usize) -> impl Iterator<I
     members.chain(discs.map(|state| (state.position_m, about_z(0.0))))
 }
 
-/// Quaternion of a turn about z.
+/// Quaternion of a rotation about z.
 pub(super) fn about_z(angle_rad: f64) -> [f64; 4] {
     let (sin, cos) = libm::sincos(0.5 * angle_rad);
     [0.0, 0.0, sin, cos]
 }
 
-/// Times of the samples with their numbers.
+/// Indices and times of the samples.
 pub(super) fn samples(recording: &TeamRecording) -> impl Iterator<Item = (usize, f64)> + '_ {
     recording.members.iter().take(1).flat_map(|member| member.states.iter().map(|state| state.time_s)).enumerate()
 }
 
-/// Mean yaw rate from one state to the next, rad/s, by the shorter turn.
+/// Mean yaw rate from one state to the next, rad/s, in the direction of the shorter turn.
 pub(super) fn yaw_rate(before: &MemberState, after: &MemberState) -> f64 {
     let (turn, time_s) = (after.heading_rad - before.heading_rad, after.time_s - before.time_s);
     if time_s > 0.0 { (turn - TAU * (turn / TAU).round()) / time_s } else { 0.0 }
 }
 
-/// States of a driven path: [`PATH_RATE_HZ`] of them, and the last.
+/// States of a driven path: at [`PATH_RATE_HZ`], plus the last.
 pub(super) fn path_states(states: &[MemberState], sample_rate_hz: f64) -> Vec<&MemberState> {
     let step = (sample_rate_hz / PATH_RATE_HZ).round().max(1.0) as usize;
     let last = states.last().filter(|_| !(states.len() - 1).is_multiple_of(step));
@@ -122,13 +122,13 @@ pub(super) fn changes(boxes: &[FormationBox]) -> impl Iterator<Item = &Formation
 /// Lines and walls of a team on its terrain.
 pub(super) struct Drawing<'a> {
     terrain: &'a TerrainView<'a>,
-    /// What the points of lines and walls count from: whole metres near the south-west corner and the lowest height.
+    /// Origin of the points of lines and walls: whole metres near the south-west corner and the lowest height.
     pub origin: [f64; 3],
     /// Times and planned routes on the ground, in the map frame.
     pub routes: Vec<(f64, Vec<[f64; 3]>)>,
-    /// Waypoints of a route that was planned before, in the map frame; those of routes planned on the way come and go.
+    /// Waypoints of a route planned in advance, in the map frame; empty if routes are replanned on the way.
     pub waypoints: &'a [[f64; 3]],
-    /// The path of the search on the ground, in the map frame.
+    /// The search path on the ground, in the map frame.
     pub search_path: Vec<[f64; 3]>,
     /// Height of lines above the ground, m.
     pub lift_m: f64,
@@ -154,7 +154,8 @@ impl<'a> Drawing<'a> {
         }
     }
 
-    /// Where the terrain is drawn in full: under the members, along the routes and the path of the search, and a cell around.
+    /// Where the terrain is drawn at full resolution: under the members and along the routes and the search path, with a margin of one
+    /// cell.
     pub(super) fn corridor(&self, recording: &TeamRecording) -> Vec<Square> {
         let [dx, dy] = self.terrain.dem.geometry.cell;
         let cell = dx.max(dy);
@@ -168,24 +169,24 @@ impl<'a> Drawing<'a> {
         under.chain(lines).collect()
     }
 
-    /// Points in steps from the origin, above the ground.
+    /// Points relative to the origin, lifted above the ground and rounded to steps.
     pub(super) fn lifted(&self, points: &[[f64; 3]]) -> Vec<[f64; 3]> {
         let up = |&[x, y, z]: &[f64; 3]| self.relative([x, y, z + self.lift_m]);
         points.iter().map(up).collect()
     }
 
-    /// Vertices of the roadmap above the ground.
+    /// Vertices of the roadmap, lifted above the ground.
     pub(super) fn vertices(&self, recording: &TeamRecording) -> Vec<[f64; 3]> {
         self.lifted(&thinned(&recording.vertices_m, VERTICES))
     }
 
-    /// A box as a closed line above the ground, its first corner again as the last.
+    /// A box as a closed line above the ground, with the first corner repeated as the last.
     pub(super) fn box_line(&self, one: &FormationBox) -> Vec<[f64; 3]> {
         let [a, b, c, d] = one.corners_m;
         self.lifted(&laid(self.terrain.dem, &[a, b, c, d, a]))
     }
 
-    /// The wall around an obstacle as triples of corners.
+    /// The wall around an obstacle, as triples of triangle corners.
     pub(super) fn wall(&self, ring: &[[f64; 2]]) -> Vec<[f64; 3]> {
         let closed = ring.iter().chain(ring.first());
         let closed: Vec<[f64; 3]> = closed.map(|&[x, y]| [x, y, self.ground_or_lowest(x, y)]).collect();
@@ -195,7 +196,7 @@ impl<'a> Drawing<'a> {
         pairs.flat_map(|(&a, &b)| [a, b, above(b), a, above(b), above(a)]).map(|point| self.relative(point)).collect()
     }
 
-    /// A point of the plane on the ground, from the origin.
+    /// A plan position projected onto the ground, relative to the origin.
     pub(super) fn on_ground(&self, [x, y]: [f64; 2]) -> [f64; 3] {
         self.relative([x, y, self.ground_or_lowest(x, y)])
     }
@@ -215,8 +216,8 @@ fn ground(dem: &Grid, x: f64, y: f64) -> Option<f64> {
     dem.height(x, y).filter(|z| z.is_finite())
 }
 
-/// A line on the ground: its points as they are, and between them one a cell, at most [`LAID_POINTS`] of those. Without ground under
-/// such a point it lies on the straight line.
+/// A line on the ground: the given points, with one point per cell inserted between them, at most [`LAID_POINTS`]. An inserted point
+/// without ground below lies on the straight line.
 pub(super) fn laid(dem: &Grid, line: &[[f64; 3]]) -> Vec<[f64; 3]> {
     let [dx, dy] = dem.geometry.cell;
     let pairs = || line.iter().zip(line.iter().skip(1));
@@ -238,13 +239,13 @@ fn between(dem: &Grid, a: &[f64; 3], b: &[f64; 3], share: f64) -> [f64; 3] {
     [x, y, ground(dem, x, y).unwrap_or(z)]
 }
 
-/// At most so many, evenly spaced in their order, the first among them.
+/// At most `most` elements, evenly spaced in order, including the first.
 pub(super) fn thinned<T: Copy>(all: &[T], most: usize) -> Vec<T> {
     let kept = all.len().min(most);
     (0..kept).filter_map(|k| all.get(k * all.len() / kept)).copied().collect()
 }
 
-/// Poses along a line, each looking to the next point; the last one as the one before.
+/// Poses along a line, each facing the next point; the last has the heading of the one before.
 pub(super) fn looking_ahead(points: &[[f64; 3]]) -> Vec<([f64; 3], [f64; 4])> {
     let pairs = points.iter().zip(points.iter().skip(1));
     let turns: Vec<[f64; 4]> = pairs.map(|(a, b)| about_z(libm::atan2(b[1] - a[1], b[0] - a[0]))).collect();

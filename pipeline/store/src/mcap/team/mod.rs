@@ -1,4 +1,4 @@
-//! Recordings of teams: who writes them, and the parts that both flavours draw alike.
+//! Recordings of teams: writers, and parts common to both flavours.
 
 mod check;
 mod drawing;
@@ -20,9 +20,9 @@ use std::collections::BTreeMap;
 pub struct TeamMcap<'a> {
     /// Messages and their encoding.
     pub flavour: McapFlavour,
-    /// What happened.
+    /// Recording.
     pub recording: &'a TeamRecording,
-    /// Terrain it happened on.
+    /// Terrain of the recording.
     pub terrain: &'a TerrainView<'a>,
     /// Start of the route, m.
     pub start_m: [f64; 2],
@@ -45,8 +45,8 @@ pub fn write_team<'a>(target: impl Into<Target<'a>>, team: &TeamMcap<'_>) -> Res
 /// A team's run as the bytes of an MCAP file.
 ///
 /// # Errors
-/// [`McapError::Unfit`] for a recording without members or states, with members whose names are unfit for frames or whose states
-/// are at different times, with a number that is not finite, or of an event of an unknown member.
+/// [`McapError::Unfit`] for a recording without members or states, with member names that cannot be frames, with states at different
+/// times, with a number that is not finite, or with an event of an unknown member.
 pub fn encode_team(team: &TeamMcap) -> Result<(Vec<u8>, McapSummary), McapError> {
     check::recording(team)?;
     let mut timeline = Timeline::new(channels(team), team.epoch_ns);
@@ -57,7 +57,7 @@ pub fn encode_team(team: &TeamMcap) -> Result<(Vec<u8>, McapSummary), McapError>
     encode(Flavour::of(team.flavour), timeline, team.metadata)
 }
 
-/// The flavour's channels; those of members stand together, member by member.
+/// The channels of the flavour; those of members are grouped by member.
 fn channels(team: &TeamMcap) -> Vec<Channel> {
     const OF_MEMBERS: [&Topic; 2] = [&MEMBER_ODOM, &MEMBER_PATH];
     let listed: &[&'static Topic] = match team.flavour {
@@ -89,7 +89,7 @@ fn level(kind: TeamEventKind) -> u8 {
     }
 }
 
-/// Text of an event, behind the name of the member that it happened to.
+/// Text of an event, preceded by the name of the member concerned.
 fn text(recording: &TeamRecording, event: &TeamEvent) -> String {
     let member = recording.members.iter().find(|member| Some(member.number) == event.member);
     member.map_or_else(|| event.text.clone(), |member| format!("{}: {}", member.name, event.text))

@@ -1,4 +1,4 @@
-//! ROS 2 flavour of teams: the topics of `sastrugi_schemas::topics::ros2::TEAM_ROS2` in CDR.
+//! ROS 2 flavour of teams: the topics of `sastrugi_schemas::topics::ros2::TEAM_ROS2`, in CDR.
 
 use super::super::frames::{GOAL, MAP, START, rotated};
 use super::super::ros2::message::{Log, Marker, MarkerKind, Odometry, Path, Pose, PoseStamped, encode};
@@ -14,7 +14,7 @@ use sastrugi_schemas::topics::ros2::{
 };
 use sastrugi_schemas::topics::{FormationBox, Member, MemberState, TeamEvent, TeamRecording};
 
-/// Puts all messages of a run on the timeline.
+/// Adds all messages of a run to the timeline.
 pub(super) fn messages(team: &TeamMcap, out: &mut Timeline) -> Result<(), McapError> {
     let (recording, drawing) = (team.recording, Drawing::new(team));
     terrain_messages(team.terrain, &drawing.corridor(recording), out)?;
@@ -76,7 +76,7 @@ fn path(poses: impl Iterator<Item = (u64, [f64; 3], [f64; 4])>, log_time: u64) -
     Ok(Path { header: header(MAP, log_time)?, poses: stamped.collect::<Result<_, McapError>>()? })
 }
 
-/// Everything that is drawn once.
+/// Markers that are drawn once.
 fn markers(team: &TeamMcap, drawing: &Drawing, log_time: u64) -> Result<Vec<Marker>, McapError> {
     let recording = team.recording;
     let bodies = bodies(recording);
@@ -96,7 +96,7 @@ fn markers(team: &TeamMcap, drawing: &Drawing, log_time: u64) -> Result<Vec<Mark
         (MarkerKind::LineStrip, "search_path", width, SEARCH, search),
         (MarkerKind::Points, "vertices", width, VERTEX, drawing.vertices(recording)),
     ] {
-        // RViz warns of markers without points.
+        // RViz warns about markers without points.
         if !points.is_empty() {
             all.push(marker(kind, of, scale, rgb, points)?);
         }
@@ -104,7 +104,7 @@ fn markers(team: &TeamMcap, drawing: &Drawing, log_time: u64) -> Result<Vec<Mark
     Ok(all)
 }
 
-/// A body in its frame, with which it moves.
+/// A body in its own frame, locked to it.
 fn cylinder(body: &Body, log_time: u64) -> Result<Marker, McapError> {
     Ok(Marker {
         position: [0.0, 0.0, body.radius_m],

@@ -1,4 +1,4 @@
-//! Viewer flavour of teams: the topics of `sastrugi_schemas::topics::TEAM_VIEWER` in protobuf.
+//! Viewer flavour of teams: the topics of `sastrugi_schemas::topics::TEAM_VIEWER`, in protobuf.
 
 use super::super::frames::{GOAL, IDENTITY, MAP, START};
 use super::super::protobuf::{self, Value};
@@ -18,13 +18,13 @@ use sastrugi_schemas::topics::{
 
 /// Width of lines, pixels.
 const LINE_PX: f64 = 2.0;
-/// Width and length of the dash that stands for a vertex: pixels, m.
+/// Width and length of the dash that represents a vertex: pixels, m.
 const VERTEX_PX: f64 = 3.0;
 const VERTEX_M: f64 = 0.0625;
-/// Height of members' numbers, pixels.
+/// Text height of member numbers, pixels.
 const TEXT_PX: f64 = 14.0;
 
-/// Puts all messages of a run on the timeline.
+/// Adds all messages of a run to the timeline.
 pub(super) fn messages(team: &TeamMcap, out: &mut Timeline) -> Result<(), McapError> {
     let (recording, drawing) = (team.recording, Drawing::new(team));
     let near = drawing.corridor(recording);
@@ -77,7 +77,7 @@ fn shape(team: &TeamMcap, drawing: &Drawing, time: Timestamp) -> fox::SceneUpdat
     fox::SceneUpdate { deletions: vec![], entities: bodies.chain(ends).chain(walls).collect() }
 }
 
-/// A body in its frame; members have their number above them and an arrow that points ahead.
+/// A body in its own frame; members carry their number and an arrow that points forward.
 fn cylinder(body: &Body, time: Timestamp) -> fox::SceneEntity {
     let radius_m = body.radius_m;
     let standing = fox::CylinderPrimitive {
@@ -161,7 +161,7 @@ fn graph(recording: &TeamRecording, drawing: &Drawing, time: Timestamp) -> fox::
     fox::SceneUpdate { deletions: vec![], entities: vec![waypoints, search, vertices(recording, drawing, time)] }
 }
 
-/// Vertices as dashes of a width in pixels: points on the screen from afar, and half the data of triangles.
+/// Vertices as dashes with a width in pixels: they look like points from a distance, and take half the data of triangles.
 fn vertices(recording: &TeamRecording, drawing: &Drawing, time: Timestamp) -> fox::SceneEntity {
     let drawn = drawing.vertices(recording);
     let count = |key: &str, value: usize| fox::KeyValuePair { key: key.to_owned(), value: value.to_string() };

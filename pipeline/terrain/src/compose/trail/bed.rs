@@ -7,7 +7,7 @@ use std::f64::consts::{PI, TAU};
 
 /// Width of a rut's wall over that of the tyre.
 const WALL_TYRES: f64 = 0.25;
-/// Standard deviations after which the Gaussian is cut off.
+/// Standard deviations at which the Gaussian is truncated.
 const GAUSSIAN_REACH: f64 = 4.0;
 
 /// The cross-section of a trail.
@@ -21,10 +21,10 @@ pub(super) struct Bed {
 
 /// Two ruts.
 pub(super) struct Ruts {
-    /// Between their middles, m.
+    /// Distance between their centres, m.
     pub(super) track_m: f64,
     pub(super) tyre_width_m: f64,
-    /// After all passes, m.
+    /// Depth after all passes, m.
     pub(super) depth_m: f64,
     pub(super) berm_width_m: f64,
     /// Volume of the berms over that of the ruts.
@@ -32,12 +32,12 @@ pub(super) struct Ruts {
 }
 
 impl Ruts {
-    /// From the middle of a rut to the top of its wall, m.
+    /// From the centre of a rut to the top of its wall, m.
     pub(super) fn wall_m(&self) -> f64 {
         (0.5 + WALL_TYRES) * self.tyre_width_m
     }
 
-    /// From the middle of a rut to the end of its berm, m.
+    /// From the centre of a rut to the end of its berm, m.
     pub(super) fn reach_m(&self) -> f64 {
         self.wall_m() + self.berm_width_m
     }
@@ -47,7 +47,7 @@ impl Ruts {
         self.of_one_m((u - 0.5 * self.track_m).abs()) + self.of_one_m(u + 0.5 * self.track_m)
     }
 
-    /// Change of height at a distance from the middle of one rut, m.
+    /// Change of height at a distance from the centre of one rut, m.
     fn of_one_m(&self, v: f64) -> f64 {
         let (bottom_m, wall_m) = (0.5 * self.tyre_width_m, self.wall_m());
         if v <= bottom_m {
@@ -66,7 +66,7 @@ impl Ruts {
     }
 }
 
-/// Nearest point of the centre line: its distance, and its place along the line, m.
+/// Nearest point of the centre line: its distance, and its position along the line, m.
 #[derive(Clone, Copy)]
 struct Foot {
     distance_m: f64,
@@ -77,7 +77,7 @@ impl Bed {
     /// Presses the trail into heights, m.
     ///
     /// # Errors
-    /// [`TerrainError::Trail`] where the ground has no height.
+    /// [`TerrainError::Trail`] if the ground has no height somewhere.
     pub(super) fn press(&self, z: &mut Grid, curve: &Curve) -> Result<(), TerrainError> {
         let along_m = curve.along_m();
         let bed_m = self.bed_m(z, curve, &along_m)?;
@@ -92,7 +92,7 @@ impl Bed {
         Ok(())
     }
 
-    /// The feet of all cells on the centre line; at infinite distance beyond half the width.
+    /// The foot of each cell on the centre line; at infinite distance beyond half the width.
     fn feet(&self, geometry: &Geometry, curve: &Curve, along_m: &[f64]) -> Vec<Foot> {
         let mut feet = vec![Foot { distance_m: f64::INFINITY, along_m: 0.0 }; geometry.len()];
         for (k, ends) in curve.points_m.windows(2).enumerate() {
@@ -107,7 +107,7 @@ impl Bed {
         feet
     }
 
-    /// Cells of the rectangle that holds everything within half the width of a segment.
+    /// Cells of the rectangle that encloses all points within half the width of a segment.
     fn cells_near(&self, geometry: &Geometry, [a, b]: [[f64; 2]; 2]) -> impl Iterator<Item = usize> + use<> {
         let cols = geometry.cols;
         let span = |axis: usize, count: usize| {
@@ -132,7 +132,7 @@ impl Bed {
     }
 }
 
-/// `3 t^2 - 2 t^3`, t kept to 0 to 1.
+/// `3 t^2 - 2 t^3`, with t limited to 0 to 1.
 fn smooth(t: f64) -> f64 {
     let t = t.clamp(0.0, 1.0);
     t * t * (3.0 - 2.0 * t)
@@ -145,15 +145,15 @@ fn foot_on([a, b]: [[f64; 2]; 2], [from_m, to_m]: [f64; 2], at: [f64; 2]) -> Foo
     Foot { distance_m: (x * x + y * y).sqrt(), along_m: from_m + t * (to_m - from_m) }
 }
 
-/// Linear between values at rising places.
+/// Linear interpolation between values at increasing positions.
 fn between(along_m: &[f64], values: &[f64], s: f64) -> f64 {
     let k = along_m[1..along_m.len() - 1].partition_point(|&end_m| end_m <= s);
     let share = (s - along_m[k]) / (along_m[k + 1] - along_m[k]);
     values[k] + share * (values[k + 1] - values[k])
 }
 
-/// Places and heights with one more length before and after: a closed profile goes on, an open one is turned half about its ends, so
-/// that its smoothed ends stay where they are.
+/// Positions and heights, extended by one length before and after: a closed profile continues, an open one is reflected through its end
+/// points, so that smoothing leaves its ends in place.
 fn continued(along_m: &[f64], heights: &[f64], closed: bool) -> Vec<(f64, f64)> {
     let last = along_m.len() - 1;
     let (length_m, first_z, last_z) = (along_m[last], heights[0], heights[last]);
@@ -167,7 +167,7 @@ fn continued(along_m: &[f64], heights: &[f64], closed: bool) -> Vec<(f64, f64)> 
     before.chain(own()).chain(after).collect()
 }
 
-/// Mean of a profile about a place under a Gaussian.
+/// Gaussian-weighted mean of a profile about a position.
 fn gaussian_mean(profile: &[(f64, f64)], s: f64, deviation_m: f64) -> f64 {
     let reach_m = GAUSSIAN_REACH * deviation_m;
     let first = profile.partition_point(|(at, _)| *at < s - reach_m);

@@ -1,14 +1,14 @@
-//! Centre lines with a smallest radius.
+//! Centre lines with a minimum radius.
 
 use super::{Ground, TerrainError};
 use std::f64::consts::TAU;
 
-/// Points of a centre line for each turning radius of its length.
+/// Points of a centre line per turning radius of length.
 pub(super) const POINTS_PER_RADIUS: f64 = 16.0;
-/// Relaxations between two looks at the radius, and most of them in all.
-const LOOK_EVERY: usize = 8;
+/// Relaxations between two checks of the radius, and their maximum number in total.
+const CHECK_EVERY: usize = 8;
 const RELAXATIONS_MAX: usize = 100_000;
-/// Distances from the middle among which a loop chooses.
+/// Distances from the centre among which a loop chooses.
 const REACHES: usize = 21;
 
 /// A centre line.
@@ -24,7 +24,7 @@ impl Curve {
         along_m(&self.points_m)
     }
 
-    /// Smallest radius of a circle through three points in succession, m; infinite for a straight line.
+    /// Smallest radius of a circle through three successive points, m; infinite for a straight line.
     pub(super) fn tightest_m(&self) -> f64 {
         let inner = self.points_m.windows(3).map(|w| circumradius_m(w[0], w[1], w[2]));
         let seam = match (&self.points_m[..], self.closed) {
@@ -55,7 +55,7 @@ fn circumradius_m(a: [f64; 2], b: [f64; 2], c: [f64; 2]) -> f64 {
     distance(a, b) * distance(b, c) * distance(c, a) / (2.0 * twice_area)
 }
 
-/// The points every `spacing_m` or a little less along a polyline.
+/// Points along a polyline, `spacing_m` or slightly less apart.
 fn resampled(points_m: &[[f64; 2]], spacing_m: f64) -> Vec<[f64; 2]> {
     let along_m = along_m(points_m);
     let length_m = along_m[along_m.len() - 1];
@@ -70,7 +70,7 @@ fn resampled(points_m: &[[f64; 2]], spacing_m: f64) -> Vec<[f64; 2]> {
     (0..=count).map(at).collect()
 }
 
-/// The path with its ends, relaxed until it keeps the radius; `None` where it does not come to that.
+/// The path with its ends fixed, relaxed until it keeps the radius; `None` if it never does.
 pub(super) fn relaxed_path(path_m: Vec<[f64; 2]>, turning_radius_m: f64) -> Option<Curve> {
     let points_m = resampled(&path_m, turning_radius_m / POINTS_PER_RADIUS);
     let smooth = |points_m: &mut Vec<[f64; 2]>| {
@@ -91,12 +91,12 @@ fn until_gentle<Form>(
     smooth: impl Fn(&mut Form),
     curve: impl Fn(&Form) -> Curve,
 ) -> Option<Curve> {
-    for _ in 0..RELAXATIONS_MAX / LOOK_EVERY {
+    for _ in 0..RELAXATIONS_MAX / CHECK_EVERY {
         let curve = curve(&form);
         if curve.tightest_m() >= turning_radius_m {
             return Some(curve);
         }
-        (0..LOOK_EVERY).for_each(|_| smooth(&mut form));
+        (0..CHECK_EVERY).for_each(|_| smooth(&mut form));
     }
     None
 }
@@ -105,7 +105,7 @@ fn until_gentle<Form>(
 pub(super) struct Ellipse {
     pub(super) middle_m: [f64; 2],
     pub(super) half_axes_m: [f64; 2],
-    /// Least and largest distance from the middle, over that of the ellipse.
+    /// Smallest and largest distance from the centre, over that of the ellipse.
     pub(super) reach: [f64; 2],
 }
 
@@ -125,11 +125,11 @@ impl Ellipse {
     /// The reach of every point of the loop over the gentlest slopes.
     ///
     /// # Errors
-    /// [`TerrainError::Trail`] where the ground has no height.
+    /// [`TerrainError::Trail`] if the ground has no height somewhere.
     pub(super) fn fitted(&self, ground: &Ground<'_>, turning_radius_m: f64) -> Result<Vec<f64>, TerrainError> {
         let count = self.count(turning_radius_m);
         let [least, most] = self.reach;
-        // As many levels inside of the ellipse as outside, and the ellipse itself.
+        // As many levels inside the ellipse as outside, and the ellipse itself.
         let reach = |level: usize| match 2.0 * level as f64 / (REACHES - 1) as f64 - 1.0 {
             out if out < 0.0 => 1.0 + out * (1.0 - least),
             out => 1.0 + out * (most - 1.0),
@@ -147,7 +147,7 @@ impl Ellipse {
         Ok(gentlest_round(&table, nearest_first(&reach)).into_iter().map(reach).collect())
     }
 
-    /// The loop with these reaches, relaxed until it keeps the radius; `None` where it does not come to that.
+    /// The loop with these reaches, relaxed until it keeps the radius; `None` if it never does.
     pub(super) fn relaxed(&self, reaches: Vec<f64>, turning_radius_m: f64) -> Option<Curve> {
         let smooth = |reaches: &mut Vec<f64>| {
             let (first, last) = (reaches[0], reaches.len() - 1);
@@ -167,7 +167,7 @@ impl Ellipse {
     }
 }
 
-/// Levels by how near they are to the ellipse, so that level ground gives the ellipse itself.
+/// Levels sorted by their distance from the ellipse, so that level ground gives the ellipse itself.
 fn nearest_first(reach: &impl Fn(usize) -> f64) -> Vec<usize> {
     let mut levels: Vec<usize> = (0..REACHES).collect();
     levels.sort_by(|&a, &b| (reach(a) - 1.0).abs().total_cmp(&(reach(b) - 1.0).abs()));
@@ -183,8 +183,8 @@ fn climb((a, za): Node, (b, zb): Node) -> f64 {
     dz * dz / distance(a, b)
 }
 
-/// The closed sequence of levels, each beside or equal to the one before, with the least sum of [`climb`]; of equal ones that which
-/// changes least, from the first of `starts`.
+/// The closed sequence of levels with the smallest sum of [`climb`], each level equal or adjacent to the one before; ties go to the
+/// sequence that changes least, from the first of `starts`.
 fn gentlest_round(table: &[[Node; REACHES]], starts: Vec<usize>) -> Vec<usize> {
     let mut best: (f64, Vec<usize>) = (f64::INFINITY, vec![starts[0]; table.len()]);
     for start in starts {
@@ -196,7 +196,7 @@ fn gentlest_round(table: &[[Node; REACHES]], starts: Vec<usize>) -> Vec<usize> {
     best.1
 }
 
-/// The same from one level, and its sum, m.
+/// The best sequence starting at one level, and its sum, m.
 fn gentlest_from(table: &[[Node; REACHES]], start: usize) -> (f64, Vec<usize>) {
     let mut sums = [f64::INFINITY; REACHES];
     sums[start] = 0.0;

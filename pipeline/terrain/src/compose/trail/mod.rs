@@ -1,32 +1,34 @@
-//! A vehicle trail on the ground made so far: its centre line, a levelled bed, and two ruts.
+//! A vehicle trail on the ground so far: its centre line, a levelled bed, and two ruts.
 //!
 //! # Centre line
-//! `ridges` and `valleys`: the path of least cost over the heights, averaged over squares of half the trail's width, from the south-western
-//! corner of the border to the north-eastern one. A metre costs `1 + attraction t^2`, with t = 0 on the highest ground and 1 on the lowest
-//! (`valleys`: the other way round). `loop`: an ellipse about the middle with half axes `loop_share` of the sides, every point of it moved
-//! in or out by up to `loop_wander_share` so that the sum of `dz^2 / ds` around is the least. Both are resampled every sixteenth of the
-//! turning radius and relaxed (`1/4, 1/2, 1/4`; the loop in its distance from the middle) until no three points in succession lie on a circle below the turning radius.
+//! `ridges` and `valleys`: the path of least cost from the south-western to the north-eastern corner of the border, over heights averaged
+//! over squares of half the trail's width. A metre costs `1 + attraction t^2`, with t = 0 on the highest ground and 1 on the lowest
+//! (`valleys`: the reverse). `loop`: an ellipse about the centre with semi-axes of `loop_share` times the sides, each point moved in or
+//! out by up to `loop_wander_share` to minimise the sum of `dz^2 / ds` around the loop. Both are resampled every sixteenth of the
+//! turning radius and relaxed (`1/4, 1/2, 1/4`; the loop in its distance from the centre) until no three successive points lie on a
+//! circle smaller than the turning radius.
 //!
 //! # Bed
-//! With u the distance from the centre line, H the ground's height along it after a Gaussian of standard deviation `smoothing_m`, and
-//! `w = 3 t^2 - 2 t^3`, `t = (width_m / 2 - u) / shoulder_m` kept to 0 to 1, heights become `(1 - w) z + w H`. Nothing changes
-//! from `width_m / 2` on.
+//! Let u be the distance from the centre line, H the ground's height along it, smoothed by a Gaussian of standard deviation `smoothing_m`, and
+//! `w = 3 t^2 - 2 t^3` with `t = (width_m / 2 - u) / shoulder_m` limited to 0 to 1. Heights become `(1 - w) z + w H`; beyond
+//! `width_m / 2` they do not change.
 //!
 //! # Ruts
-//! Two tyres of width b at `track_m / 2` press to the depth `D = rut_depth_m passes^(1 / multipass_coefficient)`: level over b, with walls
-//! of width b / 4 (half a cosine); beside each wall a berm of width B, `h (1 - cos(2 pi v / B)) / 2` at the distance v from the wall,
-//! with `h = berm_share D (b + b / 4) / B`. So the berms hold the share `berm_share` of the ruts' volume, the rest being compacted soil: along a
-//! curve too, because the whole is even in u and the area of a strip, `1 - u / radius`, is odd but for its 1. Ruts rise to
-//! the bed over one trail width at open ends, with their berms.
+//! Two tyres of width b at `track_m / 2` from the centre line press to the depth `D = rut_depth_m passes^(1 / multipass_coefficient)`. The
+//! bottom is level over b, with walls of width b / 4 (half a cosine). Next to each wall is a berm of width B,
+//! `h (1 - cos(2 pi v / B)) / 2` at the distance v from the wall, with `h = berm_share D (b + b / 4) / B`. The berms thus hold the share
+//! `berm_share` of the ruts' volume; the rest is compacted soil. This holds along curves too: the cross-section is even in u, and the
+//! area of a strip, `1 - u / radius`, is odd apart from its 1. At open ends, ruts and berms fade into the bed over one trail width.
 //!
 //! # Source
-//! The three kinds of trail and its widths are those of MAVS (`random_scene.cpp`, `surface.cpp`, `trail.cpp`). What it calls `track_width`
-//! is the width of one rut, here `tyre_width_m`, and its `wheelbase` the distance between the two, here `track_m`. There a ridge trail climbs
-//! the gradient on its way from corner to corner, the loop is the plain ellipse, and the trail keeps plants out of the ruts and low beside
-//! them; no heights change. Bed, ruts and the power law of passes are our own construction; no measured ruts stand behind them.
+//! The three kinds of trail and their widths are those of MAVS (`random_scene.cpp`, `surface.cpp`, `trail.cpp`). Its `track_width`
+//! is the width of one rut, here `tyre_width_m`, and its `wheelbase` the distance between the ruts, here `track_m`. In MAVS a ridge trail climbs
+//! the gradient on its way from corner to corner, the loop is the plain ellipse, and the trail keeps plants out of the ruts and low next to
+//! them; it changes no heights. Bed, ruts and the power law of passes are our own construction, not based on measured ruts.
 //!
 //! # Cost
-//! One walk over a lattice of half the trail's width, and the cells under the trail a few times; two grids. No random draws.
+//! One search over a lattice with half the trail's width as spacing, and a few passes over the cells under the trail; two grids. No random
+//! draws.
 
 mod bed;
 mod curve;
@@ -52,28 +54,28 @@ pub(super) struct Trail {
     /// The centre line keeps this far from the edges, m.
     border_m: f64,
     width_m: f64,
-    /// What it was made from, nothing left open.
+    /// Its parameters, with all defaults filled in.
     pub(super) parameters: RawTrail,
 }
 
 impl Trail {
-    /// Presses the trail into heights (m); returns the points of its centre line, m, the first again at the end of a loop.
+    /// Presses the trail into heights (m) and returns the points of its centre line, m; a loop ends with its first point.
     ///
     /// # Errors
-    /// [`TerrainError::Trail`] where the ground has no heights, or no line with the turning radius.
+    /// [`TerrainError::Trail`] if the ground has no height somewhere, or no line keeps the turning radius.
     pub(super) fn lay(&self, z: &mut Grid) -> Result<Vec<[f64; 2]>, TerrainError> {
         let curve = self.centre_line(z)?;
         self.bed.press(z, &curve)?;
         Ok(curve.points_m)
     }
 
-    /// What cells of this size, m, do to its ruts, where they show them badly.
+    /// A note if cells of this size, m, are too large to represent the ruts.
     pub(super) fn note(&self, cell_m: f64) -> Option<String> {
         let RawTrail { tyre_width_m, rut_depth_m, passes, .. } = self.parameters;
         let ruts = rut_depth_m > 0.0 && passes > 0;
         (ruts && cell_m > 0.5 * tyre_width_m).then(|| {
             let most_m = 0.5 * tyre_width_m;
-            format!("ruts of {tyre_width_m} m are too narrow for cells of {cell_m} m to show their depth; take at most {most_m} m")
+            format!("ruts of {tyre_width_m} m are too narrow for cells of {cell_m} m to show their full depth; use cells of at most {most_m} m")
         })
     }
 
@@ -93,7 +95,7 @@ impl Trail {
         };
         curve.ok_or_else(|| {
             let radius_m = self.turning_radius_m;
-            trail_error(format!("no line keeps the turning radius of {radius_m} m; choose a shorter one"))
+            trail_error(format!("no centre line keeps the turning radius of {radius_m} m; choose a smaller one"))
         })
     }
 
@@ -143,6 +145,6 @@ impl Ground<'_> {
 
 fn height(z: &Grid, [x, y]: [f64; 2]) -> Result<f64, TerrainError> {
     z.height(x, y).ok_or_else(|| {
-        trail_error(format!("the ground has no height at x = {x:.2} m, y = {y:.2} m; let the processes before make it"))
+        trail_error(format!("the ground has no height at x = {x:.2} m, y = {y:.2} m; earlier processes must cover it"))
     })
 }

@@ -7,20 +7,20 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Factor less 1 of a metre on the least favoured ground (chosen here).
+/// Extra cost of a metre on the least favoured ground, which costs 1 plus this (our choice).
 const DEFAULT_ATTRACTION: f64 = 20.0;
-/// Half axes of a loop over the sides of the surface (MAVS `surface.cpp`: 0.4).
+/// Semi-axes of a loop over the sides of the surface (MAVS `surface.cpp`: 0.4).
 const DEFAULT_LOOP_SHARE: f64 = 0.4;
-/// How far a loop goes in or out, over its half axes (chosen here).
+/// How far a loop wanders in or out, over its semi-axes (our choice).
 const DEFAULT_LOOP_WANDER_SHARE: f64 = 0.1;
-/// Turning radius over wheelbase: steering by 27 deg (chosen here).
+/// Turning radius over wheelbase: a steering angle of 27 deg (our choice).
 const TURNING_RADIUS_WHEELBASES: f64 = 2.0;
-/// Border over the diagonal, and at least, m (MAVS `surface.cpp`).
+/// Border over the diagonal, and its minimum, m (MAVS `surface.cpp`).
 const BORDER_SHARE: f64 = 0.02;
 const BORDER_MIN_M: f64 = 3.0;
-/// Width of a berm over that of a tyre (chosen here).
+/// Width of a berm over that of a tyre (our choice).
 const BERM_TYRES: f64 = 2.0;
-/// Most points of a centre line.
+/// Maximum number of points of a centre line.
 const POINTS_MAX: f64 = 1e5;
 
 /// What a trail follows.
@@ -32,53 +32,54 @@ pub enum Follows {
     Ridges,
     /// Low ground, between the same corners.
     Valleys,
-    /// A closed curve about the middle, over gentle slopes.
+    /// A closed curve about the centre, over gentle slopes.
     Loop,
 }
 
-/// A vehicle trail: a bed of smoothed height with two ruts.
+/// A vehicle trail: a bed at smoothed height with two ruts.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields, default, expecting = "a trail, which is a table")]
+#[serde(deny_unknown_fields, default, expecting = "a trail, given as a table")]
 pub struct RawTrail {
-    /// What it follows (MAVS: ridges).
+    /// What the trail follows (MAVS: ridges).
     pub follows: Follows,
     /// Width within which heights change, m, at least two cells.
     pub width_m: f64,
-    /// Width at either side, inside of `width_m`, over which the bed blends into the ground, m.
+    /// Width on either side, within `width_m`, over which the bed blends into the ground, m.
     pub shoulder_m: f64,
-    /// Standard deviation of the Gaussian that smooths the bed's height along the trail, m; 0: the ground's own height.
+    /// Standard deviation of the Gaussian that smooths the bed's height along the trail, m; 0 keeps the ground's own height.
     pub smoothing_m: f64,
-    /// Distance between the middles of the two ruts, m.
+    /// Distance between the centres of the two ruts, m.
     pub track_m: f64,
     /// Width of the ruts' level bottom, m.
     pub tyre_width_m: f64,
-    /// Depth of the ruts under the bed after one pass, m.
+    /// Depth of the ruts below the bed after one pass, m.
     pub rut_depth_m: f64,
-    /// Passes of a vehicle; 0 leaves the bed without ruts.
+    /// Number of vehicle passes; 0 leaves the bed without ruts.
     pub passes: u32,
-    /// The depth grows as `passes^(1 / this)`, 1 or above; more on denser soil (chosen here: 3).
+    /// The depth grows as `passes^(1 / multipass_coefficient)`; 1 or above, larger for denser soil (our choice: 3).
     pub multipass_coefficient: f64,
-    /// Width of the berm at either side of a rut, m; twice the tyre's when absent.
+    /// Width of the berm on either side of a rut, m; by default twice the tyre width.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub berm_width_m: Option<f64>,
     /// Share of the ruts' volume that the berms hold, 0 to 1; the rest is compacted.
     pub berm_share: f64,
-    /// Wheelbase of the vehicle that made it, m.
+    /// Wheelbase of the vehicle that made the trail, m.
     pub wheelbase_m: f64,
-    /// Smallest radius of the centre line, m; two wheelbases when absent.
+    /// Smallest radius of the centre line, m; by default two wheelbases.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub turning_radius_m: Option<f64>,
-    /// Least distance of the centre line from the edges, m; 3 m, 2 % of the diagonal, or half the width and a cell when absent,
-    /// whichever is most.
+    /// Minimum distance of the centre line from the edges, m; by default the largest of 3 m, 2 % of the diagonal, and half the
+    /// width plus one cell.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub border_m: Option<f64>,
-    /// For `ridges` and `valleys`: a metre on the least favoured ground counts as 1 plus this many; 20 when absent.
+    /// For `ridges` and `valleys`: extra cost of a metre on the least favoured ground, where the most favoured costs 1; 20 by
+    /// default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub attraction: Option<f64>,
-    /// For `loop`: half axes over the sides of the surface; 0.4 when absent.
+    /// For `loop`: semi-axes over the sides of the surface; 0.4 by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loop_share: Option<f64>,
-    /// For `loop`: how far it goes in or out, over its half axes; 0.1 when absent.
+    /// For `loop`: how far it wanders in or out, over its semi-axes; 0.1 by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub loop_wander_share: Option<f64>,
 }
@@ -124,7 +125,7 @@ impl Trail {
         refuse_foreign_keys(&raw)?;
         let cell_m = geometry.cell[0];
         if !(raw.width_m.is_finite() && raw.width_m >= 2.0 * cell_m) {
-            let message = format!("is {}; it must be at least two cells of {cell_m} m", raw.width_m);
+            let message = format!("is {}; it must be at least two cells, {cell_m} m each", raw.width_m);
             return Err(ParameterError::new("width_m", message));
         }
         let bed = bed(&mut raw)?;
@@ -135,7 +136,7 @@ impl Trail {
     }
 }
 
-/// Refuses keys of other courses, which would be without effect.
+/// Refuses keys of other courses, which would have no effect.
 fn refuse_foreign_keys(raw: &RawTrail) -> Result<(), ParameterError> {
     let closed = raw.follows == Follows::Loop;
     let given = [
@@ -144,8 +145,12 @@ fn refuse_foreign_keys(raw: &RawTrail) -> Result<(), ParameterError> {
         ("loop_wander_share", raw.loop_wander_share.is_some(), closed),
     ];
     match given.into_iter().find(|(_, given, taken)| *given && !*taken) {
-        Some((key, ..)) if closed => Err(ParameterError::new(key, "has no place in a trail that follows a loop")),
-        Some((key, ..)) => Err(ParameterError::new(key, "has a place only in a trail that follows a loop")),
+        Some((key, ..)) if closed => {
+            Err(ParameterError::new(key, "is not used by a trail with `follows = \"loop\"`; remove it"))
+        }
+        Some((key, ..)) => {
+            Err(ParameterError::new(key, "is only used by a trail with `follows = \"loop\"`; remove it"))
+        }
         None => Ok(()),
     }
 }
@@ -168,7 +173,7 @@ fn ruts(raw: &mut RawTrail) -> Result<Ruts, ParameterError> {
     let berm_width_m = *raw.berm_width_m.get_or_insert(BERM_TYRES * tyre_width_m);
     ParameterError::positive("berm_width_m", berm_width_m)?;
     if !(0.0..=1.0).contains(&raw.berm_share) {
-        return Err(ParameterError::new("berm_share", format!("is {}; it must be 0 to 1", raw.berm_share)));
+        return Err(ParameterError::new("berm_share", format!("is {}; it must lie in 0 to 1", raw.berm_share)));
     }
     if !(raw.multipass_coefficient.is_finite() && raw.multipass_coefficient >= 1.0) {
         let message = format!("is {}; it must be 1 or above", raw.multipass_coefficient);
@@ -179,7 +184,7 @@ fn ruts(raw: &mut RawTrail) -> Result<Ruts, ParameterError> {
     let (reach_m, apart_m) = (0.5 * track_m + ruts.reach_m(), track_m - ruts.wall_m() - ruts.reach_m());
     if apart_m < 0.0 {
         let least_m = ruts.wall_m() + ruts.reach_m();
-        let message = format!("is {track_m}; with its berms a rut needs a track of at least {least_m} m");
+        let message = format!("is {track_m}; with their berms, the ruts need a track of at least {least_m} m");
         return Err(ParameterError::new("track_m", message));
     }
     if reach_m > 0.5 * raw.width_m {
@@ -198,7 +203,7 @@ fn turning_radius_m(raw: &mut RawTrail, geometry: &Geometry) -> Result<f64, Para
         return Ok(radius_m);
     }
     let message =
-        format!("is {radius_m}; it must be at least {least_m} m, for this width of the trail and size of the surface");
+        format!("is {radius_m}; it must be at least {least_m} m for a trail of this width on a surface of this size");
     Err(ParameterError::new("turning_radius_m", message))
 }
 
@@ -212,7 +217,7 @@ fn border_m(raw: &mut RawTrail, geometry: &Geometry) -> Result<f64, ParameterErr
         return Ok(border_m);
     }
     let message = format!(
-        "is {border_m}; it must be {least_m} to {most_m} m, so that the trail lies inside of the surface; a larger surface or \
+        "is {border_m}; it must be {least_m} to {most_m} m to keep the trail inside the surface; a larger surface or \
          a narrower trail leaves more room"
     );
     Err(ParameterError::new("border_m", message))
@@ -233,18 +238,18 @@ fn course(
     let wander_share = *raw.loop_wander_share.get_or_insert(DEFAULT_LOOP_WANDER_SHARE);
     ParameterError::between("loop_share", share, 0.0, 0.5)?;
     if !(0.0..1.0).contains(&wander_share) {
-        let message = format!("is {wander_share}; it must be 0 or above and below 1");
+        let message = format!("is {wander_share}; it must be at least 0 and below 1");
         return Err(ParameterError::new("loop_wander_share", message));
     }
     let size = geometry.size();
     let (short_m, long_m) = (size[0].min(size[1]), size[0].max(size[1]));
-    // An ellipse turns most tightly at the ends of its long axis, on b^2 / a.
+    // An ellipse is tightest at the ends of its major axis, with radius b^2 / a.
     let tightest_m = (1.0 - wander_share) * share * short_m * short_m / long_m;
     let room = (0.5 * short_m - border_m) / (share * short_m);
     if tightest_m < turning_radius_m || room < 1.0 {
         let message = format!(
-            "is {share}: the loop turns on {tightest_m:.2} m and ends {:.2} m from the edge; it must turn on at least the turning \
-             radius, {turning_radius_m} m, and keep to the border, {border_m} m",
+            "is {share}: the loop's smallest radius is {tightest_m:.2} m and its distance from the edge {:.2} m; they must be at least \
+             the turning radius, {turning_radius_m} m, and the border, {border_m} m",
             (0.5 - share) * short_m
         );
         return Err(ParameterError::new("loop_share", message));

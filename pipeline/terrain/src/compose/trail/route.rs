@@ -4,23 +4,23 @@ use super::{Ground, TerrainError};
 use std::cmp::Ordering;
 use std::collections::BinaryHeap;
 
-/// Most steps of the lattice along a side.
+/// Maximum number of lattice steps along a side.
 const STEPS_MAX: f64 = 2000.0;
 
 /// Nodes of a lattice, west to east in rows from south to north.
 pub(super) struct Lattice {
     pub(super) cols: usize,
     pub(super) rows: usize,
-    /// Distance of neighbours east and north, m.
+    /// Distance between neighbours east and north, m.
     pub(super) step_m: [f64; 2],
-    /// Cost of a metre at every node, 0 or above.
+    /// Cost per metre at every node, 0 or above.
     pub(super) costs: Vec<f64>,
 }
 
-/// The path from one corner (south-west) to the other (north-east), its points in m.
+/// The path from the south-western to the north-eastern corner, points in m.
 ///
 /// # Errors
-/// [`TerrainError::Trail`] where the ground has no height.
+/// [`TerrainError::Trail`] if the ground has no height somewhere.
 pub(super) fn least_cost(
     ground: &Ground<'_>,
     [from_m, to_m]: [[f64; 2]; 2],
@@ -41,25 +41,25 @@ pub(super) fn least_cost(
     Ok(lattice.path().into_iter().map(point).collect())
 }
 
-/// Cost of a metre by height: 1 on the ground that is sought, `1 + attraction` at the other end of the range.
+/// Cost per metre by height: 1 on the most favoured ground, `1 + attraction` at the other end of the range.
 fn costs(heights: &[f64], favours_high: bool, attraction: f64) -> Vec<f64> {
     let (low, high) = heights.iter().fold((f64::INFINITY, f64::NEG_INFINITY), |(l, h), z| (l.min(*z), h.max(*z)));
     let cost = |z: &f64| {
         let t = if favours_high { high - z } else { z - low } / (high - low);
-        // Level ground favours nothing.
+        // Level ground has no preference.
         if t.is_finite() { 1.0 + attraction * t * t } else { 1.0 }
     };
     heights.iter().map(cost).collect()
 }
 
-/// A node, and what the way there costs.
+/// A node and the cost of reaching it.
 struct Reached {
     cost: f64,
     node: usize,
 }
 
 impl Ord for Reached {
-    /// The cheapest first out of a heap, then the lowest node.
+    /// The cheapest leaves a heap first, ties by the lowest node.
     fn cmp(&self, other: &Self) -> Ordering {
         other.cost.total_cmp(&self.cost).then(other.node.cmp(&self.node))
     }
@@ -108,7 +108,7 @@ impl Lattice {
         path
     }
 
-    /// The eight neighbours of a node, fewer at the border, and their distances, m.
+    /// The eight neighbours of a node (fewer at the border) and their distances, m.
     pub(super) fn neighbours(&self, node: usize) -> impl Iterator<Item = (usize, f64)> + '_ {
         let (i, j) = (node % self.cols, node / self.cols);
         let [dx, dy] = self.step_m;

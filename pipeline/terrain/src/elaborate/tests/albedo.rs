@@ -1,4 +1,4 @@
-//! Maps that keep a measured albedo.
+//! Albedo maps that keep a measured albedo.
 
 use super::*;
 
@@ -22,7 +22,7 @@ fn map(made: &Terrain) -> &Grid {
     &made.maps.iter().find(|m| m.name == "albedo").unwrap().values
 }
 
-/// At the centres of its cells the map is the measurement, with sand, rocks and dust in between; heights do not change.
+/// At its cell centres the map equals the measurement, with sand, rocks and dust in between; heights do not change.
 #[test]
 fn val_measured_albedo_is_kept() {
     let list = json!([{"kind": "rocks", "coverage": 0.2}, {"kind": "albedo"}, {"kind": "dust"}]);
@@ -32,7 +32,7 @@ fn val_measured_albedo_is_kept() {
     plain.as_object_mut().unwrap().remove("albedo");
     let plain = refined(plain, &site(24, 24, [1.28, 1.28]));
     assert_eq!(plain.heights, with.heights);
-    // Rocks are as much darker than sand as in the map without a measurement.
+    // The contrast between rocks and sand is the same as in the map without a measurement.
     let class = &with.maps[0].values;
     let background = Background::new(measured());
     let g = class.geometry;
@@ -44,11 +44,11 @@ fn val_measured_albedo_is_kept() {
     let contrast = mean(map(&with), 0.0, &from) - mean(map(&with), 1.0, &from);
     let expected = mean(map(&plain), 0.0, &|_| 0.0) - mean(map(&plain), 1.0, &|_| 0.0);
     assert!((contrast - expected).abs() < 0.01 && expected > 0.03, "{contrast} {expected}");
-    // What the processes add beyond the cells has no mean of its own: of sand, a tenth of its deviation.
+    // The detail that the processes add has zero mean: for sand, to a tenth of its deviation.
     assert!(mean(map(&with), 0.0, &from).abs() < 0.02);
 }
 
-/// Without a process of albedo the map is the smooth background of the measurement.
+/// Without an `albedo` process the map is the smooth background of the measurement.
 #[test]
 fn val_without_a_process_the_map_is_smooth() {
     let with = made(json!([]), measured()).unwrap();
@@ -65,7 +65,7 @@ fn val_unusable_albedos_are_refused() {
     let refused = |albedo: Grid| made(json!([{"kind": "albedo"}]), albedo).unwrap_err();
     let mut bright = measured();
     bright.values[60] = 25.0;
-    assert!(refused(bright).contains("\"bright\": it holds an albedo of 25 at x = "));
+    assert!(refused(bright).contains("\"bright\": it has an albedo of 25 at x = "));
     let mut holed = measured();
     holed.values[60] = f64::NAN;
     assert!(refused(holed).contains("no data at"));
@@ -74,5 +74,5 @@ fn val_unusable_albedos_are_refused() {
     let fine = Grid { geometry: Geometry { cell: [0.1, 0.1], ..measured().geometry }, ..measured() };
     assert!(refused(fine).contains("must be finer"));
     let missing = elaborate(params(json!([]))).generate(&streams(), &[site(24, 24, [1.28, 1.28]).into()]);
-    assert!(missing.unwrap_err().to_string().contains("\"bright\": it is not there"));
+    assert!(missing.unwrap_err().to_string().contains("\"bright\": it is missing"));
 }

@@ -26,7 +26,7 @@ fn with(points: &Value) -> Value {
     })
 }
 
-/// A DEM on a slope of 30 %, with noise on every post.
+/// A DEM on a slope of 30 %, with noise at every post.
 fn steep_and_noisy() -> Grid {
     let dem = site(24, 24, [1.28, 1.28]);
     let mut noise = Streams::for_seed(8, "test").stream("noise");
@@ -35,7 +35,7 @@ fn steep_and_noisy() -> Grid {
     Grid::new(g, values)
 }
 
-/// Bilinear between the lattice points, the surface passes through every point, and through the posts: with slope, noise, craters and rocks.
+/// The surface, bilinear between lattice points, passes through every point and every post, with slope, noise, craters and rocks.
 #[test]
 fn val_points_and_posts_are_exact() {
     for dem in [site(24, 24, [1.28, 1.28]), steep_and_noisy()] {
@@ -55,12 +55,12 @@ fn val_points_and_posts_are_exact() {
             }
             assert!(errors_at_posts(&made.heights, &dem, 60) < 1e-6);
             let note = made.notes.iter().find(|n| n.contains("altimetry")).unwrap();
-            assert!(note.starts_with("24 points of the altimetry near the window move the surface by"), "{note}");
+            assert!(note.starts_with("altimetry points near the window: 24; they shift the surface by"), "{note}");
         }
     }
 }
 
-/// Where samples are farther apart than lattice points, points on samples are exact.
+/// If samples are farther apart than lattice points, points on samples are exact.
 #[test]
 fn val_points_on_coarse_samples_are_exact() {
     let dem = site(24, 24, [1.28, 1.28]);
@@ -74,9 +74,10 @@ fn val_points_on_coarse_samples_are_exact() {
     }
 }
 
-/// The move lies between 0 and the largest move, ends one post beyond the points, and has neither steps nor bends outside of their cells.
+/// The shift lies between 0 and the largest shift, ends one post spacing beyond the points, and has continuous value and slope outside their
+/// cells.
 #[test]
-fn prop_the_move_is_local_smooth_and_does_not_ring() {
+fn prop_the_shift_is_local_smooth_and_does_not_ring() {
     let dem = site(24, 24, [1.28, 1.28]);
     let plain = refined(with(&json!([])), &dem).heights;
     let moved = refined(with(&json!([[107.3, 208.1, 9.0]])), &dem).heights;
@@ -92,7 +93,7 @@ fn prop_the_move_is_local_smooth_and_does_not_ring() {
         reached += usize::from(apart < 1.0 && *change > 0.0);
     }
     assert!(reached > 300, "{reached}");
-    // Finer lattices halve the steps, and the differences of steps fall with the square: no jump, no bend.
+    // Halving the lattice spacing halves the steps and quarters their differences: value and slope are continuous.
     let steps = |cell: f64| {
         let n = (2.4 / cell).round() as u32;
         let params = |points: Value| {
@@ -105,7 +106,7 @@ fn prop_the_move_is_local_smooth_and_does_not_ring() {
         let line = |row: usize| -> Vec<f64> { a.row(row).iter().zip(b.row(row)).map(|(a, b)| a - b).collect() };
         let (mut first, mut second): (f64, f64) = (0.0, 0.0);
         for row in 0..n as usize {
-            // Rows beside the cell of the point.
+            // Only rows outside the cell of the point.
             let y = a.geometry.y(row);
             if (y - 208.1).abs() < 0.1 {
                 continue;
@@ -122,7 +123,7 @@ fn prop_the_move_is_local_smooth_and_does_not_ring() {
     assert!(orders[0] > 0.9 && orders[1] > 1.7, "{orders:?}");
 }
 
-/// The order of the points, and points far away, change no bit; nor do windows.
+/// The order of the points, points far away, and the choice of window change no bit.
 #[test]
 fn prop_order_and_far_points_change_nothing() {
     let dem = site(24, 24, [1.28, 1.28]);
@@ -141,7 +142,7 @@ fn prop_order_and_far_points_change_nothing() {
     }
 }
 
-/// Windows of every offset agree along a dense track that runs out of each of them, over lines of posts.
+/// Windows at every offset agree along a dense track that leaves each of them and crosses lines of posts.
 #[test]
 fn prop_windows_along_a_track_agree() {
     let dem = site(24, 24, [1.28, 1.28]);
@@ -162,9 +163,9 @@ fn prop_windows_along_a_track_agree() {
     }
 }
 
-/// A soft point is missed by less than its sigma, moves nothing where it agrees to within sigma, and is nearly met from afar.
+/// The surface passes within sigma of a soft point, does not move if it already agrees to within sigma, and comes close if the shift is large.
 #[test]
-fn val_soft_points_are_met_within_sigma() {
+fn val_soft_points_are_matched_within_sigma() {
     let dem = site(24, 24, [1.28, 1.28]);
     let plain = refined(with(&json!([])), &dem).heights;
     let at = [107.3, 208.1];
@@ -178,16 +179,16 @@ fn val_soft_points_are_met_within_sigma() {
     assert!((exact.height(at[0], at[1]).unwrap() - height - 2.0).abs() < 1e-6);
 }
 
-/// A point at a post that agrees with it is left out, and told.
+/// A point at a post that agrees with the post is left out, with a note.
 #[test]
-fn val_points_at_posts_yield_to_them() {
+fn val_points_at_posts_are_left_out() {
     let dem = site(24, 24, [1.28, 1.28]);
     let post = [100.0 + 4.0 * 1.28, 200.0 + 5.0 * 1.28, dem.at(18, 4)];
     let beside = [post[0] + 0.1, post[1], post[2] + 0.09];
     let far = [107.3, 208.1, 3.0];
     let made = refined(with(&json!([far, post])), &dem);
     assert_eq!(made.heights, refined(with(&json!([far])), &dem).heights);
-    assert!(made.notes.iter().any(|n| n.contains("1 of all lie at posts")), "{:?}", made.notes);
+    assert!(made.notes.iter().any(|n| n.contains("lie at posts of the DEM: 1")), "{:?}", made.notes);
     assert_eq!(refined(with(&json!([far, beside])), &dem).heights, made.heights);
     let above = [beside[0], beside[1], post[2] + 0.5];
     assert!(refusal(with(&json!([above])), &dem).contains("0.500 m above it"));
@@ -216,7 +217,7 @@ fn val_unusable_points_are_refused() {
     assert!(of_file(vec![[107.3, f64::INFINITY, 1.0, 0.0]]).unwrap_err().to_string().contains("must be finite"));
     let listed = refined(with(&json!([[107.3, 208.0, 1.0]])), &dem).heights;
     assert_eq!(of_file(vec![[107.3, 208.0, 1.0, 0.0]]).unwrap(), listed);
-    // A hole of the DEM beside the window, under a point that reaches into it.
+    // A hole in the DEM next to the window, under a point whose reach extends into the window.
     let mut holed = dem.clone();
     holed.values[23 * 24 + 10] = f64::NAN;
     let low = json!({"origin_m": [110.0, 203.2], "size_px": [20, 20], "texture": false});

@@ -1,4 +1,4 @@
-//! No crater or rock that the DEM or images would have shown.
+//! No crater or rock is added that the DEM or images would have shown.
 
 use super::*;
 use crate::elaborate::bounds::Bound;
@@ -25,7 +25,7 @@ fn up_to(diameter_max_m: f64) -> Value {
     ])
 }
 
-/// The widest rock of a window of the world that a site is refined with, m.
+/// The widest rock in a window of the world that refines a site, m.
 fn widest_rock_m(images: Value) -> f64 {
     let mut raw = json!({"dem": "site", "cell_m": 0.16, "basic_spacing_m": 0.01, "processes": up_to(50.0)});
     raw.as_object_mut().unwrap().extend(images.as_object().unwrap().clone());
@@ -40,7 +40,7 @@ fn widest_rock_m(images: Value) -> f64 {
     rocks[0].diameter_m
 }
 
-/// No rock is wider than two posts, nor than the pixels of images: of 40 000 m2 the widest come close to the bound.
+/// No rock is wider than two posts or the given number of pixels; over 40 000 m2 the widest come close to the bound.
 #[test]
 fn val_no_rock_is_wider_than_the_bound() {
     for (images, bound_m) in [
@@ -54,7 +54,7 @@ fn val_no_rock_is_wider_than_the_bound() {
     }
 }
 
-/// The bound acts as a largest diameter of every process, and is told.
+/// The bound acts as a largest diameter of every process, and is stated in a note.
 #[test]
 fn prop_a_bound_is_a_largest_diameter() {
     let dem = site(24, 24, [1.28, 1.28]);
@@ -64,12 +64,12 @@ fn prop_a_bound_is_a_largest_diameter() {
     assert!(bounded.heights == narrow.heights && bounded.maps == narrow.maps);
     assert!(bounded.heights != wide.heights);
     let note = |made: &Terrain| made.notes.iter().find(|n| n.contains("craters and rocks")).cloned().unwrap();
-    assert!(note(&bounded).contains("at most 0.800 m wide: images of 0.4 m a pixel (2 pixels)"), "{}", note(&bounded));
+    assert!(note(&bounded).contains("at most 0.800 m wide: images with 0.4 m pixels (2 pixels)"), "{}", note(&bounded));
     assert!(note(&wide).contains("at most 2.560 m wide: the DEM, with posts 1.280 m apart"), "{}", note(&wide));
     assert!(errors_at_posts(&bounded.heights, &dem, 100) < 1e-6);
 }
 
-/// What images would show is refused before anything is made.
+/// Diameters that images would show are refused before anything is generated.
 #[test]
 fn val_diameters_above_the_bound_are_refused() {
     let refused = |extra: Value| {
@@ -91,4 +91,21 @@ fn val_diameters_above_the_bound_are_refused() {
         assert_eq!(refused(bad.clone()).map(|e| e.0).as_deref(), Some(key), "{bad}");
     }
     assert_eq!(Bound::Posts(1.0).and(Some(Bound::Pixels(1.0, 2.0))), Bound::Posts(1.0));
+}
+
+/// Two posts, or the given number of pixels; a process may start at the bound but not above it, and narrower ones stay as they are.
+#[test]
+fn val_bounds_by_hand() {
+    assert_eq!((Bound::Posts(1.28).most_m(), Bound::Pixels(0.25, 3.0).most_m()), (2.56, 0.75));
+    assert_eq!(Bound::Posts(1.0).and(Some(Bound::Pixels(0.5, 3.0))), Bound::Pixels(0.5, 3.0));
+    let list = |low: f64, high: f64| -> Vec<planetary::RawProcess> {
+        let rocks = json!([{"kind": "albedo"}, {"kind": "rocks", "diameter_min_m": low, "diameter_max_m": high}]);
+        serde_json::from_value(rocks).unwrap()
+    };
+    let bounded = |low, high| Bound::Posts(1.0).apply(&list(low, high));
+    assert_eq!(bounded(0.1, 5.0), Ok(list(0.1, 2.0)));
+    assert_eq!(bounded(2.0, 5.0), Ok(list(2.0, 2.0)));
+    assert_eq!(bounded(0.1, 1.5), Ok(list(0.1, 1.5)));
+    assert_eq!(bounded(2.1, 5.0), Err((1, 2.1)));
+    assert_eq!(Bound::Posts(1.0).note(&list(0.1, 1.5)[..1]), None);
 }

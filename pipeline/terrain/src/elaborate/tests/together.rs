@@ -1,4 +1,4 @@
-//! Images, altimetry, albedo and a rock potential at once.
+//! Images, altimetry, albedo and a rock potential combined.
 
 use super::*;
 
@@ -30,7 +30,7 @@ fn fields(made: &Terrain) -> Vec<Grid> {
     std::iter::once(&made.heights).chain(made.maps.iter().map(|m| &m.values)).cloned().collect()
 }
 
-/// Windows, zooms and 1 and 8 threads agree bit by bit, heights and maps.
+/// Windows, zooms, and 1 and 8 threads agree bit by bit in heights and maps.
 #[test]
 fn prop_windows_zooms_and_threads_agree() {
     let on = |threads| {
@@ -53,7 +53,7 @@ fn prop_windows_zooms_and_threads_agree() {
     assert!(whole[1].values.contains(&1.0));
 }
 
-/// Inputs are named in the order in which they are taken, and parameters read back.
+/// Inputs are named in the order in which they are passed, and parameters read back.
 #[test]
 fn val_inputs_are_named() {
     let params = json!({
@@ -68,10 +68,10 @@ fn val_inputs_are_named() {
     assert_eq!(again.inputs(), generator.inputs());
     let inputs = [site(24, 24, [1.28, 1.28]).into()];
     let missing = generator.generate(&streams(), &inputs).unwrap_err().to_string();
-    assert!(missing.contains("\"a\": it is not there"), "{missing}");
+    assert!(missing.contains("\"a\": it is missing"), "{missing}");
 }
 
-/// A potential and its offset: shares are those of the DEM's coordinates, whatever the lattice's shift.
+/// The rock potential is read in the DEM's coordinates, whatever the lattice's shift.
 #[test]
 fn val_the_potential_lies_in_the_dems_coordinates() {
     let dem = site(24, 24, [1.28, 1.28]);

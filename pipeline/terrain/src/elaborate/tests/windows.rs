@@ -1,4 +1,4 @@
-//! Windows of one elaborated DEM, as a server asks for them.
+//! Windows of one elaborated DEM, as a server requests them.
 
 use super::*;
 use crate::windows::Windows;
@@ -15,7 +15,8 @@ fn request(zoom: u32, first: [i64; 2], [cols, rows]: [usize; 2], least_m: f64) -
     Request { window, feature_min_m: least_m, cancel: None }
 }
 
-/// The window of the parameters has the bits of the generator; windows of other zooms, centred ones and single points the samples of finer ones.
+/// The window of the parameters has the bits of the generator; windows of other zooms, centred ones and single points have the samples of finer
+/// ones.
 #[test]
 fn prop_windows_are_of_one_surface() {
     let dem = site(40, 40, [1.28, 1.28]);
@@ -47,7 +48,7 @@ fn prop_windows_are_of_one_surface() {
     }
 }
 
-/// Posts are kept whatever is left out.
+/// Posts are kept whatever features are left out.
 #[test]
 fn val_bounded_windows_keep_the_posts() {
     let dem = site(40, 40, [1.28, 1.28]);
@@ -61,8 +62,8 @@ fn val_bounded_windows_keep_the_posts() {
     }
 }
 
-/// Beyond the outer posts, and beside posts without data, there is no ground: where exactly depends on the sample alone. Elsewhere the ground is as
-/// without the hole.
+/// There is no ground beyond the outer posts and near posts without data; where exactly depends on the sample alone. Elsewhere the ground is the same
+/// as without the hole.
 #[test]
 fn val_holes_and_edges_have_no_ground() {
     let dem = site(60, 60, [1.28, 1.28]);
@@ -73,7 +74,7 @@ fn val_holes_and_edges_have_no_ground() {
     let points = json!([[118.3, 219.1, 9.0]]);
     let given = json!({"hurst": 0.7, "roughness_m": 0.05});
     let more = json!({"hurst": 0.7, "roughness_m": 0.05, "processes": processes(), "altimetry_points_m": points});
-    // Posts that a sample depends on: two on either side; with processes and altimetry 8 and one more.
+    // Posts that a sample depends on: two on either side; with processes and altimetry, 8 and one more.
     for (given, reach) in [(given, 2.0), (more, 2.0 + 8.0 + 1.5)] {
         let (whole, all) = (surface(given.clone(), &[dem.clone().into()]), surface(given, &[holed.clone().into()]));
         let asked = request(5, [300, 620], [300, 300], 1.0);
@@ -117,7 +118,7 @@ fn val_holes_and_edges_have_no_ground() {
     }
 }
 
-/// A sample on the outer post itself has ground, alone as in a window.
+/// A sample exactly on an outer post has ground, alone and in a window.
 #[test]
 fn val_the_outer_posts_have_ground() {
     let dem = site(40, 40, [1.28, 1.28]);

@@ -1,13 +1,13 @@
 //! An isotropic field by circulant embedding.
 //!
-//! The covariance on a torus of at least twice the surface, and of 8 correlation lengths beyond it, has the eigenvalues
-//! `lambda = FFT(covariance)`. Modes with independent normal parts and mean square `M lambda` (M cells of the torus) give a
-//! field with that covariance exactly. Negative eigenvalues, which the cut at half the torus can leave, are set to 0; more
-//! than 1e-3 of all their sizes is an error.
+//! The torus is at least twice the surface and at least 8 correlation lengths larger. The covariance on it has the eigenvalues
+//! `lambda = FFT(covariance)`. Modes with independent normal real and imaginary parts and mean square `M lambda` (M cells of the
+//! torus) give a field with exactly that covariance. Truncating the covariance at half the torus can leave negative eigenvalues;
+//! they are set to 0, and if their magnitudes exceed 1e-3 of the sum of all magnitudes it is an error.
 //!
-//! Modes are drawn column frequency by column frequency, from a stream each, so that they can be drawn side by side.
+//! Each column frequency draws its modes from its own stream, so that they can be drawn in parallel.
 //!
-//! Cost: two normal numbers a mode and an inverse real transform of the torus.
+//! Cost: two normal deviates per mode and an inverse real transform of the torus.
 
 use super::Covariance;
 use crate::generator::TerrainError;
@@ -16,12 +16,12 @@ use sastrugi_numeric::fft::{Complex64, RealFft2, even_spectrum, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use std::f64::consts::FRAC_1_SQRT_2;
 
-/// Largest share of negative eigenvalues in the sum of all sizes.
+/// Largest share of negative eigenvalues in the sum of all magnitudes.
 const NEGATIVE_SHARE_MAX: f64 = 1e-3;
-/// Correlation lengths of the torus beyond the surface.
+/// Correlation lengths by which the torus exceeds the surface.
 const MARGIN_LENGTHS: f64 = 8.0;
 
-/// Cells of the torus along an axis of `cells`.
+/// Cells of the torus along an axis with `cells` cells.
 fn torus_length(cells: usize, cell_m: f64, length_m: f64) -> usize {
     let margin = (MARGIN_LENGTHS * length_m / cell_m).ceil() as usize;
     smooth_length((2 * cells).max(cells + margin))
@@ -35,14 +35,14 @@ pub fn torus_cells(size: &Size, length_m: f64) -> u64 {
 
 /// Peak memory of [`field`] without its result, bytes.
 pub fn memory_bytes(size: &Size, length_m: f64) -> u64 {
-    // A quarter of eigenvalues, and a half spectrum beside the torus that it becomes.
+    // A quarter of the eigenvalues, plus a half spectrum and the torus it is transformed to.
     18 * torus_cells(size, length_m)
 }
 
 /// The field.
 ///
 /// # Errors
-/// A covariance that does not fit the torus.
+/// A covariance that cannot be embedded in the torus.
 pub fn field(
     streams: &Streams,
     geometry: Geometry,
@@ -60,7 +60,7 @@ pub fn field(
     let modes = streams.child("modes");
     let torus = RealFft2::new(rows, cols).inverse_of(|kx, column| {
         let mut stream = modes.stream(&kx.to_string());
-        // Of a column that is its own opposite only the Hermitian half of what is drawn counts.
+        // In a column that is its own mirror image, only the Hermitian half of the draws takes effect.
         let gain = if kx == 0 || 2 * kx == cols { 1.0 } else { FRAC_1_SQRT_2 };
         for (ky, mode) in column.iter_mut().enumerate() {
             let eigenvalue = eigenvalues[kx * half_rows + ky.min(rows - ky)].max(0.0);
@@ -72,7 +72,7 @@ pub fn field(
     Ok(Grid { geometry, values: kept.copied().collect() })
 }
 
-/// Eigenvalues of the covariance on the torus: a quarter of them, the others are the same.
+/// Eigenvalues of the covariance on the torus: a quarter of them, because the others repeat these.
 fn eigenvalues([rows, cols]: [usize; 2], rms_m: f64, length_cells: f64, covariance: Covariance) -> Vec<f64> {
     even_spectrum([rows, cols], |row, line| {
         for (col, v) in line.iter_mut().enumerate() {
@@ -86,7 +86,7 @@ fn eigenvalues([rows, cols]: [usize; 2], rms_m: f64, length_cells: f64, covarian
     })
 }
 
-/// Sizes of the negative ones over the sizes of all.
+/// Sum of the magnitudes of the negative eigenvalues over that of all.
 fn negative_share(eigenvalues: &[f64]) -> f64 {
     let sizes = |kept: fn(f64) -> f64| sums::sum(&eigenvalues.iter().map(|v| kept(*v)).collect::<Vec<_>>());
     sizes(|v| (-v).max(0.0)) / sizes(f64::abs)
@@ -96,7 +96,29 @@ fn negative_share(eigenvalues: &[f64]) -> f64 {
 mod tests {
     use super::*;
 
-    /// The torus that is taken leaves hardly any negative eigenvalue; one without room for the covariance does.
+    /// Over the whole torus the eigenvalues add up to cells times variance, and the first is the sum of the covariance.
+    #[test]
+    fn val_eigenvalues_add_up_to_the_variance() {
+        let (rows, cols, variance_m2) = (40, 36, 0.0025);
+        for covariance in [Covariance::Exponential, Covariance::Gaussian] {
+            let found = eigenvalues([rows, cols], 0.05, 3.0, covariance);
+            let half_rows = rows / 2 + 1;
+            // A frequency and its mirror image share an eigenvalue.
+            let count = |k: usize, n: usize| if k == 0 || 2 * k == n { 1.0 } else { 2.0 };
+            let weighted = |(k, v): (usize, &f64)| count(k / half_rows, cols) * count(k % half_rows, rows) * v;
+            let total: f64 = found.iter().enumerate().map(weighted).sum();
+            assert!((total / (rows * cols) as f64 / variance_m2 - 1.0).abs() < 1e-10, "{covariance:?}: {total}");
+            let at = |k: usize| {
+                let [y, x] = [(k / cols, rows), (k % cols, cols)].map(|(i, n)| i.min(n - i) as f64 / 3.0);
+                let square = x * x + y * y;
+                variance_m2 * libm::exp(if covariance == Covariance::Gaussian { -square } else { -square.sqrt() })
+            };
+            let sum: f64 = (0..rows * cols).map(at).sum();
+            assert!((found[0] / sum - 1.0).abs() < 1e-10, "{covariance:?}: {} {sum}", found[0]);
+        }
+    }
+
+    /// The chosen torus leaves almost no negative eigenvalues; one that is too small for the covariance does.
     #[test]
     fn val_negative_eigenvalues() {
         for covariance in [Covariance::Exponential, Covariance::Gaussian] {

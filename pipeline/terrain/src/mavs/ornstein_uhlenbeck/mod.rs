@@ -1,19 +1,19 @@
 //! Kinds `mavs_gaussian` and `ornstein_uhlenbeck`: a Gaussian field with a correlation length (Algorithm 2).
 //!
 //! # What
-//! A field of standard deviation s and correlation length a, over rolling ground `m_l P((x, y) / lambda_l)`:
-//! * `separable`: covariance `s^2 exp(-(|dx| + |dy|) / a)`, exact on the cells: first-order recursions along x, then along y
-//!   (`chains.rs`). Correlations are longest along the axes.
+//! A field with standard deviation s and correlation length a, over rolling ground `m_l P((x, y) / lambda_l)`:
+//! * `separable`: covariance `s^2 exp(-(|dx| + |dy|) / a)`, exact on the cells, by first-order recursions along x, then along y
+//!   (`chains.rs`). Correlations reach farthest along the axes.
 //! * `isotropic`: covariance `s^2 exp(-d / a)` or `s^2 exp(-d^2 / a^2)`, by circulant embedding (`embedding.rs`).
 //!
-//! `mavs_gaussian` is `separable` without a choice; with `compat = true` it is the published listing (`listing.rs`).
+//! `mavs_gaussian` is always `separable`; with `compat = true` it is the published listing (`listing.rs`).
 //!
 //! # Source
 //! Uhlenbeck and Ornstein, Phys. Rev. 36 (1930) 823; Dietrich and Newsam, SIAM J. Sci. Comput. 18 (1997) 1088, for the
 //! embedding.
 //!
 //! # Tiles
-//! These fields have no coordinates: two surfaces are two samples, whatever their place.
+//! These fields do not depend on world coordinates: two surfaces are independent samples wherever they lie, and tiles do not match.
 
 mod chains;
 mod embedding;
@@ -40,7 +40,7 @@ struct Rolling {
 }
 
 impl Rolling {
-    /// Adds the rolling ground of `layer`; nothing where there is none.
+    /// Adds the rolling ground of `layer`, unless its amplitude is 0.
     fn under(&self, field: Grid, frame: &Frame, layer: impl Fn(f64, f64) -> Layer) -> Grid {
         if self.amplitude_m == 0.0 {
             return field;
@@ -55,8 +55,8 @@ impl Rolling {
     }
 }
 
-/// Share of the variance of profiles with covariance `exp(-d / a)`, sampled in cells, between two frequencies in cycles/m: an
-/// autoregression with ratio `r = exp(-cell / a)`, whose waves beyond the Nyquist frequency appear below it.
+/// Share of the variance, between two frequencies in cycles/m, of profiles with covariance `exp(-d / a)` sampled in cells: an
+/// autoregression with ratio `r = exp(-cell / a)`, where waves above the Nyquist frequency are aliased below it.
 fn exponential_share([low, high]: [f64; 2], length_m: f64, cell_m: f64) -> f64 {
     let r = libm::exp(-cell_m / length_m);
     let below = |f: f64| match f * cell_m < 0.5 {
@@ -66,7 +66,7 @@ fn exponential_share([low, high]: [f64; 2], length_m: f64, cell_m: f64) -> f64 {
     below(high) - below(low)
 }
 
-/// The same for `exp(-d^2 / a^2)`, which has next to no waves as short as two cells.
+/// The same for `exp(-d^2 / a^2)`, which has almost no power at wavelengths as short as two cells.
 fn gaussian_share([low, high]: [f64; 2], length_m: f64, _cell_m: f64) -> f64 {
     libm::erf(PI * high * length_m) - libm::erf(PI * low * length_m)
 }
@@ -146,15 +146,15 @@ impl Generator for Gaussian {
     fn notes(&self) -> Vec<String> {
         let compat = self.raw.compat.then(|| {
             format!(
-                "the published listing with its defects: neighbours correlate by exp(-2 a^2) = {:.2e} in place of \
-                 exp(-cell / a), and by still less from column to column; the south-west cell is 0; the lattice of the low \
-                 layer starts in the corner",
+                "published listing with its defects: the correlation of neighbours is exp(-2 a^2) = {:.2e} instead of \
+                 exp(-cell / a), and lower still from column to column; the south-west cell is 0; the lattice of the low \
+                 layer starts in the corner of the surface",
                 listing::ratio(self.raw.hi_len_m)
             )
         });
         let mut notes: Vec<String> = self.frame.size.note().into_iter().chain(compat).collect();
         notes.extend(self.replaced_cell_m.map(|cell| {
-            format!("as published, the cell of {cell} m is replaced by {} m without a word", self.frame.size.cell_m)
+            format!("as in the published listing, the cell of {cell} m is replaced by {} m", self.frame.size.cell_m)
         }));
         notes
     }
@@ -177,5 +177,36 @@ impl Generator for Gaussian {
             own + self.rolling().expected_m2(band)
         };
         finished(plain, expected_m2, self.roughness.as_ref())
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Midpoint rule.
+    fn integral([low, high]: [f64; 2], density: impl Fn(f64) -> f64) -> f64 {
+        let step = (high - low) / 1e5;
+        (0..100_000).map(|k| density(low + (f64::from(k) + 0.5) * step)).sum::<f64>() * step
+    }
+
+    /// The one-sided PSD of samples of `exp(-d / a)`, an autoregression, and that of `exp(-d^2 / a^2)`, integrated over bands.
+    #[test]
+    fn val_shares_are_integrals_of_the_spectra() {
+        let (length_m, cell_m) = (0.7, 0.25);
+        let r = libm::exp(-cell_m / length_m);
+        let sampled = |f: f64| {
+            let around = 1.0 - 2.0 * r * libm::cos(2.0 * PI * f * cell_m) + r * r;
+            2.0 * cell_m * (1.0 - r * r) / around
+        };
+        let continuous = |f: f64| 2.0 * PI.sqrt() * length_m * libm::exp(-(PI * f * length_m) * (PI * f * length_m));
+        for band in [[0.05, 0.4], [0.2, 1.9]] {
+            assert!((exponential_share(band, length_m, cell_m) - integral(band, sampled)).abs() < 1e-8, "{band:?}");
+            assert!((gaussian_share(band, length_m, cell_m) - integral(band, continuous)).abs() < 1e-8, "{band:?}");
+        }
+        // All variance lies below the Nyquist frequency, 2 cycles/m.
+        assert_eq!(exponential_share([0.0, 2.0], length_m, cell_m), 1.0);
+        assert_eq!(exponential_share([2.0, 9.0], length_m, cell_m), 0.0);
+        assert!((gaussian_share([0.0, 9.0], length_m, cell_m) - 1.0).abs() < 1e-12);
     }
 }

@@ -9,17 +9,17 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// How a field is made.
+/// How a field is generated.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Mode {
     /// Covariance `s^2 exp(-(|dx| + |dy|) / a)`, by recursions.
     Separable,
-    /// A covariance of the distance alone, by circulant embedding.
+    /// A covariance that depends only on distance, by circulant embedding.
     Isotropic,
 }
 
-/// Covariance of a field at the distance d, over its variance.
+/// Covariance of a field at the distance d, relative to its variance.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum Covariance {
@@ -33,17 +33,17 @@ pub enum Covariance {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawGaussian {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 666 x 666 when no size is given (100 m in the examples).
+    /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples).
     pub cell_m: f64,
-    /// South-west corner in the world, m, whole cells. It places the rolling ground, not the field.
+    /// South-west corner in the world, m; whole multiples of the cell. It positions the rolling ground, not the field.
     pub origin_m: [f64; 2],
-    /// RMS of the field, m (listings: 0.2 in one place, 0.1 in another; below 0.15 is advised).
+    /// RMS of the field, m (listings: 0.2 in one place, 0.1 in another; recommended: below 0.15).
     pub hi_mag_m: f64,
     /// Correlation length of the field, m (listing).
     pub hi_len_m: f64,
@@ -52,9 +52,9 @@ pub struct RawGaussian {
     /// Wavelength of the rolling ground, m (listing).
     pub lo_len_m: f64,
     /// True: the listing with its defects (a wrong correlation, and none from column to column). False: the separable field
-    /// that it is meant to be.
+    /// that was intended.
     pub compat: bool,
-    /// Where roughness is measured, and what it is scaled to.
+    /// Band in which roughness is measured, and the RMS to which it is scaled.
     pub roughness: RawRoughness,
 }
 
@@ -79,29 +79,29 @@ impl Default for RawGaussian {
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RawOrnsteinUhlenbeck {
-    /// Size east and north, m; in place of `size_px`.
+    /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_m: Option<[f64; 2]>,
-    /// Cells east and north; 666 x 666 when no size is given (100 m in the examples).
+    /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples).
     pub cell_m: f64,
-    /// South-west corner in the world, m, whole cells. It places the rolling ground, not the field.
+    /// South-west corner in the world, m; whole multiples of the cell. It positions the rolling ground, not the field.
     pub origin_m: [f64; 2],
-    /// How the field is made.
+    /// How the field is generated.
     pub mode: Mode,
-    /// Its covariance.
+    /// Covariance of the field.
     pub covariance: Covariance,
     /// RMS of the field, m.
     pub rms_m: f64,
-    /// Correlation length a, m (listing), at least a cell.
+    /// Correlation length a, m (listing), at least one cell.
     pub correlation_length_m: f64,
     /// Peak of the rolling ground, m.
     pub lo_mag_m: f64,
     /// Wavelength of the rolling ground, m (listing).
     pub lo_len_m: f64,
-    /// Where roughness is measured, and what it is scaled to.
+    /// Band in which roughness is measured, and the RMS to which it is scaled.
     pub roughness: RawRoughness,
 }
 
@@ -123,10 +123,10 @@ impl Default for RawOrnsteinUhlenbeck {
     }
 }
 
-/// Largest correlation length over a cell: the torus holds eight of them.
+/// Largest correlation length, cells: the torus holds eight such lengths.
 const LENGTH_MAX_CELLS: f64 = 500.0;
 
-/// Most cells of the torus.
+/// Maximum number of cells of the torus.
 const TORUS_CELLS_MAX: u64 = 1 << 29;
 
 /// Checked parameters of a field with a chosen covariance.
@@ -150,12 +150,12 @@ impl TryFrom<RawOrnsteinUhlenbeck> for OrnsteinUhlenbeck {
             return Err(ParameterError::new("correlation_length_m", message));
         }
         if raw.mode == Mode::Isotropic && embedding::torus_cells(&size, raw.correlation_length_m) > TORUS_CELLS_MAX {
-            let message = "is isotropic: twice the surface, and eight correlation lengths more, would have over 2^29 cells; choose a \
-                           smaller surface, or `mode = \"separable\"`";
+            let message = "is \"isotropic\", which here needs a torus of more than 2^29 cells (twice the surface, and at least eight \
+                           correlation lengths larger); choose a smaller surface, or `mode = \"separable\"`";
             return Err(ParameterError::new("mode", message));
         }
         if raw.mode == Mode::Separable && raw.covariance == Covariance::Gaussian {
-            let message = "is gaussian, which recursions do not have; use `mode = \"isotropic\"`";
+            let message = "is \"gaussian\", which `mode = \"separable\"` cannot generate; use `mode = \"isotropic\"`";
             return Err(ParameterError::new("covariance", message));
         }
         check_rolling(&frame, raw.lo_mag_m, raw.lo_len_m)?;
@@ -177,7 +177,7 @@ pub struct Gaussian {
     pub(super) raw: RawGaussian,
     pub(super) frame: Frame,
     pub(super) roughness: Option<Roughness>,
-    /// The cell that was asked for, where the listing takes a smaller one.
+    /// The requested cell, if the listing replaces it by a smaller one.
     pub(super) replaced_cell_m: Option<f64>,
 }
 
@@ -202,7 +202,7 @@ impl TryFrom<RawGaussian> for Gaussian {
         check_rolling(&frame, raw.lo_mag_m, raw.lo_len_m)?;
         let roughness = Roughness::check(&raw.roughness, &frame)?;
         if raw.compat && raw.roughness.scaling == Scaling::Expected {
-            let message = "is \"expected\", which the published listing does not follow; use \"measured\"";
+            let message = "is \"expected\", but the published listing does not have the expected RMS; use \"measured\"";
             return Err(ParameterError::new("scaling", message).within("roughness"));
         }
         let raw = RawGaussian { size_m: None, size_px: Some(size.px), cell_m: size.cell_m, ..raw };
@@ -216,8 +216,8 @@ impl Gaussian {
     }
 }
 
-/// The cell that the listing takes in place of a larger one: the shorter side of the surface's division into about twice the
-/// correlation length.
+/// The cell that the listing substitutes for a larger one: the shorter side after dividing the surface into parts of about twice
+/// the correlation length.
 fn smaller_cell_m(size: &Size, length_m: f64) -> Option<f64> {
     let part = |side: f64| side / ((0.5 * side / length_m).floor() + 1.0);
     let [x, y] = size.geometry().size().map(part);

@@ -2,7 +2,7 @@ use super::*;
 use crate::size::Size;
 use sastrugi_numeric::sums;
 
-/// Point by point, without the rows of [`sum`].
+/// Point by point, unlike the row-wise [`sum`].
 impl Perlin {
     /// The noise at a point, in lattice cells.
     fn at(&self, x: f64, y: f64) -> f64 {
@@ -16,7 +16,7 @@ fn drawn(seed: u64) -> Perlin {
     Perlin::draw(&mut Streams::for_seed(seed, "perlin-test").stream("lattice"))
 }
 
-/// FastNoise 0.4.1 (its arithmetic in double precision, its permutation for the seed 1337), frozen.
+/// Values of FastNoise 0.4.1 (evaluated in double precision, with its permutation for seed 1337), frozen.
 #[test]
 fn val_equals_fastnoise() {
     let noise = Perlin {
@@ -61,9 +61,9 @@ fn val_equals_fastnoise() {
     }
 }
 
-/// Rows of layers are the noise point by point, also far from the world's origin.
+/// Rows of layers equal the noise point by point, even far from the world's origin.
 #[test]
-fn prop_rows_are_their_points() {
+fn prop_rows_equal_their_points() {
     let streams = Streams::for_seed(5, "perlin-test");
     let layers = [("a", 2.7, 0.3), ("b", 0.11, 0.05)].map(|(name, w, a)| Layer::draw(&streams, name, w, a));
     let size = Size::check(None, Some([61, 37]), 0.1, [1, 1]).unwrap();
@@ -78,8 +78,8 @@ fn prop_rows_are_their_points() {
     }
 }
 
-/// Over 2 million points of 400 noises: RMS 0.249 +- 0.004, 99 % below 0.543 (to 0.01), sizes never beyond 1. The RMS of one noise
-/// scatters by 0.01 with its permutation, that of 400 by 0.0005.
+/// Over 2 million points of 400 noises: RMS 0.249 +- 0.004, 99 % below 0.543 (to 0.01), magnitudes never above 1. The RMS of one
+/// noise scatters by 0.01 with its permutation, that of 400 by 0.0005.
 #[test]
 fn stat_range_and_rms() {
     let mut values = Vec::new();
@@ -105,7 +105,7 @@ fn val_zero_at_lattice_points_and_periodic() {
     }
 }
 
-/// Across a lattice line value, slope and curvature agree from both sides: differences over h leave h times the third
+/// Value, slope and curvature are continuous across lattice lines: differences over h leave h times the third
 /// derivative (below 300).
 #[test]
 fn val_smooth_across_cells() {
@@ -124,7 +124,7 @@ fn val_smooth_across_cells() {
 
 /// Autocorrelation along an axis: `(int a a' int b^2 + int b b' int a^2) / (2 int a^2 int b^2)`, which is 0.959, 0.763, 0.477,
 /// 0.283, -0.014 and -0.135 at 0.1 to 1 cells. 400 noises of 2000 pairs: standard error below 0.004 (half of it from the
-/// permutations); bound at 6 of them.
+/// permutations); bound at 6 standard errors.
 #[test]
 fn stat_autocorrelation() {
     let b = |t: f64| if t.abs() < 1.0 { 1.0 - quintic(t.abs()) } else { 0.0 };
@@ -149,7 +149,7 @@ fn stat_autocorrelation() {
     }
 }
 
-/// The spectrum has the noise's variance, and its first moment gives Van Deusen's constant.
+/// The spectrum integrates to the noise's variance, and its first moment gives Van Deusen's constant.
 #[test]
 fn val_spectrum() {
     let squares = |f: fn(f64) -> f64| 2.0 * integral(0.0, 1.0, |t| f(t) * f(t));

@@ -1,32 +1,32 @@
-//! Craters by the ground that they reach.
+//! Spatial index of craters by the ground that they reach.
 
 use super::population::{Crater, Near};
 use super::shape::EJECTA_RADII;
 use crate::planetary::levels::{Window, spacing};
 
-/// Squares along either side.
+/// Squares along each side.
 const SIDE: usize = 16;
 
-/// The craters of one bombardment that reach a window or its margin, in order of time, with the squares of ground that each reaches.
+/// The craters of one bombardment that reach a window or its margin, and the squares of ground that each reaches.
 pub struct Index {
-    /// In order of time.
+    /// The craters, in order of time.
     pub craters: Vec<Crater>,
-    /// South-west and north-east corner of the ground that is looked at, lattice units.
+    /// South-west and north-east corners of the indexed ground, lattice units.
     corners: [[f64; 2]; 2],
-    /// Distance of the window's points, lattice units.
+    /// Distance between the window's points, lattice units.
     unit: f64,
     square: [f64; 2],
-    /// Places in `craters`, rising, by square.
+    /// For each square, indices in `craters`, ascending.
     reaching: Vec<Vec<u32>>,
 }
 
 impl Index {
-    /// An index of all craters that reach what is looked at.
+    /// An index of craters that reach the search area.
     pub fn new(craters: Vec<Crater>, near: &Near<'_>) -> Self {
         let Near { window, margin, .. } = near;
         let [low, high] = window.corners();
         let corners = [low.map(|at| at - margin), high.map(|at| at + margin)];
-        // A lattice unit more, so that the last points lie inside.
+        // One lattice unit more, so that the last points lie inside.
         let square = [0, 1].map(|axis| (corners[1][axis] - corners[0][axis] + 1.0) / SIDE as f64);
         let (unit, reaching) = (spacing(window.zoom), vec![Vec::new(); SIDE * SIDE]);
         let mut index = Self { craters: Vec::new(), corners, unit, square, reaching };
@@ -45,29 +45,29 @@ impl Index {
         index
     }
 
-    /// Column or row of a place, the nearest for places outside.
+    /// Column or row of squares at a coordinate; the nearest one outside.
     fn along(&self, axis: usize, at: f64) -> usize {
         (((at - self.corners[0][axis]) / self.square[axis]).max(0.0) as usize).min(SIDE - 1)
     }
 
-    /// Craters that may reach a place within the margin, in order of time.
+    /// Craters that may reach a position within the margin, in order of time.
     pub fn at(&self, place: [f64; 2]) -> impl Iterator<Item = &Crater> {
         let square = self.along(1, place[1]) * SIDE + self.along(0, place[0]);
         self.reaching[square].iter().map(|n| &self.craters[*n as usize])
     }
 
-    /// Craters that may reach a window: those of its place when it is one point within the margin, else all; in order of time.
+    /// Craters that may reach a window, in order of time: those at its position if it is a single point within the margin, else all.
     pub fn of<'a>(&'a self, window: &Window) -> Box<dyn Iterator<Item = &'a Crater> + 'a> {
         if window.len() == 1 { Box::new(self.at([window.x(0), window.y(0)])) } else { Box::new(self.craters.iter()) }
     }
 
-    /// Craters wider than one that may reach its retained points, a window, in order of time; `None` where the index does not know all of
-    /// them: where the window leaves the ground that is looked at, or where wider craters may lie between the points of that ground.
+    /// Craters wider than `crater` that may reach its retained points, a window, in order of time; `None` if the index may not contain all of
+    /// them: if the window extends beyond the indexed ground, or wider craters may lie between the points of that ground.
     pub fn wider(&self, crater: &Crater, window: &Window) -> Option<Vec<&Crater>> {
         let [low, high] = window.corners();
         let [lowest, highest] = self.corners;
         let inside = (0..2).all(|axis| low[axis] >= lowest[axis] && high[axis] <= highest[axis]);
-        // A little more than the distance of the points, so that rounding cannot part them.
+        // Slightly more than the point spacing, to allow for rounding.
         if !inside || 2.0 * EJECTA_RADII * crater.radius < 1.001 * self.unit {
             return None;
         }

@@ -10,25 +10,25 @@ use std::f64::consts::TAU;
 use std::rc::Rc;
 use std::sync::atomic::{AtomicBool, Ordering as Memory};
 
-/// Words below a crater's place.
+/// Words of a crater's own counter.
 const DIAMETER: i64 = 0;
 const ALONG: i64 = 1;
 const ACROSS: i64 = 2;
 const TIME: i64 = 3;
 const TEXTURE: i64 = 4;
 
-/// A little more than 1: bounds by which craters are passed over hold whatever the rounding.
+/// Slightly more than 1, so that bounds for skipping craters hold despite rounding.
 const MORE: f64 = 1.0 + 1e-9;
 
-/// Which crater of all: process, bin, diamond, number, and, from 1 on, number among the secondaries of that primary; else 0.
+/// Identity of a crater: process, bin, diamond, number, and, from 1, number among the secondaries of that primary, or else 0.
 pub type Place = (usize, u32, i64, i64, i64, i64);
 
 /// One crater.
 #[derive(Clone, Copy, Debug)]
 pub struct Crater {
-    /// When it struck, in 0 to 1; ties go by place.
+    /// Time of impact, in 0 to 1; ties are broken by place.
     pub time: f64,
-    /// Which it is.
+    /// Its identity.
     pub place: Place,
     /// Centre, lattice units.
     pub centre: [f64; 2],
@@ -38,102 +38,102 @@ pub struct Crater {
     pub diameter_m: f64,
     /// Key of the texture of its floor.
     pub texture: Counter,
-    /// What its process says of all its craters.
+    /// Shape parameters of its process.
     pub style: Style,
 }
 
-/// What the craters of a process have in common.
+/// Shape parameters common to the craters of a process.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Style {
     /// Depth over diameter of small craters.
     pub depth_ratio: f64,
-    /// Whether depths count from the surface instead of the rim.
+    /// Whether depths are measured from the surface instead of the rim.
     pub below_datum: bool,
     /// Roughness of new floors over that of the surface.
     pub floor_roughness: f64,
 }
 
 impl Crater {
-    /// Height above what it struck.
+    /// Height above the surface that it struck.
     pub fn profile(&self) -> Profile {
         Profile::new(self.diameter_m, self.style.depth_ratio, self.style.below_datum)
     }
 
-    /// Earlier before later.
+    /// Order of time, earliest first.
     pub fn order(&self, other: &Self) -> Ordering {
         self.time.total_cmp(&other.time).then_with(|| self.place.cmp(&other.place))
     }
 }
 
-/// What is looked at: points, and how far around them everything counts, lattice units.
+/// A search area: points, and a margin around them, lattice units.
 #[derive(Clone, Copy)]
 pub struct Near<'a> {
     /// The points.
     pub window: &'a Window,
-    /// Beyond the craters' own reach.
+    /// Margin in addition to the craters' own reach.
     pub margin: f64,
-    /// Once true, nothing more is looked for.
+    /// Set to true to cancel the search.
     pub cancel: Option<&'a AtomicBool>,
 }
 
 impl Near<'_> {
-    /// Whether nothing more is looked for.
+    /// Whether the search was cancelled.
     pub fn is_over(&self) -> bool {
         self.cancel.is_some_and(|flag| flag.load(Memory::Relaxed))
     }
 
-    /// Whether a point may lie within `reach` of a centre.
+    /// Whether a point or its margin may lie within `reach` of a centre.
     pub fn touches(&self, centre: [f64; 2], reach: f64) -> bool {
         self.window.part(centre, reach + self.margin).is_some()
     }
 }
 
-/// Secondaries of primaries that were met before.
+/// Cache of the secondaries of each primary.
 #[derive(Default)]
 pub struct Families {
-    /// Those that are not wider are never asked for, m.
+    /// Secondaries up to this width are never requested, m.
     least_m: f64,
     met: RefCell<HashMap<Place, Rc<[Crater]>>>,
 }
 
 impl Families {
-    /// None yet; nobody will ask for secondaries that are not wider than `least_m`.
+    /// An empty cache, for secondaries wider than `least_m` only.
     pub fn wider_than(least_m: f64) -> Self {
         Self { least_m, met: RefCell::default() }
     }
 
-    /// All that are known.
+    /// Number of cached secondaries.
     #[cfg(test)]
     pub fn members(&self) -> usize {
         self.met.borrow().values().map(|family| family.len()).sum()
     }
 }
 
-/// A set of craters that can be asked for those near a place.
+/// A set of craters that can be searched by area.
 pub trait Population: Send + Sync {
-    /// Adds every crater wider than `diameter_min_m` whose ejecta may reach a point that is looked at.
+    /// Adds every crater wider than `diameter_min_m` whose ejecta may reach the search area.
     fn find(&self, near: &Near<'_>, diameter_min_m: f64, families: &Families, found: &mut Vec<Crater>);
 
-    /// Expected number of craters and diamonds that [`Self::find`] looks at.
+    /// Expected number of craters and diamonds that [`Self::find`] examines.
     fn work(&self, near: &Near<'_>, diameter_min_m: f64) -> f64;
 
-    /// Expected number of craters that it holds in memory, not below the true one.
+    /// Expected number of craters that it holds in memory; never an underestimate.
     fn held(&self, near: &Near<'_>) -> f64;
 }
 
-/// Craters of one range of diameters, a factor of 2 or less.
+/// Craters in one range of diameters, a factor of 2 at most.
 #[derive(Clone, Debug)]
 struct Bin {
-    /// Binary logarithm of the grid spacing whose diamonds hold them.
+    /// Binary logarithm of the spacing of the grid whose diamonds contain them.
     zoom: u32,
-    /// Diameters to the power of -A: of the smallest, and less that of the largest.
+    /// `D^-A` of the smallest diameter, and that minus `D^-A` of the largest.
     power: [f64; 2],
     diameter_max_m: f64,
     mean: f64,
     per_diamond: Poisson,
 }
 
-/// Craters by a power law: `N(>D) = density D^-A` per square metre between two diameters.
+/// Craters that follow a power law: `N(>D) = density D^-A` per square metre between two diameters.
 #[derive(Clone, Debug)]
 pub struct PowerLaw {
     counter: Counter,
@@ -174,7 +174,7 @@ impl PowerLawParameters {
         size_ranges(self.diameters_m, spacing_m).map(bin).collect()
     }
 
-    /// The largest mean number of craters in a diamond; infinite where one is no number.
+    /// The largest mean number of craters in a diamond; infinite if any is NaN.
     pub fn mean_max(&self, spacing_m: f64) -> f64 {
         let mean = |bin: &Bin| if bin.mean.is_nan() { f64::INFINITY } else { bin.mean };
         self.bins(spacing_m).iter().map(mean).fold(0.0, f64::max)
@@ -189,12 +189,12 @@ impl PowerLaw {
         Self { counter, process, exponent, style, spacing_m, bins }
     }
 
-    /// How far from the centre of a bin's diamond something of `radii` radii can reach, lattice units.
+    /// How far from the centre of a bin's diamond a feature that extends over `radii` crater radii can reach, lattice units.
     fn reach(bin: &Bin, radii: f64, near: &Near<'_>) -> f64 {
         (1.0 + RADIUS_SHARE * radii) * spacing(bin.zoom) + near.margin
     }
 
-    /// Calls `f` for every crater wider than `diameter_min_m` that may reach a point that is looked at over `radii` radii.
+    /// Calls `f` for every crater wider than `diameter_min_m` that may reach the search area within `radii` radii.
     fn visit(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64, mut f: impl FnMut(Crater)) {
         for bin in self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m) {
             near.window.visit_diamonds(bin.zoom, Self::reach(bin, radii, near), |i, j| {
@@ -203,7 +203,7 @@ impl PowerLaw {
                 }
                 let diamond = self.counter.at(j).at(i);
                 for n in 0..i64::from(bin.per_diamond.count(diamond.uniform())) {
-                    // Most are too far even for the widest of the bin: they need no diameter.
+                    // Most would be too far away even with the widest diameter of the bin: no need to draw theirs.
                     let centre = Self::centre(bin, [i, j], diamond.at(n));
                     if !near.touches(centre, radii * 0.5 * bin.diameter_max_m * MORE / self.spacing_m) {
                         continue;
@@ -236,13 +236,13 @@ impl PowerLaw {
         }
     }
 
-    /// Expected work of [`Self::visit`] when a crater costs `each` and a diamond 1.
+    /// Expected work of [`Self::visit`] if a crater costs `each` and a diamond 1.
     fn work_of_visit(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64, each: f64) -> f64 {
         let wide = self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m);
         wide.map(|bin| (1.0 + each * bin.mean) * near.window.diamonds(bin.zoom, Self::reach(bin, radii, near))).sum()
     }
 
-    /// Expected number of craters that [`Self::visit`] calls for, were each as wide as the widest of its bin.
+    /// Expected number of craters that [`Self::visit`] calls `f` for, if each were as wide as the widest of its bin.
     fn visited(&self, near: &Near<'_>, radii: f64, diameter_min_m: f64) -> f64 {
         let wide = self.bins.iter().filter(|bin| bin.diameter_max_m > diameter_min_m);
         let reach = |bin: &Bin| RADIUS_SHARE * radii * spacing(bin.zoom) + near.margin;
@@ -264,12 +264,12 @@ impl Population for PowerLaw {
     }
 }
 
-/// Secondaries around the larger craters of a power law: as many to each, at the time of their primary.
+/// Secondaries around the larger craters of a power law: the same number around each, at the time of their primary.
 #[derive(Clone, Debug)]
 pub struct Secondaries {
     /// The primaries.
     pub primaries: PowerLaw,
-    /// Their own process.
+    /// Number of the secondaries' process.
     pub process: usize,
     /// Key of their draws.
     pub counter: Counter,
@@ -304,7 +304,7 @@ impl SecondaryParameters {
         self.ring_radii[1] + EJECTA_RADII * self.largest_ratio
     }
 
-    /// The primaries that may have a secondary wider than `diameter_min_m` are wider than this, m.
+    /// Only primaries wider than this may have a secondary wider than `diameter_min_m`, m.
     fn parent_min_m(&self, diameter_min_m: f64) -> f64 {
         self.primary_min_m.max(diameter_min_m / self.largest_ratio)
     }
@@ -317,12 +317,12 @@ impl Secondaries {
         Self { primaries, process, counter, parameters, power }
     }
 
-    /// The secondaries of a primary, the widest first; some that are not wider than `least_m` may be left out.
+    /// The secondaries of a primary, widest first; some of those up to `least_m` wide may be left out.
     fn family(&self, primary: &Crater, least_m: f64) -> Rc<[Crater]> {
         let p = &self.parameters;
         let (_, bin, j, i, n, _) = primary.place;
         let root = self.counter.at(i64::from(bin)).at(j).at(i).at(n);
-        // D^-A falls with D: what is above that of the bound is too narrow, and needs no diameter.
+        // D^-A falls with D: a secondary whose value exceeds that of the bound is too narrow; no need to compute its diameter.
         let most = libm::pow(least_m / (p.largest_ratio * primary.diameter_m), -p.exponent) * MORE;
         let wide = |m: &i64| self.relative_power(root.at(*m)) <= most;
         let members = (0..i64::from(p.count)).filter(wide);

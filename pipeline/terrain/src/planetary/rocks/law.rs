@@ -1,4 +1,4 @@
-//! How many rocks of which size.
+//! Size-frequency distribution of rocks.
 //!
 //! Rocks wider than D (m) cover the share `F(D) = f e^(-q D)` of the ground, `q = 1.79 + 0.152 / f` per metre, with `f` the coverage
 //! by all rocks (Golombek and Rapp, 1997, doi:10.1029/96JE03319; the constant is misprinted as 0.132 in the scan of the paper).
@@ -6,8 +6,8 @@
 //! $$ n(D) = \frac{4 q f e^{-q D}}{\pi D^2} \; \text{m}^{-3}, \qquad
 //!    N(>D) = \frac{4 q f}{\pi} \left( \frac{e^{-q D}}{D} - q E_1(q D) \right) \; \text{m}^{-2} $$
 //!
-//! Rocks placed independently overlap, so that together they cover `1 - e^{-F}` instead of F. The default law makes up for that:
-//! with the density `n / (1 - F)` the area of the rocks wider than D is `-ln(1 - F(D))` per unit ground, and their union covers
+//! Rocks placed independently overlap, so together they cover `1 - e^{-F}` instead of F. The default law compensates for this:
+//! with the density `n / (1 - F)`, the total area of the rocks wider than D is `-ln(1 - F(D))` per unit of ground, and their union covers
 //! exactly F(D).
 
 use std::f64::consts::PI;
@@ -19,12 +19,22 @@ const Q_COVERAGE_PER_M: f64 = 0.152;
 #[cfg(test)]
 const EULER: f64 = 0.577_215_664_901_532_9;
 
-/// Rocks at a place with a given coverage.
+/// Rocks of a given coverage.
+///
+/// ```
+/// use sastrugi_terrain::planetary::Law;
+///
+/// let law = Law { coverage: 0.176, exact_union: true };
+/// assert_eq!(law.cover_above(0.0), 0.176);
+/// assert!((law.decay_per_m() - (1.79 + 0.152 / 0.176)).abs() < 1e-12);
+/// // Rocks that overlap must be more numerous to cover the same share.
+/// assert!(law.density(0.1) > law.published_density(0.1));
+/// ```
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Law {
     /// Share of the ground covered by all rocks, above 0.
     pub coverage: f64,
-    /// Whether independent placement is made up for.
+    /// Whether to compensate for the overlap of independently placed rocks.
     pub exact_union: bool,
 }
 
@@ -44,7 +54,7 @@ impl Law {
         4.0 * self.decay_per_m() * self.cover_above(diameter_m) / (PI * diameter_m * diameter_m)
     }
 
-    /// Density of the rocks that are placed, 1/m3.
+    /// Density of the placed rocks, 1/m3.
     pub fn density(&self, diameter_m: f64) -> f64 {
         let share = if self.exact_union { 1.0 - self.cover_above(diameter_m) } else { 1.0 };
         self.published_density(diameter_m) / share
@@ -77,7 +87,7 @@ fn by_series(x: f64) -> f64 {
     sum - EULER - libm::log(x)
 }
 
-/// `e^-x / (x + 1 - 1 / (x + 3 - 4 / (x + 5 - ...)))`, from the far end back.
+/// `e^-x / (x + 1 - 1 / (x + 3 - 4 / (x + 5 - ...)))`, evaluated backwards.
 #[cfg(test)]
 fn by_continued_fraction(x: f64) -> f64 {
     let tail = (1..=100).rev().fold(0.0, |tail, k| {
@@ -95,7 +105,7 @@ mod tests {
         Law { coverage, exact_union: true }
     }
 
-    /// `q` and N(>D) per square metre of the four densities of the paper.
+    /// `q` and N(>D) per square metre for the four coverages of the paper.
     #[test]
     fn val_rocks_per_square_metre() {
         let table = [

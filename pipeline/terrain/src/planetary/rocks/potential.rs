@@ -1,16 +1,16 @@
-//! Rock potential from a raster: the share of the ground that all rocks may cover, from place to place.
+//! Rock potential from a raster: the spatially varying share of the ground that rocks may cover.
 //!
-//! Bilinear between the centres of the raster's cells. Where the raster has no data, at a cell without or beyond its outer centres, the
-//! `coverage` of the process holds. Shares lie in 0 to 0.6; others are refused, not clamped, because they hint at another unit (percent) or
-//! another quantity. A map in single precision may be above 0.6 by its rounding.
+//! Bilinear between the centres of the raster's cells. Where the raster has no data, or beyond its outer centres, the `coverage` of the
+//! process is used. Shares must lie in 0 to 0.6; others are refused, not clamped, because they suggest another unit (per cent) or
+//! another quantity. A map in single precision may exceed 0.6 by rounding.
 //!
-//! The value at a place is a function of the place alone, so that zooms, windows and tiles have the same rocks.
+//! The value depends on position alone, so that zooms, windows and tiles have the same rocks.
 
 use super::COVERAGE_MAX;
 use sastrugi_numeric::{Grid, Surface};
 use std::sync::Arc;
 
-/// How far shares may lie beyond their bounds: rounding to single precision.
+/// How far shares may exceed their bounds by rounding to single precision.
 const ROUNDING: f64 = 1e-6;
 
 /// A raster of shares of the ground.
@@ -19,12 +19,12 @@ pub struct Potential {
     raster: Arc<Grid>,
     /// Basic spacing of the lattice, m.
     spacing_m: f64,
-    /// Where lattice point 0 lies in the coordinates of the raster, m.
+    /// Position of lattice point 0 in the coordinates of the raster, m.
     offset_m: [f64; 2],
 }
 
 impl Potential {
-    /// A raster under a lattice with points `spacing_m` apart, its point 0 at `offset_m` in the raster's coordinates.
+    /// A raster for a lattice with points `spacing_m` apart whose point 0 lies at `offset_m` in the raster's coordinates.
     ///
     /// # Errors
     /// Why the raster cannot be used: fewer than 2 x 2 cells, no data at all, or shares out of range.
@@ -46,7 +46,7 @@ impl Potential {
         Ok(Self { raster: Arc::new(raster.map(|f| f.clamp(0.0, COVERAGE_MAX))), spacing_m, offset_m })
     }
 
-    /// The share at a place (lattice units), `None` where the raster has no data.
+    /// The share at a position (lattice units), `None` where the raster has no data.
     pub fn at(&self, point: [f64; 2]) -> Option<f64> {
         let [x, y] = [0, 1].map(|axis| point[axis] * self.spacing_m + self.offset_m[axis]);
         self.raster.height(x, y).map(|share| share.clamp(0.0, COVERAGE_MAX))

@@ -1,4 +1,4 @@
-//! The same bits from every side.
+//! Bit-identical samples in every zoom, window and tile.
 
 use super::*;
 
@@ -11,7 +11,7 @@ fn bits(patch: &Patch, col: usize, row: usize) -> Bits {
     [z, albedo, u64::from(patch.class[k]), potential]
 }
 
-/// Every second sample of a patch is the patch of twice the spacing.
+/// Every second sample of a patch gives the patch of twice the spacing.
 #[test]
 fn prop_zooms_agree() {
     let world = world(everything(), 1);
@@ -21,7 +21,7 @@ fn prop_zooms_agree() {
         for (row, col) in (0..33).flat_map(|row| (0..40).map(move |col| (row, col))) {
             assert_eq!(bits(&coarse, col, row), bits(&fine, 2 * col, 2 * row), "zoom {zoom} ({col}, {row})");
         }
-        // Not for want of things to see.
+        // The patches do contain rocks and sand.
         assert!(fine.class.contains(&1) && fine.class.contains(&0));
     }
 }
@@ -48,7 +48,7 @@ fn prop_patches_agree() {
             }
         }
     }
-    // A plane that is taken for another shows in what else is looked at.
+    // If one crater's plane were confused with another's, the result would depend on the window.
     let crowded = world(families(), 9);
     let whole = crowded.patch(&window(6, -20, -20, 60, 60));
     for (west, south) in [(-20, -20), (0, -20), (-20, 0), (10, 10), (20, 20)] {
@@ -68,9 +68,9 @@ fn prop_patches_agree() {
     assert_eq!(one, made.patch(&large));
 }
 
-/// What lies somewhere lies there at any spacing: a rock of 2 m is met by samples 1.28 m apart.
+/// Features have the same position at any spacing: samples 1.28 m apart hit a rock of 2 m.
 #[test]
-fn val_a_rock_of_two_metres_is_seen_at_every_zoom() {
+fn val_a_rock_of_two_metres_exists_at_every_zoom() {
     let processes =
         json!([{"kind": "texture"}, {"kind": "rocks", "coverage": 0.3, "diameter_min_m": 1.8, "diameter_max_m": 2.2}]);
     let world = world(processes, 3);
@@ -119,7 +119,14 @@ fn val_grids_put_samples_at_lattice_points() {
     assert_eq!(fine.maps.iter().map(|m| m.name).collect::<Vec<_>>(), ["class", "rock-potential", "albedo"]);
 }
 
-/// The cell is the basic spacing times a power of 2, and the origin whole cells, whatever digits they were given in.
+/// The grid spacing nearest in ratio: the border between 1 and 2 is the square root of 2.
+#[test]
+fn val_the_nearest_zoom_is_nearest_in_ratio() {
+    let zooms = [0.3, 1.0, 1.41, 1.42, 2.8, 2.9, 90.0, 91.0, 128.0].map(crate::planetary::nearest_zoom);
+    assert_eq!(zooms, [0, 0, 0, 1, 1, 2, 6, 7, 7]);
+}
+
+/// The cell is exactly the basic spacing times a power of 2, and the origin exactly whole cells, whatever the digits of the input.
 #[test]
 fn val_the_lattice_wins_over_its_decimals() {
     let params =

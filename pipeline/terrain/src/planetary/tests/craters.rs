@@ -1,8 +1,8 @@
-//! Craters: their shape on the ground, their order, how many there are, and how they wear each other out.
+//! Craters: their shape on the ground, their order, their numbers, and saturation.
 
 use super::*;
-use crate::planetary::craters::Bombardment;
 use crate::planetary::craters::population::{Crater, Families, Near, Population, PowerLaw, PowerLawParameters, Style};
+use crate::planetary::craters::{Bombardment, retained_zoom};
 use crate::planetary::levels::spacing;
 use crate::planetary::world::Step;
 use sastrugi_numeric::Counter;
@@ -13,7 +13,7 @@ fn counter(seed: u64) -> Counter {
     Counter::new(&mut Streams::for_seed(seed, "terrain").stream("test"))
 }
 
-fn crater(number: i64, time: f64, centre: [f64; 2], diameter_m: f64) -> Crater {
+pub fn crater(number: i64, time: f64, centre: [f64; 2], diameter_m: f64) -> Crater {
     Crater {
         time,
         place: (0, 0, 0, 0, number, 0),
@@ -25,7 +25,7 @@ fn crater(number: i64, time: f64, centre: [f64; 2], diameter_m: f64) -> Crater {
     }
 }
 
-/// Craters one by one.
+/// A population given as a list.
 struct Listed(Vec<Crater>);
 
 impl Population for Listed {
@@ -43,7 +43,7 @@ impl Population for Listed {
     }
 }
 
-/// Craters on a lattice of 1 cm, on the ground of some processes.
+/// Craters on a lattice of 1 cm, on ground shaped by the given processes.
 fn struck(craters: Vec<Crater>, ground: Value) -> World {
     let mut made = world(ground, 1);
     let populations: Vec<Box<dyn Population>> = vec![Box::new(Listed(craters))];
@@ -78,7 +78,7 @@ fn val_one_crater() {
     assert!((xy / xx + 3.0).abs() < 0.05, "{}", xy / xx);
 }
 
-/// On a plane the crater stands on the plane, whatever its tilt.
+/// On a plane of any tilt, the crater is added to the plane.
 #[test]
 fn val_a_crater_on_a_slope() {
     let one = vec![crater(0, 0.5, [13.3, -7.8], 0.6)];
@@ -91,7 +91,7 @@ fn val_a_crater_on_a_slope() {
     }
 }
 
-/// Inside new craters nothing of old texture is left; beyond two radii it is all there.
+/// Inside a new crater no old texture is left; beyond two radii it is unchanged.
 #[test]
 fn val_old_ground_is_annihilated() {
     let one = vec![crater(0, 0.5, [0.0, 0.0], 0.8)];
@@ -111,7 +111,44 @@ fn val_old_ground_is_annihilated() {
     }
 }
 
-/// Of two craters that meet, the later one is whole, and swapping times swaps which one is.
+/// Between one and two radii the old ground gives way to the reference plane, with the weight `1 - t^2 (3 - 2 t)` of the new, t from 0 to 1.
+#[test]
+fn val_old_ground_fades_in_from_one_to_two_radii() {
+    let one = vec![crater(0, 0.5, [0.0, 0.0], 0.8)];
+    let rough = json!([{"kind": "texture", "roughness_m": 0.1, "hurst": 0.5}]);
+    let area = window(0, -110, -110, 221, 221);
+    let of = |craters: &[Crater], ground: &Value| struck(craters.to_vec(), ground.clone()).patch(&area).heights;
+    let (both, old, flat) = (of(&one, &rough), of(&[], &rough), of(&one, &json!([])));
+    // Inside one radius only the plane and the crater are left.
+    let plane = |east: i64, north: i64| {
+        let k = ((north + 110) * 221 + east + 110) as usize;
+        both[k] - flat[k]
+    };
+    let slopes = [(plane(30, 0) - plane(-30, 0)) / 60.0, (plane(0, 30) - plane(0, -30)) / 60.0];
+    let mut checked = 0;
+    for k in 0..both.len() {
+        let (dx, dy) = (area.x(k % 221), area.y(k / 221));
+        let t = (dx * dx + dy * dy).sqrt() / 40.0 - 1.0;
+        if (0.0..1.0).contains(&t) {
+            let new = 1.0 - t * t * (3.0 - 2.0 * t);
+            let level = plane(0, 0) + slopes[0] * dx + slopes[1] * dy;
+            let wanted = (1.0 - new) * old[k] + new * level + flat[k];
+            assert!((both[k] - wanted).abs() < 1e-9, "{dx} {dy}: {} {wanted}", both[k]);
+            checked += 1;
+        }
+    }
+    assert!(checked > 10_000, "{checked}");
+}
+
+/// Retained points have the coarsest spacing of half a radius or less.
+#[test]
+fn val_retained_points_are_half_a_radius_apart() {
+    for (radius, zoom) in [(1.0, 0), (3.9, 0), (4.0, 1), (7.9, 1), (8.0, 2), (40.0, 4)] {
+        assert_eq!(retained_zoom(&Crater { radius, ..crater(0, 0.5, [0.0; 2], 1.0) }), zoom, "{radius}");
+    }
+}
+
+/// Of two overlapping craters the later one is intact; swapping the times swaps which one is.
 #[test]
 fn val_later_craters_overprint_earlier_ones() {
     let area = window(0, -60, -60, 200, 121);
@@ -124,7 +161,7 @@ fn val_later_craters_overprint_earlier_ones() {
         (struck(vec![one], json!([])).patch(&area).heights, one)
     };
     let (a_first, b_first) = (pair(0.1, 0.9), pair(0.9, 0.1));
-    // Curvature inside a bowl is that of the crater alone, where it is the later one.
+    // The curvature inside the bowl of the later crater is that of the crater alone.
     let bowl_error = |z: &[f64], (own, c): &(Vec<f64>, Crater)| {
         let inside = |k: &usize| {
             let (dx, dy) = (area.x(k % 200) - c.centre[0], area.y(k / 200) - c.centre[1]);
@@ -145,7 +182,7 @@ fn val_small_craters_see_the_wide_ones_below_them() {
     let centre = window(0, 0, 0, 1, 1);
     let depth = |craters: Vec<Crater>| struck(craters, json!([])).patch(&centre).heights[0];
     let (both, one) = (depth(vec![wide, narrow]), depth(vec![wide]));
-    // The bowl rises by 0.8 m (rho^2) at the ring of the retained points, 0.1 to 0.2 radii.
+    // The bowl rises as 0.8 m rho^2, and the retained points lie at 0.1 to 0.2 of its radii.
     let [rim, floor] = [narrow.profile().rim_m, narrow.profile().depth_m];
     assert!((both - one - (rim - floor)).abs() < 0.8 * 0.04, "{both} {one}");
 }
@@ -172,7 +209,7 @@ fn exponent_of(mean_log: f64, range: f64) -> f64 {
 }
 
 /// Exponents by maximum likelihood (truncated power law) from more than 1e4 craters: within 0.05 of 2 and 0.1 of 3.5.
-/// The estimate's standard error is about A / sqrt(n) / 0.9 = 0.01 for n = 4e4, so that a right kernel fails with less than 1e-6.
+/// The estimate's standard error is about A / sqrt(n) / 0.9 = 0.01 for n = 4e4, so a correct kernel fails with probability below 1e-6.
 #[test]
 fn stat_sizes_follow_their_power_laws() {
     for (exponent, tolerance, density, low) in [(2.0, 0.05, 0.008, 1.0), (3.5, 0.1, 0.05, 1.0)] {
@@ -191,7 +228,7 @@ fn stat_sizes_follow_their_power_laws() {
 }
 
 /// Counts per square of ground are Poisson, also across the borders of diamonds: index of dispersion of 40 x 40 squares
-/// against chi-square (1599 degrees of freedom, 5 standard deviations of sqrt(2 / n): 6e-7); and for A = 2 every bin has the same mean
+/// against chi-square (1599 degrees of freedom, 5 standard deviations of sqrt(2 / n): 6e-7). For A = 2 every bin has the same mean
 /// per diamond, 24 times the density.
 #[test]
 fn stat_counts_are_poisson() {
@@ -213,7 +250,7 @@ fn stat_counts_are_poisson() {
     }
 }
 
-/// Secondaries: as many as asked for, in the ring, with the largest and smallest sizes, at the time of their primary.
+/// Secondaries have the requested number, lie in the ring, have sizes within bounds, and strike at the time of their primary.
 #[test]
 fn val_secondaries_surround_their_primary() {
     let spec = json!([
@@ -251,9 +288,10 @@ fn val_secondaries_surround_their_primary() {
     }
 }
 
-/// Secondaries have exponent 3.5 and a density that falls with the square of the distance, which makes its logarithm uniform: maximum
-/// likelihood, and mean and mean square of the logarithm scaled to -1 to 1 (0 and 1/3, deviations 1/sqrt(3) and 2/sqrt(45)), at 6
-/// standard errors (2e-9 a figure). Sizes end at an eighth of the largest; the standard error of A is A / sqrt(n) / 0.9.
+/// Secondaries have exponent 3.5 and a density that falls with the square of the distance, so the logarithm of the distance is uniform.
+/// Maximum likelihood for the exponent; mean and mean square of the logarithm scaled to -1 to 1 (0 and 1/3, deviations 1/sqrt(3) and
+/// 2/sqrt(45)), at 6 standard errors (2e-9 per statistic). Sizes end at an eighth of the largest; the standard error of A is
+/// A / sqrt(n) / 0.9.
 #[test]
 fn stat_secondaries_follow_their_laws() {
     let spec = json!([
@@ -288,10 +326,10 @@ fn stat_secondaries_follow_their_laws() {
     assert!((second - 1.0 / 3.0).abs() < 6.0 * 2.0 / (45.0 * count).sqrt(), "{second}");
 }
 
-/// No two craters of a world are taken for each other, also where a process has secondaries of both kinds and their sizes are those of
-/// the primaries.
+/// No two craters of a world have the same identity, even if a process has both kinds of secondaries with the sizes of the
+/// primaries.
 #[test]
-fn prop_places_tell_craters_apart() {
+fn prop_places_identify_craters() {
     let made = world(families(), 7);
     let area = window(0, 0, 0, 10_000, 10_000);
     let mut places = std::collections::HashSet::new();
@@ -307,11 +345,36 @@ fn prop_places_tell_craters_apart() {
     assert!(all > 5000 && places.len() == all, "{} {all}", places.len());
 }
 
-/// What a patch is expected to hold in memory is no less than what it holds, families of secondaries included, and no more than 6 times
-/// as much (squares are looked at, circles found); also with rocks, which ask for craters beyond the window. A count of 1e4 in families
+/// A bound leaves out the craters up to that width and no others, although families are then drawn only in part.
+#[test]
+fn prop_a_bound_keeps_every_wider_crater() {
+    let made = world(families(), 7);
+    let area = window(0, 0, 0, 10_000, 10_000);
+    let near = Near { window: &area, margin: 0.0, cancel: None };
+    let found = |bound_m: f64, families: Families| {
+        let mut found = Vec::new();
+        for step in &made.steps {
+            let Step::Bombardment(b) = step else { continue };
+            b.populations.iter().for_each(|p| p.find(&near, bound_m, &families, &mut found));
+        }
+        found.sort_unstable_by(Crater::order);
+        found
+    };
+    let all = found(0.0, Families::default());
+    for bound_m in [0.15, 0.25, 0.5, 2.0] {
+        let wide: Vec<_> = all.iter().filter(|c| c.diameter_m > bound_m).map(|c| (c.place, c.diameter_m)).collect();
+        let bounded = found(bound_m, Families::wider_than(bound_m));
+        assert_eq!(bounded.iter().map(|c| (c.place, c.diameter_m)).collect::<Vec<_>>(), wide, "{bound_m}");
+        // Members of families are numbered from 1.
+        assert!(bound_m > 0.2 || wide.iter().filter(|(place, _)| place.5 > 0).count() > 20, "{}", wide.len());
+    }
+}
+
+/// The expected number of objects in memory is at least the actual one, families of secondaries included, and at most 6 times
+/// as large (squares are searched, circles found); also with rocks, which require craters beyond the window. A count of 1e4 in families
 /// of 200 scatters by 15 %.
 #[test]
-fn val_expected_objects_hold_those_found() {
+fn val_expected_objects_bound_those_found() {
     let made = world(families(), 8);
     let area = window(0, 0, 0, 4000, 4000);
     let near = Near { window: &area, margin: rocks_reach(&made), cancel: None };
@@ -331,8 +394,8 @@ fn rocks_reach(world: &World) -> f64 {
     world.rocks.as_ref().unwrap().0.reach()
 }
 
-/// Craters of 8 to 32 samples that can still be seen in a patch of 128 x 128, and how many of as many places drawn elsewhere (mirrored)
-/// look like one by chance. Seen: the floor is lower than each of 16 points at 0.9 radii by more than a third of what it was when new.
+/// Number of craters of 8 to 32 samples still visible in a patch of 128 x 128, and the number visible by chance at as many mirrored
+/// positions. Visible: the floor lies below each of 16 points at 0.9 radii by more than a third of its original depth below them.
 fn visible(density: f64, seed: u64) -> [f64; 2] {
     use sastrugi_numeric::Surface;
     let spec = json!([{"kind": "primary_craters", "density": density, "diameter_min_m": 0.06, "diameter_max_m": 1.28}]);
@@ -357,10 +420,10 @@ fn visible(density: f64, seed: u64) -> [f64; 2] {
     [own as f64, elsewhere as f64]
 }
 
-/// Saturation. Ten times the equilibrium density (10^-1.1 = 0.079), and twice that, leave the same number of craters to
-/// see, within 20 %: 3903 over 4348 in 480 patches, 0.90 with a standard error of 0.022. Were that the true ratio, the bound would be 4.4
+/// Saturation: ten times the equilibrium density (10^-1.1 = 0.079), and twice that, leave the same number of visible craters, within
+/// 20 %: 3903 over 4348 in 480 patches, 0.90 with a standard error of 0.022. If that were the true ratio, the bound would be 4.4
 /// standard errors away (5e-6). The seeds are the first ones; the counts at a tenth of the equilibrium and at the equilibrium itself are
-/// printed. Six minutes of one core.
+/// printed. Takes six minutes on one core.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_crater_fields_saturate() {

@@ -1,4 +1,4 @@
-//! Ground made where it is asked for.
+//! Ground generated on demand.
 
 use super::*;
 use crate::planetary::{Clearing, Planetary, RawPlanetary, WorldGround};
@@ -18,9 +18,9 @@ fn ground(clearings: &[Clearing], tiles: usize) -> WorldGround {
     planetary().ground(&Streams::for_seed(5, "terrain"), 0.02, clearings, tiles).unwrap()
 }
 
-/// At samples the ground has the bits of a patch of the whole surface, as files hold them.
+/// At samples the ground has the bits of a patch of the complete surface, in single precision as in files.
 #[test]
-fn prop_ground_is_that_of_the_whole_surface() {
+fn prop_ground_equals_the_complete_surface() {
     let ground = ground(&[], 64);
     let view = ground.view();
     let world = planetary().world(&Streams::for_seed(5, "terrain"));
@@ -29,7 +29,7 @@ fn prop_ground_is_that_of_the_whole_surface() {
     for k in 0..window.len() {
         let (col, row) = (k % 90, k / 90);
         let point = view.at((col as f64 - 300.0) * 0.02, (row as f64 - 280.0) * 0.02).unwrap();
-        // A place in metres is a sample's to the last digit of double precision.
+        // A position in metres is that of a sample only to the last digit of double precision.
         assert_eq!(point.height_m as f32, whole.heights[k] as f32);
         assert_eq!(point.class == GroundClass::Rock, whole.class[k] == 1);
         assert_eq!(point.albedo, f64::from(whole.albedo[k] as f32));
@@ -37,20 +37,37 @@ fn prop_ground_is_that_of_the_whole_surface() {
     assert_eq!(ground.tiles_made(), 2 * 2);
 }
 
-/// With room for one tile, every other is made again and again, to the same bits.
+/// With room for only one tile, tiles are generated repeatedly, with the same bits.
 #[test]
 fn prop_evictions_change_nothing() {
     let (small, large) = (ground(&[], 1), ground(&[], 64));
     let mut stream = Streams::for_seed(1, "ground").stream("places");
     for _ in 0..60 {
-        // A view keeps tiles at hand: a new one each time forces the eviction.
+        // A view caches tiles: a new view each time forces the eviction.
         let [x, y] = [(); 2].map(|()| stream.uniform_in(-9.0, 9.0));
         assert_eq!(small.view().at(x, y).unwrap(), large.view().at(x, y).unwrap());
     }
     assert!(small.tiles_made() > 2 * large.tiles_made(), "{} {}", small.tiles_made(), large.tiles_made());
 }
 
-/// Between the samples heights are bilinear, across the edges of tiles as well.
+/// Between samples heights are bilinear, also if the samples lie in different tiles, which meet at columns and rows 0 and 256.
+#[test]
+fn val_heights_between_samples_are_bilinear() {
+    let ground = ground(&[], 64);
+    let view = ground.view();
+    for (col, row) in [(0, 0), (17, 40), (255, 12), (255, 255), (-1, -1)] {
+        let at = |east: f64, north: f64| {
+            let [x, y] = [f64::from(col) + east, f64::from(row) + north].map(|cells| 0.02 * cells);
+            view.at(x, y).unwrap().height_m
+        };
+        let [sw, se, nw, ne] = [at(0.0, 0.0), at(1.0, 0.0), at(0.0, 1.0), at(1.0, 1.0)];
+        assert!((at(0.5, 0.5) - 0.25 * (sw + se + nw + ne)).abs() < 1e-9, "{col} {row}");
+        assert!((at(0.25, 0.0) - (0.75 * sw + 0.25 * se)).abs() < 1e-9, "{col} {row}");
+        assert!((at(0.0, 0.25) - (0.75 * sw + 0.25 * nw)).abs() < 1e-9, "{col} {row}");
+    }
+}
+
+/// Heights are continuous, also across the edges of tiles.
 #[test]
 fn prop_ground_is_continuous_between_tiles() {
     let ground = ground(&[], 64);
@@ -65,7 +82,7 @@ fn prop_ground_is_continuous_between_tiles() {
 
 /// No rock reaches into a clearing, and nothing changes farther from it than the widest rock reaches.
 #[test]
-fn val_clearings_hold_no_rock() {
+fn val_clearings_have_no_rocks() {
     let plain = ground(&[], 64);
     let plain = plain.view();
     let is_rock = |x: &f64| plain.at(*x, -2.1).unwrap().class == GroundClass::Rock;
@@ -86,7 +103,7 @@ fn val_clearings_hold_no_rock() {
     assert_eq!(cleared.at(x + 9.0, 9.0), plain.at(x + 9.0, 9.0));
 }
 
-/// There is no ground beyond the end of the world, and none at no number.
+/// There is no ground beyond the end of the world, or at NaN or infinity.
 #[test]
 fn val_the_world_ends() {
     let ground = ground(&[], 4);

@@ -1,4 +1,4 @@
-//! Rocks that follow a raster.
+//! Rocks that follow a raster of their potential.
 
 use super::rocks::{count_above, found, rocks_of};
 use super::*;
@@ -9,14 +9,14 @@ use crate::planetary::rocks::potential::Potential;
 use crate::planetary::{Planetary, RawPlanetary};
 use sastrugi_numeric::{Ground, GroundClass};
 
-/// Shares that change from cell to cell, with a hole, on ground from (-9, -9) to (9, 9) m.
+/// Shares that vary from cell to cell, with a hole, on ground from (-9, -9) to (9, 9) m.
 fn raster() -> Grid {
     let g = Geometry { rows: 18, cols: 18, cell: [1.0, 1.0], origin: [-9.0, -9.0] };
     let share = |k: usize| if k == 130 { f64::NAN } else { 0.05 + 0.02 * ((k * 7) % 25) as f64 };
     Grid::new(g, (0..g.len()).map(share).collect())
 }
 
-/// Every process, with so few craters after the rocks that most of these are left.
+/// Every process, with so few craters after the rocks that most rocks remain.
 fn processes_on_raster() -> Value {
     let mut list = everything();
     list[3]["potential"] = json!("shares");
@@ -54,7 +54,7 @@ fn prop_zooms_and_windows_agree() {
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         let made = pool.install(|| fields(&planetary([-10.24, -10.24], 0.04, [513, 513])));
-        // Cells without a number differ from themselves.
+        // NaN differs from itself, so compare bits.
         (made.iter().flat_map(|grid| &grid.values).map(|v| v.to_bits()).collect::<Vec<_>>(), made)
     };
     let ((bits, whole), (others, _)) = (on(1), on(8));
@@ -75,9 +75,9 @@ fn prop_zooms_and_windows_agree() {
     assert!(low < 0.06 && high > 0.5, "{low} {high}");
 }
 
-/// A raster of one share is the coverage itself, bit by bit, with all that craters do to it.
+/// A raster with the same share everywhere equals that coverage, bit by bit, including the effect of craters.
 #[test]
-fn val_a_raster_of_one_share_is_the_coverage() {
+fn val_a_uniform_raster_equals_the_coverage() {
     let of = |coverage: f64, raster: Option<Potential>| {
         let mut list = processes_on_raster();
         list[3]["coverage"] = json!(coverage);
@@ -89,12 +89,12 @@ fn val_a_raster_of_one_share_is_the_coverage() {
     let (followed, thin, dense) = (of(0.4, Some(raster)), of(0.118, None), of(0.4, None));
     let (inside, beyond) = (window(2, -150, -100, 200, 180), window(2, 900, 900, 90, 90));
     assert!(followed.patch(&inside) == thin.patch(&inside) && followed.patch(&inside) != dense.patch(&inside));
-    // Beyond the raster the coverage holds.
+    // Beyond the raster, the coverage is used.
     assert!(followed.patch(&beyond) == dense.patch(&beyond) && followed.patch(&beyond) != thin.patch(&beyond));
 }
 
-/// Counts east and west of a step in the raster, each against the law of its share. Poisson counts, bound of 4.9 standard deviations: a
-/// false alarm in 1e-6 of either. A share wrong by 2 % would be caught.
+/// Counts east and west of a step in the raster, each against the law for its share. Poisson counts, bound of 4.9 standard deviations:
+/// false-alarm probability 1e-6 each. Detects a share wrong by 2 %.
 #[test]
 fn stat_counts_follow_the_raster() {
     let g = Geometry { rows: 4, cols: 4, cell: [50.0, 50.0], origin: [0.0; 2] };
@@ -116,11 +116,11 @@ fn stat_counts_follow_the_raster() {
         eprintln!("share {coverage}: {count} rocks against {expected:.0}");
         assert!((count - expected).abs() < 4.9 * expected.sqrt(), "{coverage}: {count} {expected}");
     }
-    // Where the raster has no data the coverage holds, which is 0 here.
+    // Where the raster has no data the coverage is used, which is 0 here.
     assert!(rocks.iter().all(|r| r.centre.iter().all(|at| (2500.0..=17_500.0).contains(at))));
 }
 
-/// A rover meets the bits of the window: the ground that is made on demand follows the raster as well.
+/// Ground generated on demand for a rover has the bits of the window: it follows the raster too.
 #[test]
 fn prop_ground_on_demand_follows_the_raster() {
     let made = planetary([-3.2, -2.56], 0.02, [200, 160]).with_inputs(&[raster().into()]).unwrap();
@@ -139,7 +139,7 @@ fn prop_ground_on_demand_follows_the_raster() {
     assert_eq!(unread.err().unwrap().key, "processes.3.potential");
 }
 
-/// What has no data is told, and what cannot be a share is refused.
+/// Missing data are stated in a note, and values that cannot be shares are refused.
 #[test]
 fn val_unusable_rasters_are_refused() {
     let made = planetary([0.0; 2], 0.16, [64, 64]);
@@ -167,7 +167,7 @@ fn val_unusable_rasters_are_refused() {
     let empty = Grid::filled(Geometry::square(4, 4, 1.0), f64::NAN);
     assert!(refusal(&[empty.into()]).contains("no cell with data"));
     assert!(refusal(&[Grid::filled(Geometry::square(1, 4, 1.0), 0.1).into()]).contains("1 x 4 cells"));
-    assert!(refusal(&[]).contains("is not there"));
+    assert!(refusal(&[]).contains("is missing"));
     let list: Vec<RawProcess> = serde_json::from_value(json!([{"kind": "rocks", "potential": ""}])).unwrap();
     assert_eq!(processes::check(&list, 0.01).unwrap_err().key, "processes.0.potential");
 }

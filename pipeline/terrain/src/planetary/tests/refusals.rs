@@ -1,4 +1,4 @@
-//! What is refused, and where the refusal points.
+//! Invalid parameters are refused under the right key.
 
 use super::*;
 
@@ -74,18 +74,19 @@ fn val_bad_processes_are_refused() {
     assert_eq!(refused(orphans), "processes.0.per_primary");
     let unknown = crate::prepare(KIND, &json!({"processes": [{"kind": "volcano"}]})).err().unwrap();
     assert!(unknown.message.contains("`secondary_craters`"), "{unknown}");
-    assert!(crate::prepare(KIND, &process(json!({"kind": "texture", "hirst": 0.5}))).is_err());
+    let misspelt = crate::prepare(KIND, &process(json!({"kind": "texture", "hirst": 0.5}))).err().unwrap();
+    assert!(misspelt.message.contains("`hirst`"), "{misspelt}");
 }
 
-/// Too many craters and rocks to look at.
+/// Too many craters and rocks to examine.
 #[test]
-fn val_endless_work_is_refused() {
+fn val_excessive_work_is_refused() {
     let crowded = json!({
         "cell_m": 0.64, "basic_spacing_m": 0.01, "size_px": [16000, 16000],
         "processes": [{"kind": "primary_craters", "density": 0.5, "diameter_min_m": 0.05}, {"kind": "rocks"}]
     });
     assert_eq!(refused(crowded), "processes");
-    // Every tile looks at the ten thousands of secondaries around each wide crater anew.
+    // Every tile examines the tens of thousands of secondaries around each wide crater again.
     let families = |side: u32| {
         json!({
             "cell_m": 0.02, "size_px": [side, side],
@@ -96,7 +97,7 @@ fn val_endless_work_is_refused() {
     assert_eq!(refused(families(16_000)), "processes");
 }
 
-/// Means that are no numbers.
+/// Mean numbers that are NaN.
 #[test]
 fn val_densities_beyond_double_precision_are_refused() {
     let tiny = json!({
@@ -106,9 +107,9 @@ fn val_densities_beyond_double_precision_are_refused() {
     assert_eq!(refused(tiny), "processes.0.density");
 }
 
-/// Craters and rocks of a tile are charged, for each of the tiles at work.
+/// Stated memory includes the craters and rocks of every active tile.
 #[test]
-fn val_memory_goes_with_the_objects() {
+fn val_memory_grows_with_the_objects() {
     let of = |per_primary: u32| {
         let processes = json!([{"kind": "primary_craters"}, {"kind": "secondary_craters", "per_primary": per_primary}]);
         let params = json!({"cell_m": 0.02, "size_px": [512, 512], "processes": processes});
@@ -118,9 +119,9 @@ fn val_memory_goes_with_the_objects() {
     assert!(many > 10 * few && few > none && none < 200 << 20, "{none} {few} {many}");
 }
 
-/// No rocks is a coverage of 0, not an error; an empty list is a plain.
+/// A coverage of 0 gives no rocks and is not an error; an empty list gives a plain; an empty window gives an empty patch.
 #[test]
-fn val_nothing_is_possible() {
+fn val_empty_worlds_and_windows_are_valid() {
     let bare = world(json!([{"kind": "rocks", "coverage": 0.0}]), 1).patch(&window(0, 0, 0, 50, 50));
     assert!(bare.class.iter().all(|c| *c == 0) && bare.heights.iter().all(|z| *z == 0.0));
     assert!(world(json!([]), 1).patch(&window(4, 0, 0, 9, 9)).heights.iter().all(|z| *z == 0.0));

@@ -1,4 +1,4 @@
-//! What a server asks for: samples in the middle of cells, without narrow features, of some of the processes, and no longer.
+//! Requests of a server: samples at cell centres, without narrow features, of selected processes, and cancelled.
 
 use super::*;
 use crate::planetary::craters::population::{Families, Near};
@@ -15,7 +15,7 @@ fn world_of(processes: Value, seed: u64, acts: impl Fn(usize) -> bool) -> World 
     assemble::Assembly::new(0.01, 20).with(&processes, &Streams::for_seed(seed, "terrain"), None, acts)
 }
 
-/// Samples in the middle of cells are those of the grid of half the spacing with both coordinates odd.
+/// Samples at cell centres are those of the grid of half the spacing with both coordinates odd.
 #[test]
 fn prop_centred_samples_are_samples() {
     let world = world(everything(), 1);
@@ -37,13 +37,13 @@ fn prop_centred_samples_are_samples() {
     }
 }
 
-/// Without a bound nothing is left out. With one the ground is that of a world without the narrow craters: wider ones, here above 3.2 m, are the
-/// same to the bit, since no bin holds diameters of both sides of it.
+/// Without a bound nothing is left out. With a bound the ground is that of a world without the narrow craters: wider ones, here above 3.2 m, are
+/// identical to the bit, because no bin contains diameters on both sides of the bound.
 #[test]
 fn prop_narrow_features_are_left_out_and_wide_ones_stay() {
     let craters = |least: f64| json!([{"kind": "texture"}, {"kind": "primary_craters", "density": 0.05, "diameter_min_m": least, "diameter_max_m": 400.0}]);
     let whole = world(craters(0.4), 3);
-    // Bins begin at a quarter of a power of 2 of the basic spacing: 0.0025 m 2^k.
+    // Bins start at a quarter of the basic spacing times a power of 2: 0.0025 m 2^k.
     let bound_m = 0.0025 * 1024.0;
     let area = window(3, -120, 40, 200, 150);
     assert_eq!(whole.patch_for(&request(area, 0.0)).unwrap(), whole.patch(&area));
@@ -52,7 +52,7 @@ fn prop_narrow_features_are_left_out_and_wide_ones_stay() {
     assert_ne!(bounded, whole.patch(&area));
 }
 
-/// Rocks wider than the bound stand where they stood.
+/// Rocks wider than the bound stay where they are.
 #[test]
 fn prop_wide_rocks_stay() {
     let whole = world(json!([{"kind": "texture"}, {"kind": "rocks", "coverage": 0.176}]), 5);
@@ -63,7 +63,7 @@ fn prop_wide_rocks_stay() {
     for k in 0..area.len() {
         assert!(wide.class[k] <= all.class[k] && wide.heights[k] <= all.heights[k]);
     }
-    // A share of the ground stays in line with the law: narrow rocks cover what the bound takes away.
+    // The coverage is consistent with the law: narrow rocks cover what the bound removes.
     let parameters = whole.rocks.as_ref().unwrap().0.parameters();
     let narrow = parameters.cover_below(0.176, 0.3);
     let measured = (count(&all) - count(&wide)) as f64 / (area.len() - count(&wide)) as f64;
@@ -71,33 +71,46 @@ fn prop_wide_rocks_stay() {
     assert_eq!(parameters.cover_below(0.176, 0.03), 0.0);
 }
 
-/// A process that does not act leaves the others as they are.
+/// What a server asks of a world before it generates anything.
 #[test]
-fn prop_the_others_do_not_change() {
+fn val_worlds_know_their_rocks_and_albedo() {
+    use crate::windows::Windows;
+    let bare = world(json!([{"kind": "texture"}]), 1);
+    assert!(!bare.has_rocks() && !bare.has_albedo());
+    assert_eq!(bare.rock_cover_below(0.118, 9.0), 0.0);
+    let full = world(json!([{"kind": "rocks"}, {"kind": "albedo"}]), 1);
+    assert!(full.has_rocks() && full.has_albedo());
+    let all = 0.118 * (libm::exp(-0.03 * (1.79 + 0.152 / 0.118)) - libm::exp(-5.0 * (1.79 + 0.152 / 0.118)));
+    assert!((full.rock_cover_below(0.118, 9.0) - all).abs() < 1e-12);
+}
+
+/// Leaving out a process does not change the others.
+#[test]
+fn prop_leaving_out_a_process_changes_no_other() {
     let area = window(2, -60, 10, 90, 80);
     let whole = world(everything(), 4).patch(&area);
     assert_eq!(world_of(everything(), 4, |_| true).patch(&area), whole);
-    // Without rocks, number 3: their places aside the ground is the same.
+    // Without rocks, number 3: except under them, the ground is the same.
     let bare = world_of(everything(), 4, |n| n != 3).patch(&area);
     assert!(bare.class.iter().all(|c| *c == 0) && whole.class.contains(&1));
     for k in (0..area.len()).filter(|k| whole.class[*k] == 0) {
         assert_eq!(bare.heights[k].to_bits(), whole.heights[k].to_bits());
         assert_eq!(bare.albedo[k].to_bits(), whole.albedo[k].to_bits());
     }
-    // The second craters alone are those that a list with the first as thin air has: the plane of each sees its own kind only.
+    // The second crater process alone: the plane of each crater sees craters of that process only.
     let alone = world_of(everything(), 4, |n| n == 4).patch(&area);
     assert!(alone.heights.iter().any(|z| *z != 0.0) && alone != whole);
-    // Secondaries of primaries that do not act are where they were.
+    // Secondaries keep their positions even if their primaries do not act.
     let secondaries = world_of(everything(), 4, |n| n == 5).patch(&window(6, -60, 10, 90, 80));
     assert!(secondaries.heights.iter().any(|z| *z < -0.05));
-    // Nothing acts: the ground is level.
+    // If nothing acts, the ground is level.
     assert!(world_of(everything(), 4, |_| false).patch(&area).heights.iter().all(|z| *z == 0.0));
 }
 
-/// A patch that takes many seconds ends soon after it is no longer wanted: within 2 s even where other programs keep the processor; 1 to 29 ms were
-/// seen.
+/// A patch that takes many seconds stops soon after cancellation: within 2 s even if other programs occupy the processor; 1 to 29 ms were
+/// observed.
 #[test]
-fn val_a_patch_can_be_stopped() {
+fn val_a_patch_can_be_cancelled() {
     let world = world(everything(), 6);
     let cancel = AtomicBool::new(false);
     let ended = std::thread::scope(|scope| {
@@ -116,7 +129,7 @@ fn val_a_patch_can_be_stopped() {
     assert!(ended < Duration::from_secs(2));
 }
 
-/// What is looked at on the way to a patch, by count: no fewer than the craters and rocks found, and fewer the wider they must be.
+/// The expected number of visits is at least the number of craters and rocks found, and falls as the bound on their width rises.
 #[test]
 fn val_expected_visits_follow_the_bound() {
     let whole = world(everything(), 7);
@@ -138,10 +151,10 @@ fn val_expected_visits_follow_the_bound() {
     assert_eq!(last, 0.0);
 }
 
-/// Samples of a tile, the planes of whose craters come from the craters that the tile knows, against each sample made alone, where every plane
-/// looks for its craters anew.
+/// Samples of a tile, whose crater planes use the craters in the tile's index, agree with samples generated one by one, where every plane
+/// searches for its craters itself.
 #[test]
-fn prop_tiles_agree_with_samples_made_alone() {
+fn prop_tiles_agree_with_single_samples() {
     let world = world(everything(), 9);
     for zoom in [0, 1, 3, 5, 7, 9, 11] {
         for bound in [0.0, 0.5, 2.0] {

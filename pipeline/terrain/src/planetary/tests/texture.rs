@@ -1,4 +1,4 @@
-//! Roughness over scales.
+//! Roughness across scales.
 
 use super::*;
 use sastrugi_roughness::{level, profile_spectra};
@@ -22,9 +22,9 @@ fn slope(grid: &Grid) -> f64 {
     sum(&|p| (p[0] - x) * (p[1] - y)) / sum(&|p| (p[0] - x) * (p[0] - x))
 }
 
-/// Spectra of profiles fall with -(2 H + 1), within 0.15, between 8 and 128 samples: shorter waves are lifted by the
-/// aliases that point samples have. One patch of 1024 x 1024 scatters by 0.015 (printed) about 0.05 to 0.07 less than H says, so that a
-/// right kernel fails with 1e-6 or so; an exponent of H + 1 or a missing level would be off by more than 0.3.
+/// PSDs of profiles have the slope -(2 H + 1), within 0.15, between 8 and 128 samples: point sampling raises shorter waves by
+/// aliasing. One patch of 1024 x 1024 scatters by 0.015 (printed) about a slope 0.05 to 0.07 less steep than H predicts, so a
+/// correct kernel fails with about 1e-6; an exponent of H + 1 or a missing level would be off by more than 0.3.
 #[test]
 fn stat_spectra_follow_the_hurst_exponent() {
     for hurst in [0.5, 0.7, 0.8, 0.9] {
@@ -36,8 +36,9 @@ fn stat_spectra_follow_the_hurst_exponent() {
     }
 }
 
-/// Root mean square difference of neighbours: 2.12 s1 d^H at H = 0.8 over a world with 20 levels (2.05 on fewer). Over 4000 places; half of the squares come from waves longer than 8 points, so that they scatter by
-/// about 1.5 % as one figure a place: 6 % is 5 standard errors of the root and more.
+/// RMS difference of neighbours: 2.12 s1 d^H at H = 0.8 in a world with 20 levels (2.05 with fewer). Over 4000 places. Half of the
+/// variance comes from waves longer than 8 points, so each place counts as one value and their mean square scatters by about 1.5 %: 6 % is
+/// at least 5 standard errors of the root.
 #[test]
 fn stat_neighbours_differ_as_specified() {
     let (world, mut places) = (texture(0.8, 7), Streams::for_seed(7, "texture").stream("places"));
@@ -53,7 +54,15 @@ fn stat_neighbours_differ_as_specified() {
     assert!((rms / 2.12 - 1.0).abs() < 0.06, "{rms}");
 }
 
-/// Every point is the mean of its parents and a draw; anchors are 0; no roughness is flat; twice the roughness is twice the height.
+/// The bilinear surface through the corners of the anchor square: corners, middles of the sides and the middle, by hand.
+#[test]
+fn val_base_slopes_are_bilinear() {
+    let corners = json!([{"kind": "base_slope", "corner_heights_m": [0.0, 3.0, -2.0, 7.0]}]);
+    let heights = world(corners, 1).patch(&window(19, 0, 0, 3, 3)).heights;
+    assert_eq!(heights, [0.0, 1.5, 3.0, -1.0, 2.0, 5.0, -2.0, 2.5, 7.0]);
+}
+
+/// Anchors are 0; zero roughness is flat; twice the roughness gives twice the height.
 #[test]
 fn prop_roughness_scales() {
     let at = |roughness: f64| {
@@ -66,7 +75,7 @@ fn prop_roughness_scales() {
     assert!(texture(0.7, 9).patch(&window(20, -2, -2, 5, 5)).heights.iter().all(|z| *z == 0.0));
 }
 
-/// On a slope the texture is the stochastic interpolation of the slope: both add.
+/// A texture on a slope is the stochastic interpolation of the slope: the two add up.
 #[test]
 fn prop_texture_adds_to_a_slope() {
     let slope = json!({"kind": "base_slope", "gradient": [0.3, -0.1]});
@@ -80,8 +89,8 @@ fn prop_texture_adds_to_a_slope() {
     assert!((flat[0] - (0.3 * x - 0.1 * y)).abs() < 1e-12);
 }
 
-/// Slope and intercept of the second differences over lags of 1 to 8 points, by which `elaborate` knows a texture. The mean squares of
-/// 4000 places scatter by 2 %, together over all lags: half slopes by 0.004, factors by half of that.
+/// Slope and intercept of the second differences over lags of 1 to 8 points, from which `elaborate` fits a texture. The mean squares of
+/// 4000 places scatter by 2 %, jointly over all lags: half slopes by 0.004, factors by half of that.
 #[test]
 fn stat_second_differences_are_those_of_the_fit() {
     const LAGS: usize = 8;
@@ -109,7 +118,7 @@ fn stat_second_differences_are_those_of_the_fit() {
         let [x, y] = [0, 1].map(|a| points.iter().map(|p| p[a]).sum::<f64>() / LAGS as f64);
         let (xy, xx) =
             points.iter().fold((0.0, 0.0), |(a, b), p| (a + (p[0] - x) * (p[1] - y), b + (p[0] - x) * (p[0] - x)));
-        let [half_slope, factor] = crate::elaborate::seen_through_the_lags(hurst);
+        let [half_slope, factor] = crate::elaborate::half_slope_and_factor(hurst);
         let ours = [0.5 * xy / xx, libm::exp(0.5 * (y - 2.0 * hurst * x)) / 0.02];
         eprintln!("H = {hurst}: {ours:.4?}, tables {half_slope:.4} {factor:.4}");
         assert!((ours[0] - half_slope).abs() < 0.01 && (ours[1] / factor - 1.0).abs() < 0.02);

@@ -1,6 +1,6 @@
-//! Direct sums at 60 digits, made independently (mpmath): row-major from the south-west post, phases n first.
+//! Direct sums to 60 digits, computed independently (mpmath): row-major from the south-west post, phases in order of n.
 
-/// Phases, n first, rad.
+/// Phases in order of n, rad.
 pub const FIRST_PHASES: [f64; 24] = [
     3.2158701122134374,
     5.971939531762716,

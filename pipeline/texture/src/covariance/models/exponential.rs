@@ -1,7 +1,7 @@
 //! Exponential covariance `B(rho) = sigma^2 exp(-rho / b)` (Vecherin et al., 2022, Eq. 9).
 //!
-//! A surface with it is continuous, but its slope is not defined: increments grow with the square root of distance
-//! (Hurst exponent 1/2). `b` is the distance at which the correlation falls to 1/e; the integral scale equals b, the
+//! A surface with this covariance is continuous, but its slope is undefined: increments grow with the square root of distance
+//! (Hurst exponent 1/2). `b` is the distance at which the correlation falls to 1/e. The integral scale equals b; the
 //! "effective range" of geostatistics (5 % correlation) is 3 b.
 
 use super::Model;
@@ -10,7 +10,7 @@ use sastrugi_schemas::kind::schema_of;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the exponential model as a fit file states them.
+/// Parameters of the exponential model in a fit file.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ExponentialParameters {

@@ -1,7 +1,7 @@
 //! Gaussian covariance `B(rho) = sigma^2 exp(-(rho / b)^2)`.
 //!
-//! A surface with it is smooth to all orders: rounded mounds of one size. `b` is the distance at which the correlation
-//! falls to 1/e; the integral scale is `b sqrt(pi) / 2`.
+//! A surface with this covariance is infinitely differentiable: rounded mounds of one size. `b` is the distance at which the
+//! correlation falls to 1/e; the integral scale is `b sqrt(pi) / 2`.
 
 use super::Model;
 use super::exponential::ExponentialParameters;

@@ -10,7 +10,7 @@ use sastrugi_schemas::kind::schema_of;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the Matern model as a fit file states them.
+/// Parameters of the Matern model in a fit file.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct MaternParameters {
@@ -48,16 +48,16 @@ impl Model for Matern {
 /// Aliases summed one by one on each side of each wavenumber.
 const ALIASES: i32 = 4;
 
-/// Eigenvalue of the covariance of unit variance on cells of `cell_m`, at an angular wavenumber `[east, north]` in rad per
-/// m, for a covariance whose long axis lies at `axis = [sin, cos]` of the azimuth and whose range across is `ratio` times that
-/// along: the spectral density `nu b^2 / pi (1 + b^2 k^2)^(-nu - 1)` with what is above half a wave per cell folded back, the far
-/// part of it as an integral. Positive whatever the torus, unlike the transform of a covariance cut to it.
+/// Eigenvalue of a covariance of unit variance on cells of `cell_m`, at an angular wavenumber `[east, north]` in rad per
+/// m, for a covariance whose long axis has `[sin, cos]` of the azimuth and whose range across is `ratio` times the range
+/// along: the spectral density `nu b^2 / pi (1 + b^2 k^2)^(-nu - 1)`, with wavenumbers above half a wave per cell folded back (the
+/// far ones as an integral). Always positive, unlike the transform of a covariance truncated to a torus.
 pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2], [sin, cos]: [f64; 2], ratio: f64) -> f64 {
     use std::f64::consts::PI;
     let b2 = range_m * range_m;
     let density = |k2: f64| {
         let q = 1.0 + b2 * k2;
-        // An exponential needs no power.
+        // The exponential needs no power function.
         if nu == 0.5 { 1.0 / (q * q.sqrt()) } else { libm::exp(-(nu + 1.0) * libm::log(q)) }
     };
     let turn = cell_m.map(|c| 2.0 * PI / c);
@@ -65,12 +65,12 @@ pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2], [sin, co
         .flat_map(|i| (-ALIASES..=ALIASES).map(move |j| [f64::from(i), f64::from(j)]))
         .map(|[i, j]| {
             let [x, y] = [k[0] + i * turn[0], k[1] + j * turn[1]];
-            // Across the long axis distances are stretched by 1 / ratio, wavenumbers shrunk.
+            // Across the long axis distances are stretched by 1 / ratio, and wavenumbers shrunk.
             let (along, across) = (x * sin + y * cos, (x * cos - y * sin) * ratio);
             density(along * along + across * across)
         })
         .sum();
-    // Beyond a square of as many wavenumbers as a circle of this radius.
+    // Beyond the summed aliases, replaced by a circle of equal area and this squared radius.
     let radius2 = (2.0 * f64::from(ALIASES) + 1.0) * (2.0 * f64::from(ALIASES) + 1.0) * turn[0] * turn[1] / PI;
     let far = libm::exp(-nu * libm::log1p(b2 * radius2 * ratio));
     near * ratio * nu * b2 / PI * turn[0] * turn[1] + far
@@ -78,7 +78,7 @@ pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2], [sin, co
 
 /// Ratio below which the correlation is taken as 1.
 const RATIO_MIN: f64 = 1e-140;
-/// Ratio above which the correlation is 0.
+/// Ratio above which the correlation is taken as 0.
 const RATIO_MAX: f64 = 700.0;
 
 fn correlation(x: f64, nu: f64) -> f64 {
@@ -99,7 +99,7 @@ const TERMS: usize = 10_000;
 const ROUNDING: f64 = 1e-16;
 
 /// Modified Bessel function of the second kind `K_nu(x)`, nu >= 0, x > 0: Temme's series (1975) for `x < 2`, Steed's
-/// continued fraction (Thompson and Barnett, 1987) beyond, at an order in [-1/2, 1/2], then forward recurrence. Relative
+/// continued fraction (Thompson and Barnett, 1987) otherwise, at an order in [-1/2, 1/2], then forward recurrence. Relative
 /// error about 1e-14.
 pub fn bessel_k(nu: f64, x: f64) -> f64 {
     let steps = (nu + 0.5) as usize;
@@ -183,7 +183,7 @@ const EULER_GAMMA: f64 = 0.577_215_664_901_532_9;
 mod tests {
     use super::*;
 
-    /// `K_nu(x)` with mpmath at 30 digits.
+    /// `K_nu(x)`, computed with mpmath at 30 digits.
     #[rustfmt::skip]
     const BESSEL: [(f64, f64, f64); 12] = [
         (0.05, 1e-06, 15.115528569478292),
@@ -208,7 +208,7 @@ mod tests {
         }
     }
 
-    /// Against the transform of the covariance itself on a torus of 40 ranges, where nothing is cut.
+    /// Against the transform of the covariance itself on a torus of 40 ranges, where truncation is negligible.
     #[test]
     fn val_eigenvalues_are_the_transform() {
         let (n, cell) = (200, 0.2);

@@ -14,20 +14,20 @@ pub trait Model: Sync {
     fn kind(&self) -> Kind;
 
     /// Correlation at a distance of `ratio = rho / b >= 0`; 1 at 0 (self-affine: see there). `shape` is the value of
-    /// [`Model::shape`], and means nothing to a model without one.
+    /// [`Model::shape`], and is ignored by a model without one.
     fn correlation(&self, ratio: f64, shape: f64) -> f64;
 
-    /// The parameter beside sigma and b that bends the curve.
+    /// The shape parameter, if the model has one in addition to sigma and b.
     fn shape(&self) -> Option<Shape> {
         None
     }
 
-    /// True when the correlation falls from 1 in a straight line: then sigma^2 / b is the short-range slope, up to a factor.
+    /// True if the correlation falls linearly from 1: then sigma^2 / b is the short-range slope, up to a factor.
     fn is_linear_at_origin(&self) -> bool {
         false
     }
 
-    /// Names of sigma and b in fit files; no b for a model without a scale of its own.
+    /// Names of sigma and b in fit files; no b for a model without a characteristic scale.
     fn scale_names(&self) -> (&'static str, Option<&'static str>) {
         ("sigma_m", Some("range_m"))
     }
@@ -48,10 +48,10 @@ pub struct Shape {
 pub static MODELS: [&dyn Model; 5] =
     [&exponential::Exponential, &gaussian::Gaussian, &spherical::Spherical, &matern::Matern, &self_affine::SelfAffine];
 
-/// The model of that name.
+/// The model called `name`.
 ///
 /// # Errors
-/// An unknown name, with the known ones.
+/// An unknown name; the message lists the known ones.
 pub fn model(name: &str) -> Result<&'static dyn Model, ParameterError> {
     MODELS.into_iter().find(|m| m.kind().kind == name).ok_or_else(|| {
         let known: Vec<&str> = MODELS.iter().map(|m| m.kind().kind).collect();
@@ -59,8 +59,8 @@ pub fn model(name: &str) -> Result<&'static dyn Model, ParameterError> {
         ParameterError::new(
             "model",
             format!(
-                "is `{name}`; it is one of {known}, a sum of two (`exponential+gaussian`), with `+nugget` after it or \
-                 `anisotropic:` before it where wanted"
+                "is `{name}`; it must be one of {known}, or a sum of two (`exponential+gaussian`), optionally followed by \
+                 `+nugget` or preceded by `anisotropic:`"
             ),
         )
     })

@@ -1,7 +1,7 @@
-//! Self-affine (power) surface: increments over a distance rho have the variance `D(rho) = s^2 (rho / 1 m)^(2 H)`.
+//! Self-affine (power-law) surface: increments over a distance rho have the variance `D(rho) = s^2 (rho / 1 m)^(2 H)`.
 //!
-//! It has no variance and no covariance: its heights wander ever further. What stands for the covariance is `-D / 2`
-//! (Matheron, 1973), and every weighting that sums to zero, as that of the moving average's residual does, turns it into a
+//! It has no finite variance and no covariance: its heights drift without limit. The generalised covariance is `-D / 2`
+//! (Matheron, 1973). Any weights that sum to zero, such as those of the moving average's residual, turn it into a
 //! true covariance. H in (0, 1) is the Hurst exponent; the fractal dimension is 3 - H.
 
 use super::{Model, Shape};
@@ -10,7 +10,7 @@ use sastrugi_schemas::kind::schema_of;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Parameters of the self-affine model as a fit file states them.
+/// Parameters of the self-affine model in a fit file.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct SelfAffineParameters {

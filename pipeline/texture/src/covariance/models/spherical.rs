@@ -1,6 +1,6 @@
 //! Spherical covariance `B(rho) = sigma^2 (1 - 3/2 rho / b + 1/2 (rho / b)^3)` for `rho < b`, 0 beyond.
 //!
-//! Cells further apart than b know nothing of each other; near zero it falls linearly, as the exponential does.
+//! Cells further apart than b are uncorrelated; near zero it falls linearly, like the exponential.
 
 use super::Model;
 use super::exponential::ExponentialParameters;

@@ -1,4 +1,4 @@
-//! Noise of the measurement beside the texture.
+//! Fits of textures with measurement noise.
 
 use super::*;
 use crate::covariance::filtered::Measurement;
@@ -8,7 +8,7 @@ const TRUTH: Noise = Noise { white_sigma_m: 0.01, correlated_sigma_m: 0.02, corr
 const SIGMA_M: f64 = 0.05;
 const RANGE_M: f64 = 0.28;
 
-/// A measured field on ground that rises by `slope` eastwards.
+/// A measured field on ground that rises eastwards by `slope`.
 fn measured(noise: Noise, slope: f64, seed: u64) -> Grid {
     let cells = 256;
     let truth = covariance("exponential", &[("sigma_m", SIGMA_M), ("range_m", RANGE_M)]);
@@ -26,7 +26,7 @@ fn noisy(model: &str) -> FitSettings {
 /// Stated correlated noise is removed: means of 16 fields on a slope of 20 %. One field scatters by 2.3 % in sigma and 5.5 % in b, so
 /// four standard errors are 2.3 % and 5.5 %. Without the statement sigma comes out about a tenth too large.
 #[test]
-fn stat_correlated_noise_is_taken_off() {
+fn stat_correlated_noise_is_removed() {
     let found: Vec<[f64; 3]> = (0..16u64)
         .into_par_iter()
         .map(|seed| {
@@ -43,8 +43,8 @@ fn stat_correlated_noise_is_taken_off() {
     assert!(bias[2] > 0.05, "{bias:?}");
 }
 
-/// The measured covariance is stored without the noise: mean over 16 fields of its standard deviation beside that of the same
-/// surfaces without noise, four standard errors as above.
+/// The measured covariance is stored without the noise: mean over 16 fields of its standard deviation over that of the same
+/// surfaces without noise; four standard errors as above.
 #[test]
 fn stat_a_covariance_map_has_no_noise() {
     let sigma = |dem: &Grid, settings: &FitSettings| {
@@ -63,7 +63,7 @@ fn stat_a_covariance_map_has_no_noise() {
     assert!((mean - 1.0).abs() < 0.02, "{mean}");
 }
 
-/// Blocks of one site have the site's sigma on average, whatever its noise.
+/// Blocks of one site have the site's sigma on average, whatever the noise.
 #[test]
 fn stat_local_maps_have_no_noise() {
     let dem = measured(TRUTH, 0.0, 7);
@@ -75,7 +75,7 @@ fn stat_local_maps_have_no_noise() {
     assert!((sigma_m / site_m - 1.0).abs() < 4.0 * maps.sigma_error / 4.0 + 0.01, "{sigma_m} {site_m}");
 }
 
-/// Noise that leaves nothing for a texture, or is not stated whole, is refused by name.
+/// Noise that leaves nothing for a texture, or is incomplete, is refused with the parameter's name.
 #[test]
 fn val_impossible_noise_is_refused() {
     let key = |noise: [f64; 3]| {
@@ -102,9 +102,9 @@ fn val_impossible_noise_is_refused() {
     assert!(refused.contains("m of noise in the residual"), "{refused}");
 }
 
-/// A texture of the truth reproduces the residual but for its noise: both kinds of fit say so.
+/// A texture with the true covariance reproduces the residual except for its noise; both kinds of fit report this.
 #[test]
-fn val_noise_is_no_part_of_what_a_texture_reproduces() {
+fn val_noise_does_not_count_in_what_a_texture_reproduces() {
     let dem = measured(TRUTH, 0.0, 3);
     for model in ["exponential", "empirical"] {
         let carried = fit(&dem, &noisy(model), &streams()).unwrap().fit.carried.unwrap();

@@ -1,4 +1,4 @@
-//! Fits on slopes: as on level ground, in any direction, with holes and trees.
+//! Fits on slopes give the same as on level ground, in any direction, with holes and trees.
 
 use super::*;
 use sastrugi_roughness::background::BoxWindow;
@@ -8,7 +8,8 @@ use std::f64::consts::TAU;
 pub const TRUTH: [f64; 2] = [0.05, 0.28];
 const SIDE: usize = 256;
 
-/// The field of a seed on a slope (rise over run) that falls towards an azimuth, with an undulation of 0.3 m over 40 m along it.
+/// The field of a seed on a slope (rise over run) that falls towards an azimuth, with an undulation of 0.3 m amplitude and 40 m
+/// wavelength along it.
 fn sloping(seed: u64, slope: f64, azimuth_deg: f64) -> Grid {
     let dem = field(TRUTH[1], SIDE, CELL_M, seed);
     let g = dem.geometry;
@@ -20,7 +21,7 @@ fn sloping(seed: u64, slope: f64, azimuth_deg: f64) -> Grid {
     Grid::new(g, (0..dem.values.len()).map(height).collect())
 }
 
-/// A field of the table for a seed: four slopes, eight azimuths, every other one with holes.
+/// The field of the table for a seed: four slopes, eight azimuths, every other one with holes.
 pub fn of_table(seed: u64) -> Grid {
     let slope = [0.0, 0.2, 0.5, 1.0][(seed / 2 % 4) as usize];
     let mut dem = sloping(seed, slope, 45.0 * (seed / 8 % 8) as f64 + 11.0);
@@ -30,7 +31,7 @@ pub fn of_table(seed: u64) -> Grid {
     dem
 }
 
-/// Six cones of 0.5 m height and 0.6 m radius.
+/// Adds six cones of 0.5 m height and 0.6 m radius.
 fn with_trees(dem: &mut Grid, seed: u64) {
     let mut s = Streams::for_seed(seed, "fit-test").stream("trees");
     let g = dem.geometry;
@@ -43,7 +44,7 @@ fn with_trees(dem: &mut Grid, seed: u64) {
     }
 }
 
-/// 15 % of the cells, at random.
+/// Removes 15 % of the cells at random.
 fn with_holes(dem: &mut Grid, seed: u64) {
     let mut s = Streams::for_seed(seed, "fit-test").stream("holes");
     dem.values.iter_mut().filter(|_| s.uniform() < 0.15).for_each(|z| *z = f64::NAN);
@@ -57,7 +58,7 @@ fn with_trees_and_holes(dem: &mut Grid, seed: u64) {
 const CONDITIONS: [(&str, Spoil); 4] =
     [("bare", untouched), ("holes", with_holes), ("trees", with_trees), ("trees, holes", with_trees_and_holes)];
 
-/// Relative errors of sigma and b on a slope, and less those of the same field on level ground, in percent.
+/// Relative errors of sigma and b on a slope, in percent, and the same minus those of the same field on level ground.
 fn errors(slope: f64, seeds: std::ops::Range<u64>, spoil: Spoil) -> Vec<[[f64; 2]; 2]> {
     let s = settings(Mode::Corrected, 2.0, 0.05);
     seeds
@@ -81,8 +82,8 @@ fn mean(errors: &[[[f64; 2]; 2]], which: usize, parameter: usize) -> [f64; 2] {
     [sums::mean(&values), (sums::variance(&values) / values.len() as f64).sqrt()]
 }
 
-/// The table of slopes and conditions from so many fields each; the bias of every condition over all slopes lies within
-/// `bias` percent of the truth, the mean paired difference of every slope within `paired` percent.
+/// The table of slopes and conditions with `fields` fields each; asserts that the bias of every condition over all slopes is within
+/// `bias` percent, and the mean paired difference of every slope within `paired` percent.
 fn table(fields: u64, bias: [f64; 2], paired: [f64; 2]) {
     let mut seed = 1000;
     for (condition, spoil) in CONDITIONS {
@@ -115,24 +116,24 @@ fn table(fields: u64, bias: [f64; 2], paired: [f64; 2]) {
 }
 
 /// Null: slopes change nothing. 2 fields for each of 20 cells of the table: one field scatters by 2.2 % and 4.9 %, so that the
-/// mean of 10 errs by 0.7 % and 1.5 %; limits of 3.4 % and 8 % are about five of these (1e-6). What slopes do shows in the paired
-/// differences: they were 6 and 13 % at 10 %, and beyond all measure at 50 %.
+/// mean of 10 has a standard error of 0.7 % and 1.5 %; limits of 3.4 % and 8 % are about five of these (1e-6). The effect of slopes
+/// shows in the paired differences: with the former background they were 6 and 13 % at 10 %, and useless at 50 %.
 #[test]
 fn stat_slopes_do_not_bias_the_fit() {
     table(2, [3.4, 8.0], [0.1, 0.2]);
 }
 
-/// 2080 fields in all. Standard error of a condition (520 fields) 0.10 % and 0.21 %: without any bias limits of 0.5 % and
-/// 1 % are five of these (1e-6). At this size the estimator itself is off by about -0.2 % and -0.5 %, on level ground as on slopes.
+/// 2080 fields in all. Standard error of a condition (520 fields) 0.10 % and 0.21 %: without bias, limits of 0.5 % and
+/// 1 % are five of these (1e-6). At this size the estimator itself has a bias of about -0.2 % and -0.5 %, on level ground as on slopes.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_fits_on_slopes_are_unbiased() {
     table(104, [0.5, 1.0], [0.1, 0.2]);
 }
 
-/// Steep ground is no object: none of its cells is left out, and six trees on it are.
+/// Steep ground is not an object: none of its cells is left out, whereas six trees on it are.
 #[test]
-fn val_objects_are_not_taken_from_steep_ground() {
+fn val_steep_ground_is_not_an_object() {
     let s = settings(Mode::Corrected, 2.0, 0.05);
     let left_out = |slope: f64, spoil: Spoil| {
         let mut dem = sloping(7, slope, 30.0);
@@ -147,10 +148,10 @@ fn val_objects_are_not_taken_from_steep_ground() {
     }
 }
 
-/// A plane has no texture. A paraboloid that bends by c leaves `-c h (h + 1) / 3` both ways where windows are complete (h half a window in
-/// cells), and no more than that where they are not.
+/// A plane has no texture. A paraboloid of curvature c leaves `-c h (h + 1) / 3` for both directions together where windows are complete (h
+/// half a window in cells), and no more than that where they are not.
 #[test]
-fn val_planes_leave_nothing_and_paraboloids_their_bend() {
+fn val_planes_leave_nothing_and_paraboloids_their_curvature() {
     let s = settings(Mode::Corrected, 2.0, 0.05);
     let plane = Grid::new(
         Geometry::square(SIDE, SIDE, CELL_M),
@@ -158,21 +159,21 @@ fn val_planes_leave_nothing_and_paraboloids_their_bend() {
     );
     assert!(matches!(Case::new(&plane, &s).err(), Some(FitError::Constant { .. })));
 
-    let bend = 1e-3;
-    let part = |k: usize| (k as f64 - 100.0) * (k as f64 - 100.0) * 0.5 * bend;
+    let curvature = 1e-3;
+    let part = |k: usize| (k as f64 - 100.0) * (k as f64 - 100.0) * 0.5 * curvature;
     let height = |k: usize| part(k % SIDE) + part(k / SIDE) + if k % 11 == 3 && k > 30_000 { f64::NAN } else { 0.0 };
     let values: Vec<f64> = (0..SIDE * SIDE).map(height).collect();
     let residual = residual::residual(&values, SIDE, &s, BoxWindow { half: [16, 16] });
-    let complete = -bend * 16.0 * 17.0 / 3.0;
+    let complete = -curvature * 16.0 * 17.0 / 3.0;
     let inner = residual[60 * SIDE + 60];
     assert!((inner - complete).abs() < 1e-12, "{inner} {complete}");
     let worst = residual.iter().filter(|r| !r.is_nan()).fold(0.0, |m, r| f64::max(m, r.abs()));
     assert!(worst <= 1.01 * complete.abs(), "{worst} {complete}");
 }
 
-/// Transects that climb are fitted as level ones: their ends and gaps are partial windows too.
+/// Climbing transects give the same fit as level ones; their ends and gaps are partial windows too.
 #[test]
-fn val_transects_may_climb() {
+fn val_climbing_transects_give_the_same_fit() {
     let fit = |slope: f64| {
         let dem = field(TRUTH[1], SIDE, CELL_M, 3);
         let row = |r: usize| {

@@ -1,16 +1,16 @@
 //! Random field from the Cholesky factor of its covariance matrix.
 //!
-//! `z = L f`, f independent standard normal values, one per cell, and `L L' = C` the lower factor of the matrix of
-//! covariances of all pairs of cells. Exact on average on any grid, for any covariance, and in no need of a torus: hence not
+//! `z = L f`, f independent standard normal values, one per cell, and L the lower Cholesky factor, `L L' = C`, of the matrix of
+//! covariances of all pairs of cells. Exact on average on any grid, for any covariance. It needs no torus and is not
 //! periodic.
 //!
-//! Source: Vecherin et al. 2022, section 3.2. The factor is made in blocks of 64 cells, column of blocks by column of
-//! blocks; each element is the same sum in the same order on any number of threads. Each cell has 1e-9 of the variance more than
-//! it should: smooth covariances on fine grids are singular to rounding, and a factor without it is not stable.
+//! Source: Vecherin et al. 2022, section 3.2. The factor is computed in blocks of 64 cells, one column of blocks at a
+//! time; each element is the same sum in the same order on any number of threads. 1e-9 of the variance is added to each cell:
+//! smooth covariances on fine grids are singular to rounding, and the factorisation would be unstable without it.
 //!
-//! Cost, for N cells: `N^3 / 3` operations, `4 N^2` bytes (half of the matrix). 100 x 100 cells are a matrix of 0.8 GB, 0.4 GB
-//! of it kept; more than [`CELLS_MAX`] cells are refused before anything is done. [`super::fft_ma`] gives the same fields at a
-//! millionth of the cost; this is the reference beside it.
+//! Cost, for N cells: `N^3 / 3` operations, `4 N^2` bytes (half of the matrix). 100 x 100 cells give a matrix of 0.8 GB, of which
+//! 0.4 GB are stored; more than [`CELLS_MAX`] cells are refused at once. [`super::fft_ma`] gives equivalent fields at a
+//! millionth of the cost; this method is the reference for it.
 
 use super::tile::{self, Tile};
 use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted};
@@ -24,12 +24,12 @@ use std::sync::OnceLock;
 
 /// Most cells: 100 x 100, a matrix of 0.8 GB.
 pub const CELLS_MAX: usize = 10_000;
-/// Cells per block: a block of 32 kB stays in the first cache.
+/// Cells per block: a block of 32 kB fits into the level-1 cache.
 const BLOCK: usize = 64;
 /// White variance added, as a share of the variance.
 const JITTER: f64 = 1e-9;
 
-/// A Cholesky texture has no parameters beside those of its tile.
+/// A Cholesky texture has no parameters other than those of its tile.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct CholeskyParameters {}
@@ -38,7 +38,7 @@ pub struct CholeskyParameters {}
 pub struct Cholesky {
     covariance: Covariance,
     tile: Geometry,
-    /// Made once for all realisations.
+    /// Computed once for all realisations.
     factor: OnceLock<Factor>,
 }
 
@@ -68,8 +68,8 @@ impl MethodParameters for CholeskyParameters {
         }
         let gigabytes = 8e-9 * cells as f64 * cells as f64;
         let message = format!(
-            "gives {} x {} cells, a covariance matrix of {gigabytes:.1} GB; `cholesky` takes at most {CELLS_MAX} cells \
-             (0.8 GB), `fft_ma` any number",
+            "gives {} x {} cells, a covariance matrix of {gigabytes:.1} GB; `cholesky` supports at most {CELLS_MAX} cells \
+             (0.8 GB): use `fft_ma` for more",
             tile.geometry.cols, tile.geometry.rows
         );
         Err(ParameterError::new("size_m", message))
@@ -120,7 +120,7 @@ impl Kernel for Cholesky {
     fn notes(&self) -> Vec<String> {
         let gigabytes = 1e-9 * self.cost().memory_bytes as f64;
         vec![format!(
-            "the covariance matrix of {} cells takes {gigabytes:.3} GB; the field is not periodic",
+            "the covariance matrix of {} cells needs {gigabytes:.3} GB; the field is not periodic",
             self.tile.len()
         )]
     }
@@ -199,7 +199,7 @@ fn subtract_product(block: &mut [f64], a: &[f64], b: &[f64]) {
     }
 }
 
-/// Replaces a square block by its lower factor; the rest of it by 0.
+/// Replaces a square block by its lower factor, with 0 above the diagonal.
 fn factorise(block: &mut [f64]) {
     let n = side(block);
     for j in 0..n {
@@ -232,7 +232,7 @@ fn divide(block: &mut [f64], lower: &[f64]) {
     }
 }
 
-/// What is left of a column whose pivot is lost to rounding: nothing.
+/// `rest / pivot`; 0 if the pivot is lost to rounding.
 fn ratio(rest: f64, pivot: f64) -> f64 {
     if pivot > 0.0 { rest / pivot } else { 0.0 }
 }

@@ -15,8 +15,8 @@ fn kernel(size_px: [u32; 2], covariance: &Covariance) -> Result<Cholesky, Parame
     own.kernel(&tile, covariance, &covariance.clone().into())
 }
 
-/// `L L'` is the covariance matrix to 2e-9 of the variance (what is added to each cell), also where the last block is not
-/// full and where the matrix is singular to rounding.
+/// `L L'` is the covariance matrix to 2e-9 of the variance (the jitter added to each cell), even if the last block is not
+/// full or the matrix is singular to rounding.
 #[test]
 fn val_the_factor_reproduces_the_matrix() {
     for (size_px, name, tolerance) in
@@ -48,7 +48,7 @@ fn val_memory_is_stated_and_limited() {
     assert!(largest.notes()[0].contains("0.403 GB"), "{:?}", largest.notes());
 }
 
-/// One thread or many: the same bits.
+/// Results are identical to the bit for any number of threads.
 #[test]
 fn prop_threads_change_no_bit() {
     let (of_tile, own) = tile::read::<CholeskyParameters>(&json!({ "size_px": [17, 13] })).unwrap();

@@ -1,4 +1,4 @@
-//! What the covariance of a texture is of, and the spectrum that follows.
+//! Target covariances other than the model of the surface, and their spectra.
 
 use super::spectrum::Spectrum;
 use crate::covariance::Covariance;
@@ -10,23 +10,24 @@ use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::CovarianceMap;
 
-/// A cell that is a whole multiple of another is one to this relative precision.
+/// Relative tolerance for one cell size being a whole multiple of another.
 const MULTIPLE_TOLERANCE: f64 = 1e-6;
 
-/// A spectrum that is not that of a covariance model alone.
+/// A target that is not just a covariance model.
 #[derive(Clone)]
 pub enum Aim {
-    /// What a background over the window lacks of the model, on cells `times` finer (north-south and east-west) than the texture's.
+    /// The part of the model that a background over the window lacks, on cells `times` finer (north-south and east-west) than the
+    /// texture's.
     Residual { window: BoxWindow, times: [usize; 2] },
-    /// A measured covariance, on such cells: those it was measured on.
+    /// A measured covariance, on the cells it was measured on, also `times` finer.
     Empirical { map: Box<CovarianceMap>, window: BoxWindow, purpose: Purpose, times: [usize; 2] },
 }
 
 impl Aim {
-    /// What a fit and a purpose ask for; `None` where it is the model of the surface.
+    /// The target for a fit and a purpose; `None` if it is the model of the surface.
     ///
     /// # Errors
-    /// A fit without a window; cells that are no multiples of the measured ones.
+    /// A fit without a window; cells that are not multiples of the measured ones.
     pub fn of(wanted: &Wanted, purpose: Purpose, cell_m: [f64; 2]) -> Result<Option<Self>, ParameterError> {
         let window_at = |cell_m: [f64; 2]| {
             let [x_m, y_m] = wanted.window_m.ok_or_else(|| {
@@ -40,7 +41,7 @@ impl Aim {
             return match purpose {
                 Purpose::Surface => Ok(None),
                 Purpose::Residual => {
-                    // A window of a few coarse cells is not the fit's: cells no larger than the fit's show it.
+                    // A few coarse cells cannot represent the fit's window, so cells no larger than the fit's are used.
                     let fitted_m = wanted.cell_m.unwrap_or(cell_m);
                     let times = [1, 0].map(|k| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0));
                     let window = window_at([cell_m[0] / times[1], cell_m[1] / times[0]])?;
@@ -61,14 +62,14 @@ impl Aim {
         Ok(Some(Self::Empirical { map: map.clone(), window, purpose, times }))
     }
 
-    /// Cells computed with for each cell of the texture.
+    /// Number of computed cells per cell of the texture.
     pub fn oversampling(&self) -> usize {
         match self {
             Self::Residual { times, .. } | Self::Empirical { times, .. } => times[0] * times[1],
         }
     }
 
-    /// Sides, east-west and north-south, that a torus needs to hold the measured lags, m.
+    /// Sides, east-west and north-south, that a torus needs for the measured lags, m.
     pub fn torus_m(&self, cell_m: [f64; 2]) -> [f64; 2] {
         match self {
             Self::Residual { window, times } => window.size_m(finer(cell_m, *times)).map(|side| 2.0 * side),
@@ -79,18 +80,18 @@ impl Aim {
         }
     }
 
-    /// A periodic tile holds the measured lags.
+    /// Checks that a periodic tile is large enough for the measured lags.
     ///
     /// # Errors
-    /// One that is too small.
+    /// A tile that is too small.
     pub fn check_tile(&self, tile: &Geometry) -> Result<(), ParameterError> {
         let ([needed_x_m, needed_y_m], [x_m, y_m]) = (self.torus_m(tile.cell).map(tidy), tile.size().map(tidy));
         if matches!(self, Self::Residual { .. }) || (x_m >= needed_x_m && y_m >= needed_y_m) {
             return Ok(());
         }
         let message = format!(
-            "is {x_m} x {y_m} m; a periodic tile of this measured covariance is at least {needed_x_m} x {needed_y_m} m: take a larger one, \
-             or periodic = false"
+            "is {x_m} x {y_m} m; a periodic tile of this measured covariance must be at least {needed_x_m} x {needed_y_m} m: enlarge it, \
+             or set periodic = false"
         );
         Err(ParameterError::new("size_m", message))
     }
@@ -116,16 +117,17 @@ impl Aim {
     }
 }
 
-/// How many cells no larger than a fit's one of a texture's takes, for the spectrum of a residual or of a measured covariance.
+/// How many cells, each no larger than the fit's, make up one cell of the texture, for the spectrum of a residual or of a measured
+/// covariance.
 pub fn finest(cell_m: [f64; 2], fitted_m: [f64; 2]) -> u64 {
     let times = |k: usize| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0) as u64;
     times(0).saturating_mul(times(1))
 }
 
-/// How many cells of a measured covariance make one of a texture, north-south and east-west.
+/// How many cells of a measured covariance make up one cell of a texture, north-south and east-west.
 ///
 /// # Errors
-/// Cells that are no whole multiples of the measured ones.
+/// Cells that are not whole multiples of the measured ones.
 pub fn multiples(cell_m: [f64; 2], measured_m: [f64; 2]) -> Result<[usize; 2], ParameterError> {
     let ratio = [1, 0].map(|k| cell_m[k] / measured_m[k]);
     let times = ratio.map(|r| r.round().max(1.0));
@@ -139,25 +141,25 @@ pub fn multiples(cell_m: [f64; 2], measured_m: [f64; 2]) -> Result<[usize; 2], P
     Ok(times.map(|t| t as usize))
 }
 
-/// Cells of which `times` (north-south and east-west) make one.
+/// Size of the cells of which `times` (north-south and east-west) make up one.
 fn finer(cell_m: [f64; 2], times: [usize; 2]) -> [f64; 2] {
     [0, 1].map(|k| cell_m[k] / times[1 - k] as f64)
 }
 
-/// The spectrum of every `times[0]`-th row and `times[1]`-th column: the mean over the modes that look alike on them.
+/// The spectrum of every `times[0]`-th row and `times[1]`-th column: the mean over the modes that alias onto each other.
 fn folded(fine: &HalfSpectrum, values: Vec<f64>, times: [usize; 2]) -> Vec<f64> {
     if times == [1, 1] {
         return values;
     }
     let (rows, cols) = (fine.rows / times[0], fine.cols / times[1]);
-    // Modes beyond the half are those opposite.
+    // Modes beyond the stored half equal the opposite ones.
     let at = |ky: usize, kx: usize| match 2 * kx > fine.cols {
         true => values[(fine.cols - kx) * fine.rows + (fine.rows - ky) % fine.rows],
         false => values[kx * fine.rows + ky],
     };
     let mean = |kx: usize, ky: usize| {
-        let alike = (0..times[0]).flat_map(|i| (0..times[1]).map(move |j| (ky + i * rows, kx + j * cols)));
-        alike.map(|(ky, kx)| at(ky, kx)).sum::<f64>() / (times[0] * times[1]) as f64
+        let aliases = (0..times[0]).flat_map(|i| (0..times[1]).map(move |j| (ky + i * rows, kx + j * cols)));
+        aliases.map(|(ky, kx)| at(ky, kx)).sum::<f64>() / (times[0] * times[1]) as f64
     };
     (0..=cols / 2).flat_map(|kx| (0..rows).map(move |ky| (kx, ky))).map(|(kx, ky)| mean(kx, ky)).collect()
 }

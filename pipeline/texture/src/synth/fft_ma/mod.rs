@@ -1,37 +1,41 @@
 //! FFT moving average: a random field from the square root of its spectrum.
 //!
 //! `z = IDFT[ sqrt(lambda M) Q ]`, `lambda = DFT(C)` the spectrum of the covariance C on a torus of M cells, every lag
-//! taken the short way round, and Q random with `Q(-k)` the conjugate of `Q(k)`:
+//! taken the shorter way around, and Q random with `Q(-k)` the conjugate of `Q(k)`:
 //! * `phase = "unit"`: `Q = exp(i theta)`, theta uniform (\[P\], section 3.3). The covariance of the field on the torus,
 //!   `1 / M * sum of z(i) z(i + h)`, is C(h) in every realisation.
-//! * `phase = "gaussian"`: Q complex normal. The field is a normal one, and its covariance is C on average only.
+//! * `phase = "gaussian"`: Q complex normal. The field is normal, and its covariance is C only on average.
 //!
 //! Source: \[P\] = Vecherin et al. 2022, Eqs. 11 and 12; Oliver 1995, Mathematical Geology 27, 939. Departures from \[P\]:
 //! * the spectrum is the DFT of the covariance, not Eq. 10 sampled: Eq. 10 lacks a factor 2 pi under the paper's own
 //!   Eqs. 8 and 11, and sampled at the wavenumbers of a grid it loses 2 to 10 % of the variance;
 //! * the mean over the tile is not removed: the mode at k = 0 belongs to the covariance.
 //!
-//! `spectrum = "eq10"` takes that equation (with its 2 pi) after all, for comparison: isotropic exponentials only, and its
+//! `spectrum = "eq10"` uses that equation (with its 2 pi) for comparison: isotropic exponentials only, and the
 //! loss of variance is reported.
 //!
-//! Covariances of any model, sums, nugget, anisotropy at any azimuth, oblong cells. A self-affine one is made as its
-//! stationary twin (see [`super::tile`]).
+//! Supports covariances of any model, sums, nugget, anisotropy at any azimuth, oblong cells. A self-affine covariance is replaced by
+//! its stationary counterpart (see [`super::tile`]).
 //!
-//! A covariance cut to a torus may have negative eigenvalues (none found for an exponential on a side of 14 ranges or more;
-//! at 10 ranges 2e-6 on 400 cells, 2e-5 on 2000). They are set to 0 when they are at most [`CLIP_SHARE_MAX`] of the
-//! spectrum; the largest error of the covariance is then their sum over M (it is largest at lag 0), and is reported.
+//! A covariance truncated to a torus may have negative eigenvalues (none found for an exponential on a side of 14 ranges or more;
+//! at 10 ranges 2e-6 on 400 cells, 2e-5 on 2000). They are set to 0 if they are at most [`CLIP_SHARE_MAX`] of the
+//! spectrum; the largest error of the covariance, at lag 0, is then their sum over M, and is reported.
 //! Otherwise `periodic = true` is refused.
 //!
-//! `periodic = true`: the tile is the torus and repeats without seams. `periodic = false`: the field is cut from a torus
-//! at least twice as wide (so that no lag within the crop goes the other way round) and wide enough for the covariance
+//! `periodic = true`: the tile is the torus and repeats without seams. `periodic = false`: the field is cropped from a torus
+//! at least twice as wide (so that no lag within the crop wraps around) and wide enough for the covariance
 //! ([`super::reach`]: 16 ranges of an exponential).
 //!
-//! Unit phases are exact on the whole torus only. Crops scatter like any sample, and the spread over an ensemble of
+//! Unit phases are exact only on the complete torus. Crops scatter like any sample, and the spread over an ensemble of
 //! unit-phase tiles is too small: Monte Carlo work needs `gaussian`.
 //!
-//! Cost: a quarter of a complex transform for the spectrum (half of one where the axes of anisotropy are not the grid's),
-//! half of one for the field, a square root and a phase per mode. Memory: 11 bytes per torus cell,
-//! 17 where the axes of anisotropy are not the grid's.
+//! Cost: a quarter of a complex transform for the spectrum (half of one if the axes of anisotropy are not the grid's),
+//! half of one for the field, a square root and a phase per mode.
+//!
+//! Memory at the peak, per torus cell: 10 bytes, of which 2 are a quarter of the spectrum and 8 the field, transformed where it
+//! lies; 16 if the axes of anisotropy are not the grid's, while the covariance (8) and its half transform (8) are there. With the buffers of
+//! the threads 175 MB were measured for 4096 x 4096 cells, 10.4 bytes each. A cost states 18 for both, which leaves room for those buffers
+//! on small tori, and 8 more for each cell of the tile (`tests/memory.rs`).
 
 mod aim;
 mod spectrum;
@@ -49,19 +53,19 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use spectrum::Spectrum;
 
-/// Negative share of the spectrum that is set to 0; more is refused.
+/// Largest negative share of the spectrum that is set to 0; more is refused.
 pub const CLIP_SHARE_MAX: f64 = 1e-6;
-/// A tile of fewer ranges is worth a note.
+/// Width of a tile, in ranges, below which it is noted.
 const TILE_RANGES_NOTE: f64 = 4.0;
-/// Share of the variance continued by the model that is worth a note of its own.
+/// Share of the variance extrapolated by the model above which it is noted.
 const CONTINUED_SHARE_NOTE: f64 = 0.5;
-/// Bytes per torus cell while a field is made.
+/// Bytes per torus cell during the synthesis of a field: an upper bound of the 10 or 16 of the module header.
 const BYTES_PER_CELL: u64 = 18;
 
-/// The same while the spectrum of a residual or of a measured covariance is made.
+/// The same during the computation of the spectrum of a residual or of a measured covariance.
 const AIM_BYTES_PER_CELL: u64 = 40;
 
-/// Transforms and roots of a texture with such a spectrum, over those of another.
+/// Operations of a texture with such a spectrum, relative to any other.
 const AIM_SPECTRA: f64 = 3.0;
 
 /// Random part of the spectrum.
@@ -75,7 +79,7 @@ pub enum Phase {
     Gaussian,
 }
 
-/// Where the eigenvalues come from.
+/// Source of the eigenvalues.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum SpectrumOf {
@@ -86,18 +90,18 @@ pub enum SpectrumOf {
     Eq10,
 }
 
-/// What the covariance is of.
+/// What the covariance describes.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CovarianceOf {
-    /// The surface: for flat or synthetic ground.
+    /// The surface: for textures on flat or synthetic ground.
     #[default]
     Surface,
-    /// What the background over the fit's window lacks of it: for laying a texture on a measured background.
+    /// The part of the surface that the background over the fit's window lacks: for textures on a measured background.
     Residual,
 }
 
-/// Raw parameters of an FFT-MA texture, beside those of its tile.
+/// Raw parameters of an FFT-MA texture, without those of its tile.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct FftMaParameters {
@@ -105,10 +109,10 @@ pub struct FftMaParameters {
     pub phase: Phase,
     /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
-    /// `covariance` (default) or `eq10` (an isotropic exponential as published, which loses variance).
+    /// `covariance` (default) or `eq10` (the published spectrum of an isotropic exponential, which loses variance).
     pub spectrum: SpectrumOf,
-    /// `surface` (the fit's covariance) or `residual` (what a moving average over the fit's window leaves out of it, so that a
-    /// measured background and the texture together have that covariance). Default: `residual` on a measured DEM, else `surface`.
+    /// `surface` (the fit's covariance) or `residual` (the part of it that a moving average over the fit's window lacks, so that a
+    /// measured background and the texture together have that covariance). Default: `residual` on a measured DEM, otherwise `surface`.
     pub covariance: CovarianceOf,
 }
 
@@ -122,7 +126,7 @@ impl Default for FftMaParameters {
 pub struct FftMa {
     parameters: FftMaParameters,
     covariance: Covariance,
-    /// What is made in the place of the model of the surface.
+    /// The target, if it is not the model of the surface.
     aim: Option<Aim>,
     tile: Geometry,
     /// Rows and columns of the torus.
@@ -167,12 +171,12 @@ impl MethodParameters for FftMaParameters {
             return Err(not_of_a_surface());
         }
         if self.spectrum == SpectrumOf::Eq10 && tile.stated_ratio().is_some_and(|ratio| ratio != 1.0) {
-            return Err(ParameterError::new("spectrum", "is `eq10`, which is isotropic; leave out `ratio`"));
+            return Err(ParameterError::new("spectrum", "is `eq10`, which is isotropic; remove `ratio`"));
         }
         let cells = self.torus_of_any(tile).map(|n| n as f64);
         if cells[0] * cells[1] > CELLS_MAX as f64 {
             let message = format!(
-                "is false, which needs a torus of {:.1e} cells; at most {CELLS_MAX} are made: larger cells, or a smaller texture",
+                "is false, which needs a torus of {:.1e} cells; the most is {CELLS_MAX}: use larger cells or a smaller texture",
                 cells[0] * cells[1]
             );
             return Err(ParameterError::new("periodic", message));
@@ -182,7 +186,7 @@ impl MethodParameters for FftMaParameters {
 
     fn cost(&self, tile: &Tile) -> Cost {
         let [rows, cols] = self.torus_of_any(tile);
-        // As for a measured covariance or a residual, which takes most.
+        // As for a measured covariance or a residual, which costs most.
         cost(rows * cols, tile.geometry.len(), 1)
     }
 
@@ -192,19 +196,19 @@ impl MethodParameters for FftMaParameters {
         let aims = prospect.is_measured || self.covariance == CovarianceOf::Residual;
         let memory_bytes = if aims {
             let oversampling = prospect.cell_m.map_or(1, |fitted_m| aim::finest(cell_m, fitted_m));
-            // More is refused.
+            // More cells would be refused.
             let most = (CELLS_MAX / (rows * cols).max(1) as u64).max(1);
             cost(rows * cols, tile.geometry.len(), oversampling.min(most)).memory_bytes
         } else if self.periodic {
             least.memory_bytes
         } else {
             let side = |n: usize, cell_m: f64| (prospect.torus_m / cell_m).ceil().max(n as f64);
-            // A larger one is refused.
+            // A larger torus would be refused.
             let cells = (side(rows, cell_m[1]) * side(cols, cell_m[0])).min(CELLS_MAX as f64);
             cost(cells as usize, tile.geometry.len(), 0).memory_bytes
         };
-        // Time is that of the usual range, which is shorter; the spectrum of a residual or of a measured covariance is filtered, and made again for
-        // the notes.
+        // Time is estimated for the usual, shorter range. The spectrum of a residual or of a measured covariance is filtered, and computed
+        // once more for the notes.
         let operations = if aims { AIM_SPECTRA * least.operations } else { least.operations };
         Cost { memory_bytes: memory_bytes.max(least.memory_bytes), operations }
     }
@@ -213,7 +217,7 @@ impl MethodParameters for FftMaParameters {
         aim::multiples(tile.geometry.cell, measured_m).map(drop)
     }
 
-    /// Refuses Eq. 10 of a covariance that is no isotropic exponential, a residual of a fit without a window, and cells that are no
+    /// Refuses Eq. 10 for anything but an isotropic exponential, a residual if the fit has no window, and cells that are not
     /// multiples of the measured ones.
     fn kernel(&self, tile: &Tile, wanted: &Covariance, fitted: &Wanted) -> Result<FftMa, ParameterError> {
         let purpose = match self.covariance {
@@ -225,11 +229,11 @@ impl MethodParameters for FftMaParameters {
             return Err(not_of_a_surface());
         }
         if fitted.map.is_some() && tile.turns() {
-            let message = "is given, but the fit's covariance is empirical: it has the direction that was measured";
+            let message = "cannot be set: the fit's covariance is empirical and keeps its measured direction";
             return Err(ParameterError::new("azimuth_deg", message));
         }
         if self.spectrum == SpectrumOf::Eq10 && !is_plain_exponential(wanted) {
-            let message = "is `eq10`, which is an isotropic exponential without nugget; the fit is another model";
+            let message = "is `eq10`, which needs an isotropic exponential fit without nugget; use `covariance`";
             return Err(ParameterError::new("spectrum", message));
         }
         if let Some(aim) = aim.as_ref().filter(|_| self.periodic) {
@@ -241,13 +245,13 @@ impl MethodParameters for FftMaParameters {
 }
 
 impl FftMaParameters {
-    /// Rows and columns of the least torus for a tile, whatever the covariance.
+    /// Rows and columns of the smallest torus for a tile, whatever the covariance.
     fn torus_of_any(&self, tile: &Tile) -> [usize; 2] {
         let least = [tile.geometry.rows, tile.geometry.cols];
         if self.periodic { least } else { least.map(|n| 2 * n) }
     }
 
-    /// Rows and columns of the torus for a tile of a covariance.
+    /// Rows and columns of the torus for a tile with a given covariance.
     fn torus(&self, tile: &Tile, wanted: &Covariance, aim: Option<&Aim>) -> Result<[usize; 2], ParameterError> {
         let [dx, dy] = tile.geometry.cell;
         let [width_m, height_m] = aim.map_or_else(|| reach::torus_m(wanted), |aim| aim.torus_m(tile.geometry.cell));
@@ -259,7 +263,7 @@ impl FftMaParameters {
         let cells = aim.map_or(1, Aim::oversampling) as f64 * enough[0] * enough[1];
         if cells > CELLS_MAX as f64 {
             let message = format!(
-                "is false, for which the range of {} m needs a torus of {cells:.1e} cells; at most {CELLS_MAX} are made: larger cells, \
+                "is false, for which the range of {} m needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}: use larger cells \
                  or a shorter range",
                 wanted.range_m()
             );
@@ -269,14 +273,14 @@ impl FftMaParameters {
     }
 }
 
-/// The error for Eq. 10 of a residual or of a measured covariance.
+/// The error for Eq. 10 with a residual or a measured covariance.
 fn not_of_a_surface() -> ParameterError {
-    ParameterError::new("spectrum", "is `eq10`, which is the spectrum of a surface's exponential alone")
+    ParameterError::new("spectrum", "is `eq10`, which supports only the exponential covariance of a surface")
 }
 
-/// What a tile from a torus takes; `oversampling` is that of the spectrum of a residual or of a measured covariance, 0 for others.
+/// Cost of a tile from a torus; `oversampling` is that of the spectrum of a residual or of a measured covariance, 0 for others.
 fn cost(torus: usize, tile: usize, oversampling: u64) -> Cost {
-    /// Covariance, root and phase of one cell.
+    /// Operations for covariance, root and phase of one cell.
     const PER_CELL: f64 = 60.0;
     let memory_bytes = (BYTES_PER_CELL + AIM_BYTES_PER_CELL * oversampling) * torus as u64 + 8 * tile as u64;
     let cells = torus as f64;
@@ -295,32 +299,32 @@ impl FftMa {
         }
     }
 
-    /// The torus, its south-west corner the origin.
+    /// The torus, with its south-west corner as the origin.
     fn torus_geometry(&self) -> Geometry {
         Geometry { rows: self.torus[0], cols: self.torus[1], ..self.tile }
     }
 
-    /// What a residual or measured covariance is made of.
+    /// Notes on a residual or measured covariance.
     fn aim_notes(&self) -> Vec<String> {
         let Some(aim) = &self.aim else { return Vec::new() };
         let (spectrum, made) = aim.spectrum(&self.covariance, self.torus, self.tile.cell);
         let rms_m = (spectrum.total() / (self.torus[0] * self.torus[1]) as f64).sqrt();
         let of = match self.parameters.covariance {
             CovarianceOf::Surface => "the surface",
-            CovarianceOf::Residual => "what a background over the fit's window lacks",
+            CovarianceOf::Residual => "the part of the surface that a background over the fit's window lacks",
         };
         let mut notes = vec![format!("covariance of {of}: RMS {rms_m:.3e} m")];
         if let Aim::Empirical { .. } = aim {
             notes.push(format!(
-                "measured covariance: {:.2} % of its spectrum was negative and set to 0, {:.1} % of the variance is continued by \
+                "measured covariance: {:.2} % of its spectrum was negative and set to 0, {:.1} % of the variance is extrapolated by \
                  the model",
                 100.0 * made.clip_share,
                 100.0 * made.continued_share
             ));
             if made.continued_share > CONTINUED_SHARE_NOTE {
                 notes.push(
-                    "most of the variance is the model's, at waves that the background took away, not measured: lay a texture with \
-                     covariance = \"residual\" on a measured background instead"
+                    "most of the variance comes from the model, at wavelengths that the background removed, and was not measured: add a \
+                     texture with covariance = \"residual\" to a measured background instead"
                         .to_owned(),
                 );
             }
@@ -341,14 +345,14 @@ fn is_plain_exponential(covariance: &Covariance) -> bool {
     exponential(term.model.kind().kind) && covariance.is_isotropic() && covariance.nugget_m2 == 0.0
 }
 
-/// Sentences about cells too coarse and tiles too small for the covariance.
+/// Notes on cells that are too coarse and tiles that are too small for the covariance.
 pub(super) fn size_notes(covariance: &Covariance, tile: &Geometry, periodic: bool) -> Vec<String> {
     let ranges = reach::extent(covariance).map(|e| super::tidy(e * covariance.range_m()));
     let ([dx, dy], [width_m, height_m]) = (tile.cell, tile.size());
     let mut notes = Vec::new();
     if let Some((cell_m, range_m)) = [(dx, ranges[0]), (dy, ranges[1])].into_iter().find(|(c, b)| *c > 0.5 * b) {
         notes.push(format!(
-            "the cell of {cell_m} m is more than half the range of {range_m} m: most of the texture is below it"
+            "the cell of {cell_m} m is more than half the range of {range_m} m: most of the texture is smaller than a cell"
         ));
     }
     let narrow = |(side, range): &(f64, f64)| *side < TILE_RANGES_NOTE * range;
@@ -371,14 +375,16 @@ impl Kernel for FftMa {
         let mut notes =
             if self.aim.is_none() { size_notes(&self.covariance, &self.tile, periodic) } else { Vec::new() };
         if !periodic && phase == Phase::Unit {
-            notes.push("unit phases are exact on the whole torus; the covariance of this crop scatters".to_owned());
+            notes.push(
+                "unit phases are exact only on the complete torus; the covariance of this crop scatters between realisations".to_owned(),
+            );
         }
         notes.extend(self.aim_notes());
         if spectrum == SpectrumOf::Eq10 {
             let made_m2 = self.spectrum().total() / (self.torus[0] * self.torus[1]) as f64;
             let share = 100.0 * made_m2 / self.covariance.at_distance(0.0);
             notes.push(format!(
-                "Eq. 10 of the paper (with its missing factor 2 pi) on this grid holds {share:.1} % of the variance"
+                "Eq. 10 of the paper (with its missing factor 2 pi) on this grid gives {share:.1} % of the variance"
             ));
         }
         notes
@@ -420,8 +426,8 @@ impl Kernel for FftMa {
     }
 }
 
-/// Spectrum of a field on a torus of `[rows, cols]`: `amplitude(kx, ky) Q`, the amplitude being `sqrt(lambda M)`, on the
-/// stored half. One stream for each column of modes.
+/// Spectrum of a field on a torus of `[rows, cols]`: `amplitude(kx, ky) Q` on the stored half, the amplitude being
+/// `sqrt(lambda M)`. One stream per column of modes.
 pub(crate) fn random_spectrum(
     [rows, cols]: [usize; 2],
     amplitude: impl Fn(usize, usize) -> f64 + Sync,
@@ -435,7 +441,7 @@ pub(crate) fn random_spectrum(
     half
 }
 
-/// Column `kx` of such a spectrum of `cols` columns.
+/// Column `kx` of such a spectrum with `cols` columns.
 fn random_column(
     kx: usize,
     cols: usize,
@@ -452,7 +458,7 @@ fn random_column(
     column.iter_mut().enumerate().for_each(|(ky, q)| *q *= amplitude(ky));
 }
 
-/// A column of Q that is its own mirror image: `Q(-ky)` is the conjugate of `Q(ky)`.
+/// Fills a column of Q that is its own conjugate mirror image: `Q(-ky)` is the conjugate of `Q(ky)`.
 fn fill_conjugate_column(column: &mut [Complex64], phase: Phase, stream: &mut Stream) {
     let rows = column.len();
     for ky in 0..=rows / 2 {
@@ -463,14 +469,14 @@ fn fill_conjugate_column(column: &mut [Complex64], phase: Phase, stream: &mut St
 }
 
 impl Phase {
-    /// Q of a mode that has a conjugate partner; mean square 1.
+    /// Draws Q of a mode that has a conjugate partner; mean square 1.
     fn draw(self, stream: &mut Stream) -> Complex64 {
         let mut one = [Complex64::default()];
         self.fill(&mut one, stream);
         one[0]
     }
 
-    /// Draws of Q for many modes.
+    /// Draws Q for many modes.
     fn fill(self, modes: &mut [Complex64], stream: &mut Stream) {
         match self {
             Self::Unit => fill_unit(modes, stream),
@@ -478,7 +484,7 @@ impl Phase {
         }
     }
 
-    /// Q of a mode that is its own conjugate; mean square 1.
+    /// Draws Q of a mode that is its own conjugate; mean square 1.
     fn draw_real(self, stream: &mut Stream) -> f64 {
         match self {
             Self::Unit => 1.0 - 2.0 * (stream.bits() >> 63) as f64,
@@ -487,7 +493,7 @@ impl Phase {
     }
 }
 
-/// Modes drawn at once.
+/// Number of modes drawn at once.
 const RUN: usize = 64;
 
 /// `exp(2 pi i u)`, u uniform.

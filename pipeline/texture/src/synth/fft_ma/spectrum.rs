@@ -1,5 +1,5 @@
-//! Spectrum of a covariance on a torus: real, as the covariance is even, and where rows and columns of the torus are axes
-//! of symmetry also even in each wavenumber, so that a quarter of it is computed.
+//! Spectrum of a covariance on a torus. It is real, as the covariance is even; if rows and columns of the torus are axes
+//! of symmetry it is also even in each wavenumber, so that only a quarter of it is computed.
 
 use super::{reach, sums};
 use crate::covariance::Covariance;
@@ -7,14 +7,14 @@ use crate::covariance::filtered::torus_covariance;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, even_spectrum};
 use std::f64::consts::PI;
 
-/// Share of its variance below which a term of the covariance is taken as nothing: far below the rounding of a transform.
-const NOTHING: f64 = 1e-20;
+/// Share of its variance below which a term of the covariance is taken as zero, far below the rounding of a transform.
+const NEGLIGIBLE: f64 = 1e-20;
 
 /// The eigenvalues `lambda(kx, ky)` of a covariance on a torus, m2, for `kx <= cols / 2`.
 pub struct Spectrum {
     rows: usize,
     cols: usize,
-    /// Row frequencies stored: `rows / 2 + 1` of an even spectrum, else `rows`.
+    /// Row frequencies stored: `rows / 2 + 1` for an even spectrum, otherwise `rows`.
     stored: usize,
     /// `values[kx * stored + ky]`.
     values: Vec<f64>,
@@ -22,7 +22,7 @@ pub struct Spectrum {
 
 impl Spectrum {
     /// Spectrum of `covariance` on a torus of `[rows, cols]` cells of `cell_m = [east-west, north-south]`, each lag taken
-    /// the short way round.
+    /// the shorter way around.
     pub fn of(covariance: &Covariance, [rows, cols]: [usize; 2], cell_m: [f64; 2]) -> Self {
         match stretches(covariance) {
             Some(stretch) => Self::even(covariance, [rows, cols], [cell_m[0] * stretch[0], cell_m[1] * stretch[1]]),
@@ -38,14 +38,14 @@ impl Spectrum {
         Self { rows, cols, stored: rows, values }
     }
 
-    /// Of a covariance that is isotropic once cells have these sides.
+    /// Spectrum of a covariance that is isotropic on cells stretched to these sides.
     fn even(covariance: &Covariance, [rows, cols]: [usize; 2], [dx, dy]: [f64; 2]) -> Self {
-        // Square cells: whole numbers under the root, so that cells as far from the origin have the same bits.
+        // For square cells the root is of integers, so that cells at equal distance from the origin get identical values.
         let aspect = dy / dx;
-        let reach = reach::reach_m(covariance, NOTHING) / dx;
+        let reach = reach::reach_m(covariance, NEGLIGIBLE) / dx;
         let values = even_spectrum([rows, cols], |r, line| {
             let y = r as f64 * aspect;
-            // NaN beyond the reach, which is column 0 as an integer.
+            // Beyond the reach the root is NaN, which becomes 0 as an integer.
             let within = ((reach * reach - y * y).sqrt().ceil() as usize).min(line.len());
             let (near, far) = line.split_at_mut(within);
             for (c, v) in near.iter_mut().enumerate() {
@@ -58,7 +58,7 @@ impl Spectrum {
     }
 
     /// Eq. 10 of Vecherin et al. 2022 with its missing factor, `2 pi sigma^2 b^2 / (1 + b^2 k^2)^(3/2)`, at the wavenumbers
-    /// of the torus and per cell: an isotropic exponential's spectrum as if space had no bounds and no grid.
+    /// of the torus and per cell: the spectrum of an isotropic exponential in unbounded continuous space.
     pub fn eq10(sigma_m: f64, range_m: f64, [rows, cols]: [usize; 2], cell_m: [f64; 2]) -> Self {
         let (half_rows, half_cols) = (rows / 2 + 1, cols / 2 + 1);
         let step = |n: usize, cell: f64| 2.0 * PI * range_m / (n as f64 * cell);
@@ -89,7 +89,7 @@ impl Spectrum {
         if self.values.iter().all(|v| *v >= 0.0) {
             return 0.0;
         }
-        // Rounding of the transforms is no negative eigenvalue.
+        // Rounding errors of the transforms do not count as negative eigenvalues.
         let rounding = 1e-14 * self.values.iter().fold(0.0, |m, v| f64::max(m, v.abs()));
         self.weighted_sum(|v| if v < -rounding { -v } else { 0.0 })
     }
@@ -100,14 +100,14 @@ impl Spectrum {
         if negative == 0.0 { 0.0 } else { negative / (self.total() + 2.0 * negative) }
     }
 
-    /// The magnitudes `sqrt(lambda M)` of the modes of a field, those of negative eigenvalues 0.
+    /// The magnitudes `sqrt(lambda M)` of the modes of a field; 0 for negative eigenvalues.
     pub fn amplitudes(mut self) -> Self {
         let cells = (self.rows * self.cols) as f64;
         self.values.iter_mut().for_each(|v| *v = (v.max(0.0) * cells).sqrt());
         self
     }
 
-    /// The covariance that belongs to it, row-major, m2.
+    /// The corresponding covariance, row-major, m2.
     pub fn covariance(&self) -> Vec<f64> {
         let (rows, cols) = (self.rows, self.cols);
         let modes = (0..=cols / 2).flat_map(|kx| (0..rows).map(move |ky| (kx, ky)));
@@ -131,7 +131,7 @@ impl Spectrum {
     }
 }
 
-/// Factors for lags east-west and north-south that make the covariance isotropic, where its axes are those of the grid.
+/// Factors for lags east-west and north-south that make the covariance isotropic, if its axes are those of the grid.
 fn stretches(covariance: &Covariance) -> Option<[f64; 2]> {
     let across = 1.0 / covariance.ratio;
     match covariance.azimuth_deg {

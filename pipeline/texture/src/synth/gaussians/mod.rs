@@ -3,14 +3,14 @@
 //! `z(r) = A * sum over i of h_i exp(-|r - e_i|^2 / a^2)`, i up to G, `h_i = +-1`, centres uniform on the tile; see
 //! [`super::bumps`] for the covariance and the choice of A.
 //!
-//! Source: Vecherin et al. 2022, Eq. 1. Departures: the bumps go round the tile's edges, so that it repeats without seams
+//! Source: Vecherin et al. 2022, Eq. 1. Departures: the bumps wrap around the tile's edges, so that it repeats without seams
 //! (the paper's do not); the half axes are a along the long axis and `ratio` a across it, at any azimuth (the paper has x and
 //! y).
 //!
-//! Its correlation is a Gaussian, `exp(-h^2 / (2 a^2))`, whatever the fit's is: the difference is reported. Where a is not
-//! given it is chosen so that both have fallen to one half at the same distance. The variance is the fit's on average.
+//! Its correlation is a Gaussian, `exp(-h^2 / (2 a^2))`, whatever the fit's: the difference is reported. If a is not
+//! given, it is chosen so that both correlations are 1/2 at the same distance. The variance is the fit's on average.
 //!
-//! Cost: 81 multiplications per bump and a^2 of cells; memory 32 bytes per bump. Not for a fit whose small scales matter.
+//! Cost: 81 multiplications per bump and a^2 of cells; memory 32 bytes per bump. Do not use it if small scales matter.
 
 use super::bumps::{Class, Torus};
 use super::tile::{self, Tile};
@@ -21,12 +21,12 @@ use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Bumps per area of their half axes where none is given: an excess kurtosis of 0.03.
+/// Default number of bumps per area of their half axes: an excess kurtosis of 0.03.
 const DENSITY: f64 = 10.0;
 /// Most bumps: 3.2 GB.
 const COUNT_MAX: u64 = 100_000_000;
 
-/// Raw parameters of a sum of Gaussians, beside those of its tile.
+/// Raw parameters of a sum of Gaussians, without those of its tile.
 #[derive(Clone, Debug, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct GaussiansParameters {
@@ -77,7 +77,7 @@ impl MethodParameters for GaussiansParameters {
     }
 
     fn cost(&self, tile: &Tile) -> Cost {
-        // Without a scale, assume the narrowest bumps that the cells resolve.
+        // Without a scale, assume the smallest bumps that the cells resolve.
         let least_m = 2.0 * tile.geometry.cell[0].min(tile.geometry.cell[1]);
         let along_m = self.scale_m.unwrap_or(least_m);
         let across_m = along_m * tile.stated_ratio().unwrap_or(1.0);
@@ -124,7 +124,7 @@ impl Kernel for Gaussians {
         let Class { along_m, across_m, count, .. } = self.class;
         let mut notes = fft_ma::size_notes(&self.covariance, &self.tile, true);
         notes.push(format!(
-            "{count} Gaussians of half axes {along_m:.4} m x {across_m:.4} m: the correlation is a Gaussian, not the fit's"
+            "{count} Gaussians with half axes {along_m:.4} m x {across_m:.4} m: the correlation is Gaussian, not the fit's"
         ));
         notes
     }

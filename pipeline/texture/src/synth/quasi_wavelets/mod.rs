@@ -1,22 +1,22 @@
 //! Quasi-wavelets: Gaussian bumps of self-similar size classes, matched to a given covariance, with intermittency.
 //!
-//! Classes k have the half axis `a_k = a_1 q^(k - 1)` down to 0.7 cells, q the ratio of sizes; what varies below that is
-//! white from cell to cell. Each class is a sum of bumps ([`super::bumps`]), so that on average
+//! Classes k have the half axis `a_k = a_1 q^(k - 1)` down to 0.7 cells, q the ratio of sizes; smaller-scale variation is
+//! white. Each class is a sum of bumps ([`super::bumps`]), so that on average
 //!
 //! `C(h) = sum over k of w_k exp(-h^2 / (2 a_k^2)) + w_0 [h = 0]`
 //!
-//! (wrapped around the tile). The variances `w_k >= 0` are those nearest to the fit's covariance in least squares, at lags
-//! along rows, columns and diagonals; they are then scaled to its variance. A covariance that is a mixture of Gaussians
-//! (exponential, Matern) is met within 1 % of its variance; what is left is reported.
+//! (wrapped around the tile). The variances `w_k >= 0` are the least-squares fit to the target covariance at lags
+//! along rows, columns and diagonals, then scaled to its variance. A covariance that is a mixture of Gaussians
+//! (exponential, Matern) is reproduced within 1 % of its variance; the remaining difference is reported.
 //!
-//! Intermittency: class k holds `packing (a_k / a_1)^intermittency` bumps per area of their half axes. At 0 all classes fill
-//! space alike; above, small bumps are fewer and higher (the beta model of Frisch, Sulem and Nelkin 1978, J. Fluid Mech. 87),
-//! which leaves the covariance as it is and fattens the tails of small increments: excess kurtosis of a class
+//! Intermittency: class k has `packing (a_k / a_1)^intermittency` bumps per area of their half axes. At 0 all classes fill
+//! space equally; above, small bumps are fewer and higher (the beta model of Frisch, Sulem and Nelkin 1978, J. Fluid Mech. 87),
+//! which does not change the covariance but makes the tails of small increments heavier: excess kurtosis of a class
 //! `1 / (pi packing (a_k / a_1)^intermittency)`.
 //!
 //! Source: Goedecke, Ostashev, Wilson and Auvermann 2004, Boundary-Layer Meteorology 112, 33 (size classes in constant ratio,
 //! constant packing); Vecherin et al. 2022, section 3.1. Departures: variances by non-negative least squares rather than from
-//! the inertial range, so that any covariance can be asked for; scalar field, h = +-1; periodic; ellipses at any azimuth,
+//! the inertial range, so that any covariance can be a target; scalar field, h = +-1; periodic; ellipses at any azimuth,
 //! which the paper calls hard.
 //!
 //! Cost: 81 `packing` multiplications per class and cell (exponentials, where the long axis is not a grid axis); memory 72
@@ -37,21 +37,21 @@ const SMALLEST_CELLS: f64 = 0.7;
 const LARGEST_SHARE: f64 = 0.5;
 /// Most classes.
 const CLASSES_MAX: usize = 64;
-/// Sizes that are assumed where the covariance is not known.
+/// Number of sizes assumed if the covariance is unknown.
 const SIZES: f64 = 10.0;
 /// Most bumps of a class.
 const COUNT_MAX: f64 = 1e8;
-/// Lags along each direction that are compared.
+/// Lags fitted along each direction.
 const LAGS: usize = 48;
-/// Weight of lag 0 among the lags.
+/// Weight of lag 0 relative to the other lags.
 const VARIANCE_WEIGHT: f64 = 30.0;
-/// Rounds of the descent; the variances no longer move by then.
+/// Rounds of the descent; the variances have converged by then.
 const ROUNDS: usize = 20_000;
 
-/// Least packing.
+/// Smallest packing.
 const PACKING_MIN: f64 = 0.01;
 
-/// Raw parameters of quasi-wavelets, beside those of their tile.
+/// Raw parameters of quasi-wavelets, without those of their tile.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct QuasiWaveletsParameters {
@@ -59,7 +59,7 @@ pub struct QuasiWaveletsParameters {
     pub size_ratio: f64,
     /// Bumps per area of their half axes in the largest class. Default 1.
     pub packing: f64,
-    /// Exponent by which the packing falls with size, in [0, 2]. Default 0: none.
+    /// Exponent with which the packing decreases with size, in [0, 2]. Default 0 (no intermittency).
     pub intermittency: f64,
 }
 
@@ -104,7 +104,9 @@ impl MethodParameters for QuasiWaveletsParameters {
         }
         ParameterError::positive("packing", packing)?;
         if packing < PACKING_MIN {
-            let message = format!("is {packing}; below {PACKING_MIN} the heights are a few bumps on a plain");
+            let message = format!(
+                "is {packing}; it must be at least {PACKING_MIN}, below which there are only a few isolated bumps"
+            );
             return Err(ParameterError::new("packing", message));
         }
         if !(0.0..=2.0).contains(&intermittency) {
@@ -112,14 +114,14 @@ impl MethodParameters for QuasiWaveletsParameters {
         }
         let least = self.least_count(tile);
         if least > COUNT_MAX {
-            let message = format!("is {packing}: {least:.1e} bumps or more; the most is {COUNT_MAX:.0e}");
+            let message = format!("is {packing}, which needs at least {least:.1e} bumps; the most is {COUNT_MAX:.0e}");
             return Err(ParameterError::new("packing", message));
         }
         Ok(())
     }
 
     fn cost(&self, tile: &Tile) -> Cost {
-        // The covariance is not known yet: assume one that takes as many sizes as there may be, each with the bumps of the smallest.
+        // The covariance is not known yet: assume a fixed number of sizes, each with as many bumps as the smallest.
         let [dx, dy] = tile.geometry.cell;
         let along_m = SMALLEST_CELLS * dx.min(dy);
         let across_m = along_m * tile.stated_ratio().unwrap_or(1.0);
@@ -140,7 +142,7 @@ impl MethodParameters for QuasiWaveletsParameters {
 }
 
 impl QuasiWaveletsParameters {
-    /// Fewer bumps of the smallest size no covariance takes, as long as the number of sizes is not what ends them.
+    /// Fewest bumps of the smallest size that any covariance needs, unless the sizes end at the largest number of classes.
     fn least_count(&self, tile: &Tile) -> f64 {
         let ([width_m, height_m], [dx, dy]) = (tile.geometry.size(), tile.geometry.cell);
         let smallest_m = SMALLEST_CELLS * dx.min(dy);
@@ -154,7 +156,7 @@ impl QuasiWaveletsParameters {
     }
 }
 
-/// Number of bumps that cover a tile as densely as that.
+/// Number of bumps that cover a tile at the given packing.
 fn bumps(packing: f64, tile: &Geometry, along_m: f64, across_m: f64) -> f64 {
     let [width_m, height_m] = tile.size();
     (packing * width_m * height_m / (along_m * across_m)).ceil()
@@ -167,7 +169,7 @@ fn cost(torus: &Torus, classes: &[Class], tile: &Geometry) -> Cost {
     }
 }
 
-/// Sizes and numbers of the bumps for a covariance that reaches as far as that, with that ratio of ranges.
+/// Sizes and numbers of the bumps for a covariance with the given reach and ratio of ranges.
 fn classes(
     parameters: &QuasiWaveletsParameters,
     tile: &Geometry,
@@ -185,8 +187,10 @@ fn classes(
         let packing = parameters.packing * libm::exp(parameters.intermittency * libm::log(share));
         let count = bumps(packing, tile, along_m, across_m);
         if count > COUNT_MAX {
-            let message =
-                format!("is {}: {count:.1e} bumps of {along_m:.3} m; the most is {COUNT_MAX:.0e}", parameters.packing);
+            let message = format!(
+                "is {}, which needs {count:.1e} bumps of {along_m:.3} m; the most is {COUNT_MAX:.0e}",
+                parameters.packing
+            );
             return Err(ParameterError::new("packing", message));
         }
         classes.push(Class { along_m, across_m, count: count as u64, variance_m2: 0.0 });
@@ -195,7 +199,7 @@ fn classes(
     Ok(classes)
 }
 
-/// Lags that are compared: whole cells along rows, columns and diagonals up to half the tile, denser near 0.
+/// Lags to fit: whole cells along rows, columns and diagonals up to half the tile, denser near 0.
 fn lags(tile: &Geometry) -> Vec<[f64; 2]> {
     let [dx, dy] = tile.cell;
     let mut lags = vec![[0.0; 2]];
@@ -213,7 +217,7 @@ fn lags(tile: &Geometry) -> Vec<[f64; 2]> {
     lags
 }
 
-/// Sets the variances of the classes; returns the white one.
+/// Sets the variances of the classes; returns the white variance.
 fn match_variances(torus: &Torus, classes: &mut [Class], lags: &[[f64; 2]], wanted: &Covariance) -> f64 {
     let weight = |k: usize| if k == 0 { VARIANCE_WEIGHT } else { 1.0 };
     let mut columns: Vec<Vec<f64>> =
@@ -230,7 +234,7 @@ fn match_variances(torus: &Torus, classes: &mut [Class], lags: &[[f64; 2]], want
     variances[classes.len()]
 }
 
-/// The `x >= 0` that minimises `x' G x / 2 - r' x`, by descent along one coordinate after another.
+/// The `x >= 0` that minimises `x' G x / 2 - r' x`, by coordinate descent.
 fn non_negative_least_squares(gram: &[Vec<f64>], right: &[f64]) -> Vec<f64> {
     let mut x = vec![0.0; right.len()];
     for _ in 0..ROUNDS {
