@@ -22,7 +22,7 @@ MAPS = {
     "flux": ("1", "mean 1"),
     "rms-measured": ("m", "RMS"),
     "rms-predicted": ("m", "RMS"),
-    "rock-potential": ("1", "share of the ground"),
+    "rock-potential": ("1", "fraction of the ground"),
 }
 # Unit and description of rendered images.
 IMAGE = ("1", "brightness")

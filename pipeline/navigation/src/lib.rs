@@ -9,7 +9,7 @@
 //! 2. [`CostModel::new`]: what a metre of path costs. [`clearance::Clearance::new`] makes gaps that are narrower than a team cost more.
 //! 3. [`plan`], or a [`Planner`] for many routes over the same ground: a [`Method`] searches ([`search`]) all cells, or a [`roadmap`] whose vertices are
 //!    the cells where the ground changes ([`vertices`]) and whose edges are the straight lines between them.
-//! 4. [`Route`]: the path as found and as straightened by [`smoothing`], each scored by the same integral ([`line`]).
+//! 4. [`Route`]: the path as found and as straightened by [`smoothing`], each scored by the same integral ([`mod@line`]).
 //! 5. [`formation::Team`] moves a team along a route. [`replan::walk`] and [`explorer::Explorer`] plan on what has been seen so far.
 //!
 //! # Example

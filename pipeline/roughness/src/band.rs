@@ -93,7 +93,7 @@ mod tests {
     /// 4/9 full, so corners are out.
     #[test]
     fn val_the_band_rms_of_a_chessboard() {
-        let sign = |k: usize| if (k / 10 + k % 10) % 2 == 0 { 1.0 } else { -1.0 };
+        let sign = |k: usize| if (k / 10 + k % 10).is_multiple_of(2) { 1.0 } else { -1.0 };
         let dem = Grid::new(Geometry::square(8, 10, 1.0), (0..80).map(sign).collect());
         let expected = ((48.0 * 64.0 / 81.0 + 28.0 * 16.0 / 9.0) / 76.0f64).sqrt();
         let (found, window) = band_rms(&dem, 3.0);

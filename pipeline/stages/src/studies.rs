@@ -417,8 +417,14 @@ mod tests {
     /// Values that no parameter accepts, nor any other after them is looked at.
     const NEVER: &[&str] = &["nan", "-inf", "2026-01-01", "07:32:00", "1979-05-27T07:32:00Z"];
 
+    /// A key and its value.
+    type Pair = (String, String);
+
+    /// A key, and values for it.
+    type Line = (&'static str, &'static [&'static str]);
+
     /// Tables without an error, by section: keys and values.
-    const RIGHT: &[(&str, &[(&str, &[&str])])] = &[
+    const RIGHT: &[(&str, &[Line])] = &[
         ("study", &[("name", &["\"x\""]), ("seed", &["1"]), ("date", &["\"2026-01-01\""])]),
         ("dem", &[("id", &["\"s\""]), ("file", &["\"none.tif\""])]),
         (
@@ -480,13 +486,13 @@ mod tests {
             prop_oneof![
                 18 => select(values).prop_map(move |value| Some((key.to_owned(), value.to_owned()))),
                 1 => value(keys).prop_map(move |value| Some((key.to_owned(), value))),
-                1 => Just(None::<(String, String)>),
+                1 => Just(None::<Pair>),
             ]
             .boxed()
         };
-        let right: Vec<BoxedStrategy<Option<(String, String)>>> = right.iter().map(line).collect();
+        let right: Vec<BoxedStrategy<Option<Pair>>> = right.iter().map(line).collect();
         let more = vec((select(keys.to_vec()), value(keys)), 0..3);
-        let text = |(right, more): (Vec<Option<(String, String)>>, Vec<(String, String)>)| {
+        let text = |(right, more): (Vec<Option<Pair>>, Vec<Pair>)| {
             let lines: BTreeMap<String, String> = more.into_iter().chain(right.into_iter().flatten()).collect();
             lines.iter().map(|(key, value)| format!("{key} = {value}\n")).collect::<String>()
         };

@@ -325,18 +325,21 @@ mod tests {
         })
     }
 
+    /// A change of a manifest.
+    type Change = fn(&mut Value);
+
     /// Each kind of difference alone, as path and problem.
     #[test]
     fn val_every_difference_of_manifests_is_found() {
         assert_eq!(compare_manifests(&manifest(), &manifest()), []);
-        let found = |change: fn(&mut Value)| {
+        let found = |change: Change| {
             let mut here = manifest();
             change(&mut here);
             let differences = compare_manifests(&manifest(), &here);
             let [Difference { path, problem }] = differences.as_slice() else { panic!("{differences:?}") };
             format!("{path}: {problem}")
         };
-        let cases: [(fn(&mut Value), &str); 6] = [
+        let cases: [(Change, &str); 6] = [
             (|m| m["artifacts"][1]["sha256"] = "3".into(), "b.tif: its bytes differ when recomputed"),
             (
                 |m| m["artifacts"][0]["stage"] = "texture".into(),

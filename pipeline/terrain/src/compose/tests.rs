@@ -75,16 +75,17 @@ fn val_blends_and_masks_follow_their_region() {
         3.0 * t * t - 2.0 * t * t * t
     };
     let (first, second) = (hills(1).values, hills(2).values);
-    for k in 0..600 {
+    assert_eq!((first.len(), second.len()), (600, 600));
+    for (k, hill) in second.iter().enumerate() {
         let (x, w) = (heights.geometry.x(k % 30), weight(k));
-        let expected = (1.0 - w) * x + w * second[k];
+        let expected = (1.0 - w) * x + w * hill;
         assert!((heights.values[k] - expected).abs() < 1e-12, "{x}: {} {expected}", heights.values[k]);
     }
     let mask = json!([{"kind": "spheroids"}, {"operation": "mask", "outside_m": -1.0, "region": region}]);
     let masked = made(mask, &[ramp()]).heights;
     assert!((0..600).all(|k| heights.geometry.x(k % 30) > 4.0 || masked.values[k] == -1.0));
-    for k in 0..600 {
-        let expected = weight(k) * first[k] - (1.0 - weight(k));
+    for (k, hill) in first.iter().enumerate() {
+        let expected = weight(k) * hill - (1.0 - weight(k));
         assert!((masked.values[k] - expected).abs() < 1e-12, "{k}: {} {expected}", masked.values[k]);
     }
 }

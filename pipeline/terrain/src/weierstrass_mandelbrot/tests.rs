@@ -250,10 +250,13 @@ fn val_impossible_parameters_are_refused() {
     );
 }
 
+/// A parameter to set.
+type Field = fn(&mut RawWeierstrassMandelbrot) -> &mut f64;
+
 #[test]
 fn val_non_finite_parameters_are_refused() {
     for bad in [f64::NAN, f64::INFINITY, f64::NEG_INFINITY] {
-        let edits: [(&str, fn(&mut RawWeierstrassMandelbrot) -> &mut f64); 6] = [
+        let edits: [(&str, Field); 6] = [
             ("cell_m", |r| &mut r.cell_m),
             ("frequency_ratio", |r| &mut r.frequency_ratio),
             ("fractal_dimension", |r| &mut r.fractal_dimension),

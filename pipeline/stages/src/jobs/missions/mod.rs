@@ -44,7 +44,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
 
 /// The missions of an item.
 ///
-/// `folder_file` is the path from [`file`].
+/// `folder_file` is the path from [`fn@file`].
 ///
 /// # Errors
 /// A file that cannot be read.
