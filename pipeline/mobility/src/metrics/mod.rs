@@ -160,6 +160,17 @@ impl Differentiator {
             Self::Gradient => gradient(&gradient(series, rate_hz), rate_hz),
         }
     }
+
+    /// RMS of the first (`derivative` 1) or second derivative of white noise of variance 1, away from the ends: differences have
+    /// twice the variance, second differences six times; central differences span two samples.
+    fn noise_gain(self, derivative: u32, rate_hz: f64) -> f64 {
+        let samples = match self {
+            Self::SecondDifference => 1.0,
+            Self::Gradient => 2.0,
+        };
+        let rate_hz = rate_hz / samples;
+        if derivative == 2 { 6.0f64.sqrt() * rate_hz * rate_hz } else { 2.0f64.sqrt() * rate_hz }
+    }
 }
 
 /// Central differences, one-sided at the ends; empty for fewer than two values.

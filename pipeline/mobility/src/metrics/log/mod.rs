@@ -368,11 +368,8 @@ impl Noise<'_> {
             return AboveNoise { rms, floor: 0.0 };
         }
         let series: Vec<Vec<f64>> = self.pieces.iter().map(|p| p.iter().map(value).collect()).collect();
-        let of_spectrum = Spectrum::of(&series, self.rate_hz).map(|s| {
-            // White noise of variance 1 has differences of variance 2, and second differences of variance 6.
-            let gain = if derivative == 2 { 6.0f64.sqrt() * self.rate_hz } else { 2.0f64.sqrt() };
-            s.noise_sigma(s.top()) * gain * self.rate_hz
-        });
+        let gain = self.differentiator.noise_gain(derivative, self.rate_hz);
+        let of_spectrum = Spectrum::of(&series, self.rate_hz).map(|s| s.noise_sigma(s.top()) * gain);
         AboveNoise { rms, floor: of_spectrum.unwrap_or(f64::NAN).min(self.at_rest(&series, derivative)) }
     }
 

@@ -227,6 +227,20 @@ fn stat_noise_is_distinguished_from_motion() {
     assert!(moving.acceleration.tells() && moving.acceleration.floor < 0.2, "{:?}", moving.acceleration);
 }
 
+/// Central differences span two samples, so the same noise gives a quarter of the acceleration and half of the rate, and so does the
+/// floor. Bounds as above: false alarm 5e-4 for each floor.
+#[test]
+fn stat_the_floor_is_that_of_the_differentiator() {
+    let mut s = Streams::for_seed(6, "log-test").stream("noise");
+    let poses = (0..800).map(|k| pose(0.05 * f64::from(k), 0.001 * s.normal(), 0.001 * s.normal()));
+    let settings = LogSettings { differentiator: Differentiator::Gradient, ..LogSettings::default() };
+    let found = analyse(&log_of(poses.collect()), &settings).unwrap();
+    let [acceleration, rate] = [0.001 * 6.0f64.sqrt() / 4.0 * 400.0, 0.001 * SQRT_2 / 2.0 * 20.0];
+    assert!((found.acceleration.rms / acceleration - 1.0).abs() < 0.15, "{:?}", found.acceleration);
+    assert!((found.acceleration.floor / acceleration - 1.0).abs() < 0.25, "{:?}", found.acceleration);
+    assert!((found.pitch_rate.floor / rate - 1.0).abs() < 0.25, "{:?}", found.pitch_rate);
+}
+
 /// At rest for 3 s with 0.1 mm of noise, then a motion that fills the spectrum up to its top: the floor comes from the rest.
 #[test]
 fn val_the_floor_comes_from_the_rest() {
