@@ -622,3 +622,17 @@ fn val_a_study_whose_every_item_fails_fails() {
     assert!(call.stderr.contains("dem/a.tif"), "the file as the release calls it: {}", call.stderr);
     assert!(!folder.path().join("release").exists());
 }
+
+/// A missing file, or a folder in place of a file, is refused in the same words by every verb that reads one.
+#[test]
+fn val_unreadable_files_are_named_in_plain_words() {
+    let folder = area();
+    let path = folder.path();
+    std::fs::create_dir(path.join("folder")).unwrap();
+    for (name, words) in [("none", "none: no such file\n"), ("folder", "folder: is a folder, not a file\n")] {
+        refused(path, &["run", name], INPUT, &[words]);
+        refused(path, &["plan", name], INPUT, &[words]);
+        refused(path, &["texture", name, "--size", "8x8", "--cell", "0.1", "-o", "a.tif"], INPUT, &[words]);
+    }
+    refused(path, &["analyze", "none.mcap"], INPUT, &["none.mcap: no such file\n"]);
+}

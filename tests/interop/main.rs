@@ -627,7 +627,7 @@ fn val_logs_of_other_writers_are_judged_alike() {
         ("backwards", "on /odom, time goes back by "),
         ("damaged", "the file is damaged after "),
         ("text", "not an MCAP file"),
-        ("missing", "No such file"),
+        ("missing", "no such file"),
     ];
     for (name, why) in refusals {
         let call = sastrugi_in(folder.path(), &["analyze", &format!("{name}.mcap")]);

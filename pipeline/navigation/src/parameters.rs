@@ -241,7 +241,10 @@ impl RouteParameters {
             Cost::Energy => SlopeCost::Energy { resistance: rolling_resistance, floor: self.energy_floor },
             _ => self.linear_cost(),
         };
-        cost.check()?;
+        cost.check().map_err(|e| match e.key.as_str() {
+            "floor" => ParameterError { key: "energy_floor".to_owned(), ..e },
+            _ => e,
+        })?;
         Ok(cost)
     }
 

@@ -369,7 +369,11 @@ impl<'a> Builder<'a> {
         if self.heightfields.contains_key(id) {
             return Ok(vec![id.to_owned()]);
         }
-        self.families.get(id).cloned().ok_or_else(|| unknown_id(entry, key, id, self.families.keys()))
+        // A refused table has named its family, but added no or not all of its items.
+        let is_there =
+            |ids: &&Vec<String>| ids.iter().all(|id| self.heightfields.contains_key(id)) || !self.refused.holds(id);
+        let ids = self.families.get(id).filter(is_there);
+        ids.cloned().ok_or_else(|| unknown_id(entry, key, id, self.families.keys()))
     }
 }
 

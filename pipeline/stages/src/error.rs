@@ -39,6 +39,16 @@ pub enum Error {
 }
 
 impl Error {
+    /// Input that cannot be read.
+    pub fn unreadable(path: &Path, error: &std::io::Error) -> Self {
+        let reason = match error.kind() {
+            std::io::ErrorKind::NotFound => "no such file".to_owned(),
+            std::io::ErrorKind::IsADirectory => "is a folder, not a file".to_owned(),
+            _ => error.to_string(),
+        };
+        Self::Input(format!("{}: {reason}", path.display()))
+    }
+
     /// A failure on this machine.
     pub fn failed(message: impl std::fmt::Display) -> Self {
         Self::Failed(message.to_string())

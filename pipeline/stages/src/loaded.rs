@@ -43,13 +43,8 @@ pub fn load(path: &Path) -> Result<Loaded, Error> {
 /// # Errors
 /// A missing file, or one that is not text.
 pub fn read(path: &Path) -> Result<String, Error> {
-    let text =
-        sastrugi_store::file::read(path).map_err(|e| Error::Input(format!("{}: {}", path.display(), io_reason(&e))))?;
+    let text = sastrugi_store::file::read(path).map_err(|e| Error::unreadable(path, &e))?;
     String::from_utf8(text).map_err(|_| Error::Usage(format!("{}: the study is not UTF-8 text", path.display())))
-}
-
-fn io_reason(error: &std::io::Error) -> String {
-    if error.kind() == std::io::ErrorKind::NotFound { "no such file".to_owned() } else { error.to_string() }
 }
 
 /// Reads a study from text; relative paths start from `folder`. `name` stands for the file in messages.

@@ -406,6 +406,10 @@ mod tests {
         let wrong = fit("snow", "site") + "[[dem]]\nid = \"site\"\npath = \"site.tif\"\n";
         let refused = load_text(&format!("{STUDY}\n{wrong}"), "study", Path::new("")).err().unwrap().to_string();
         assert!(refused.contains("unknown key `path`") && !refused.contains("names \"site\""), "{refused}");
+        let wrong = "[[terrain]]\nid = \"hole\"\nkind = \"gap\"\nsize_m = -1\nsize_px = [64, 64]\n\
+                     [[missions]]\nid = \"across\"\nterrains = [\"hole\"]\n";
+        let refused = load_text(&format!("{STUDY}\n{wrong}"), "study", Path::new("")).err().unwrap().to_string();
+        assert!(refused.contains("size_m") && !refused.contains("across"), "{refused}");
     }
 
     /// Numbers, of which most parameters accept some.

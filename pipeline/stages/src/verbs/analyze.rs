@@ -76,7 +76,8 @@ impl Request<'_> {
     /// A file that is not MCAP, is damaged, or has no usable poses.
     pub fn judge(&self, path: &Path, terrain: Option<&Terrain>) -> Result<Judged, Error> {
         let log = read_log(path).map_err(|e| match e {
-            McapError::Io { .. } | McapError::Unusable { .. } => Error::Input(e.to_string()),
+            McapError::Io { path, source } => Error::unreadable(&path, &source),
+            McapError::Unusable { .. } => Error::Input(e.to_string()),
             other => Error::failed(other),
         })?;
         let found = analyse(&log, &self.settings).map_err(|e| {

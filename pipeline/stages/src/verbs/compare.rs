@@ -99,7 +99,7 @@ impl Read {
 /// Refuses to compare a fit with the DEM it was made from: their agreement is not evidence.
 fn not_circular(side: &Side<'_>, fit: &FitFile) -> Result<(), Error> {
     let name = side.path.display();
-    let (_, sha256) = digest::of_file(side.path).map_err(|e| Error::Input(format!("{name}: {e}")))?;
+    let (_, sha256) = digest::of_file(side.path).map_err(|e| Error::unreadable(side.path, &e))?;
     match fit.source.as_ref().is_some_and(|source| source.sha256 == sha256) {
         true => Err(Error::Usage(format!(
             "{name} is the DEM that the fit was made from, so agreement proves nothing; `compare {name} --split-half` tests \

@@ -285,6 +285,6 @@ fn subtracted(request: &Request<'_>, path: &Path) -> Result<(Grid, Read, Minus),
 
 /// Name of a file without its folder, and its SHA-256.
 fn named(path: &Path) -> Result<(String, String), Error> {
-    let (_, sha256) = digest::of_file(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    let (_, sha256) = digest::of_file(path).map_err(|e| Error::unreadable(path, &e))?;
     Ok((path.file_name().map_or_else(String::new, |n| n.to_string_lossy().into_owned()), sha256))
 }

@@ -55,7 +55,7 @@ pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
     }
     let refused = |e: &dyn std::fmt::Display| Error::Usage(format!("{vehicle}: {e}"));
     let text =
-        sastrugi_store::file::read_text(Path::new(vehicle)).map_err(|e| Error::Input(format!("{vehicle}: {e}")))?;
+        sastrugi_store::file::read_text(Path::new(vehicle)).map_err(|e| Error::unreadable(Path::new(vehicle), &e))?;
     let file: Value = if is(".json") {
         serde_json::from_str(&text).map_err(|e| refused(&e))?
     } else {
@@ -144,7 +144,7 @@ pub fn to_toml(value: &Value) -> Result<toml_edit::Value, Error> {
 /// # Errors
 /// A file that is missing, or not valid TOML.
 pub fn read_file(path: &Path) -> Result<Value, Error> {
-    let text = sastrugi_store::file::read_text(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    let text = sastrugi_store::file::read_text(path).map_err(|e| Error::unreadable(path, &e))?;
     let name = path.display().to_string();
     let read = StudyText::parse(&text).and_then(|t| t.to_json());
     read.map_err(|error| Error::Study { name, text, refusals: error.into() })

@@ -164,7 +164,7 @@ fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Erro
 /// A missing file, or one that is not a fit.
 pub fn read_fit(path: &Path) -> Result<FitFile, Error> {
     let name = path.display();
-    let bytes = sastrugi_store::file::read(path).map_err(|e| Error::Input(format!("{name}: {e}")))?;
+    let bytes = sastrugi_store::file::read(path).map_err(|e| Error::unreadable(path, &e))?;
     let fit: FitFile = serde_json::from_slice(&bytes).map_err(|e| match dem::Format::of_name(path) {
         Some(_) => Error::Input(format!("{name} is a DEM, not a fit file; run `sastrugi fit` first")),
         None => Error::Input(format!("{name}: not a fit file: {e}")),
