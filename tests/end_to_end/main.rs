@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
+mod cluster;
 mod costs;
 mod hostile;
 mod image;
@@ -393,11 +394,12 @@ fn val_merge_refuses_what_does_not_fit() {
         assert!(call.code == 65 && call.stderr.contains(words), "{shards:?}: {} {}", call.code, call.stderr);
         assert!(!path.join("merged").exists());
     };
-    refused(&["a"], "shard 2 of 2 is missing");
+    refused(&["a"], "shard 2 of 2 is missing; run the study again with `--shard 2/2`");
+    refused(&["a", "nowhere"], "nowhere is not a shard: it has no shard.json; shard 2 of 2 is missing");
     refused(&["a", "a"], "both shard 1");
     refused(&["a", "c"], "another study");
     flip(&first_product(&path.join("b/items")));
-    refused(&["a", "b"], "missing or damaged");
+    refused(&["a", "b"], "missing or damaged; run the study again with `--shard 2/2`");
 }
 
 /// `analyze` finds in a recording the metrics that the release's table has for the mission, bit for bit.

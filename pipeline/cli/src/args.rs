@@ -48,17 +48,25 @@ pub enum Verb {
     Init(Init),
     /// Run a study and write its release; resumes where an earlier run stopped.
     #[command(
-        after_help = "Examples:\n  sastrugi run study.toml -o release\n  sastrugi run study.toml -o part1 --shard 1/3"
+        after_help = "Examples:\n  sastrugi run study.toml -o release\n  sastrugi run study.toml -o part1 --shard 1/3\n  \
+        sastrugi run study.toml --ancestors 3 --cache cache\n  \
+        sastrugi run study.toml -o part1 --shard 1/3 --cache cache"
     )]
     Run(Run),
     /// Show what a run would compute, its cost, and why each stale item is stale.
-    #[command(
-        after_help = "Examples:\n  sastrugi plan study.toml -o release\n  sastrugi plan study.toml -o part1 --shard 1/3"
-    )]
+    #[command(after_help = "Examples:\n  sastrugi plan study.toml -o release\n  \
+        sastrugi plan study.toml -o part1 --shard 1/3\n  sastrugi plan study.toml --shards 8")]
     Plan(Plan),
     /// Merge shards into a release, byte for byte the same as an unsharded run.
     #[command(after_help = "Example:\n  sastrugi merge part1 part2 part3 -o release")]
     Merge(Merge),
+    /// Show how full a shared cache is, and remove what was not used for long.
+    #[command(
+        after_help = "Safe beside running shards: they compute what disappears. Without a limit nothing is removed.\n\
+        With one, drafts that killed runs left more than a day ago go too.\n\n\
+        Examples:\n  sastrugi cache /scratch/cache\n  sastrugi cache /scratch/cache --max-age 30 --max-bytes 500G"
+    )]
+    Cache(Cache),
     /// Check all checksums, schemas and row counts of a release; recompute items on request.
     #[command(after_help = "Examples:\n  sastrugi verify release\n  sastrugi verify release --recompute 3")]
     Verify(Verify),
@@ -285,6 +293,16 @@ pub struct Run {
     /// Run one of N shards (I = 1..N) into a folder for `merge`.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<String>,
+    /// Compute only what more than one of N shards needs, publish it to --cache, and write no release.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "cache", conflicts_with = "shard")]
+    pub ancestors: Option<u32>,
+    /// Shared cache: a folder that any number of runs may use at the same time, also over a network. Items in it are copied, others are
+    /// published to it.
+    #[arg(long, value_name = "DIR")]
+    pub cache: Option<String>,
+    /// Read the shared cache without writing to it.
+    #[arg(long, requires = "cache", conflicts_with = "ancestors")]
+    pub cache_read_only: bool,
     /// Replace an existing release of this study even if it has fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
@@ -304,6 +322,23 @@ pub struct Plan {
     /// Plan one of N shards (I = 1..N), including the items it depends on.
     #[arg(long, value_name = "I/N")]
     pub shard: Option<String>,
+    /// Show what each of N shards costs, what they have in common, and whether they are balanced, for an empty work area.
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000), conflicts_with = "shard")]
+    pub shards: Option<u32>,
+}
+
+/// `cache`.
+#[derive(Debug, Args)]
+pub struct Cache {
+    /// Shared cache.
+    #[arg(value_name = "DIR")]
+    pub place: String,
+    /// Remove the longest unused entries until the rest is no larger, such as 500G.
+    #[arg(long, value_name = "BYTES")]
+    pub max_bytes: Option<String>,
+    /// Remove entries that were not used for this time, days.
+    #[arg(long, value_name = "DAYS", allow_negative_numbers = true)]
+    pub max_age: Option<f64>,
 }
 
 /// `merge`.

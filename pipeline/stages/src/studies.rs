@@ -6,10 +6,12 @@ use crate::loaded::{Loaded, load_text};
 use crate::registry;
 use crate::runner::assemble::{Contents, assemble};
 use crate::runner::cache::Cache;
+use crate::runner::division::{Division, common_ancestors, divide};
 use crate::runner::execute::{Execution, Failure, Limits, execute};
 use crate::runner::plan::{PlanSummary, plan};
 use crate::runner::progress::Progress;
 use crate::runner::shard::{self, Part};
+use crate::runner::shared::{Sharing, Tally};
 use crate::study::Study;
 use sastrugi_schemas::manifest::ItemNote;
 use sastrugi_schemas::study::StudyHead;
@@ -49,6 +51,12 @@ pub struct RunSummary {
     pub failures: Vec<Failure>,
     /// Notes on the items of a release, as in its manifest; empty for a shard.
     pub notes: Vec<ItemNote>,
+    /// Of a merge: the shard of each item without a result.
+    #[serde(skip_serializing_if = "BTreeMap::is_empty")]
+    pub failed_in: BTreeMap<String, u32>,
+    /// What was done with the shared cache, if there is one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub cache: Option<Tally>,
 }
 
 impl RunSummary {
@@ -80,16 +88,30 @@ pub fn default_work(output: &Path) -> PathBuf {
 /// A destination that is not a sastrugi folder, a busy work area, or no item with a result. As long as some items have a
 /// result, failed items are not an error but are listed.
 pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -> Result<RunSummary, Error> {
+    run_sharing(loaded, request, None, progress)
+}
+
+/// The same with a shared cache: items that it has are copied, all others are published to it.
+///
+/// # Errors
+/// As [`run`]. A cache that fails is no error; see [`RunSummary::cache`].
+pub fn run_sharing(
+    loaded: &Loaded,
+    request: &RunRequest<'_>,
+    sharing: Option<Sharing>,
+    progress: &dyn Progress,
+) -> Result<RunSummary, Error> {
     check_destination(request)?;
     let work = request.work.map_or_else(|| default_work(request.output), Path::to_owned);
-    let cache = Cache::open(&work)?;
+    let cache = Cache::open(&work)?.sharing(sharing);
     let graph = &loaded.graph;
     let needed = needed(loaded, request.part);
     check_memory(loaded, &cache, &needed, request.limits)?;
     let execution = execute(graph, &cache, &needed, request.limits, progress)?;
     write_timings(&cache, &execution)?;
     let made = execution.done.iter().any(|&p| is_worth_a_release(&graph.node(p).item.stage, request.purpose));
-    if !made && !execution.failures.is_empty() {
+    // A shard is written even so: other shards may have results.
+    if !made && !execution.failures.is_empty() && request.part.is_none() {
         return Err(all_failed(&execution.failures));
     }
     let notes = match request.part {
@@ -112,9 +134,56 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
         }
     };
     cache.drop_orphans(graph)?;
-    let computed = execution.seconds.len() - execution.failures.iter().filter(|f| f.skipped_for.is_none()).count();
-    let (output, items, failures) = (request.output.to_owned(), needed.len(), execution.failures);
-    Ok(RunSummary { output, items, computed, failures, notes })
+    Ok(RunSummary { notes, ..summary(request.output, needed.len(), execution, &cache) })
+}
+
+/// Computes the items that more than one of `count` shards needs, and publishes them to a shared cache. Nothing but the work area is
+/// written otherwise.
+///
+/// # Errors
+/// As [`run`]; also a cache that is only read, or that an item could not be published to, because the shards would compute it again.
+pub fn run_ancestors(
+    loaded: &Loaded,
+    count: u32,
+    request: &RunRequest<'_>,
+    sharing: Sharing,
+    progress: &dyn Progress,
+) -> Result<RunSummary, Error> {
+    if sharing.tally().read_only {
+        return Err(Error::Usage(
+            "the cache cannot be written to, so the shards would not find the ancestors".to_owned(),
+        ));
+    }
+    let work = request.work.map_or_else(|| default_work(request.output), Path::to_owned);
+    let cache = Cache::open(&work)?.sharing(Some(sharing));
+    let needed = common_ancestors(&loaded.graph, count);
+    check_memory(loaded, &cache, &needed, request.limits)?;
+    let execution = execute(&loaded.graph, &cache, &needed, request.limits, progress)?;
+    write_timings(&cache, &execution)?;
+    if execution.done.is_empty() && !execution.failures.is_empty() {
+        return Err(all_failed(&execution.failures));
+    }
+    let summary = summary(&work, needed.len(), execution, &cache);
+    match summary.cache.as_ref().and_then(|tally| tally.problems.first().cloned()) {
+        Some(problem) => {
+            Err(Error::Retry(format!("some ancestors may be missing from the cache: {problem}; run again")))
+        }
+        None => Ok(summary),
+    }
+}
+
+/// Summary of an execution.
+fn summary(output: &Path, items: usize, execution: Execution, cache: &Cache) -> RunSummary {
+    let failed = execution.failures.iter().filter(|f| f.skipped_for.is_none()).count();
+    RunSummary {
+        output: output.to_owned(),
+        items,
+        computed: execution.seconds.len() - failed,
+        failures: execution.failures,
+        notes: Vec::new(),
+        failed_in: BTreeMap::new(),
+        cache: cache.shared().map(Sharing::tally),
+    }
 }
 
 /// Items of a shard and their ancestors; all items without a shard.
@@ -248,12 +317,20 @@ pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>, part: Option
     Ok(PlanSummary { doubts: loaded.doubts.clone(), ..plan })
 }
 
+/// Divides a study into `count` shards: what each costs, and what they have in common.
+pub fn plan_shards(loaded: &Loaded, count: u32) -> Division {
+    divide(&loaded.graph, count)
+}
+
 /// Merges shards into a release.
 ///
 /// # Errors
 /// Shards that do not form one complete study, or a destination that is not a sastrugi folder.
 pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Progress) -> Result<RunSummary, Error> {
     let joined = shard::join(shards)?;
+    if joined.results.is_empty() && !joined.failures.is_empty() {
+        return Err(all_failed(&joined.failures));
+    }
     let study = Study::parse(&joined.study, Path::new(""), &registry::section_names()).map_err(Error::failed)?;
     let items = joined.results.len() + joined.failures.len();
     let contents = Contents {
@@ -265,7 +342,8 @@ pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Pr
         replace,
     };
     let notes = assemble(&contents, output, progress)?.manifest().notes.clone();
-    Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures: joined.failures, notes })
+    let (failures, failed_in) = (joined.failures, joined.failed_in);
+    Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures, notes, failed_in, cache: None })
 }
 
 /// Runs a study composed by a verb and writes its release.

@@ -1,6 +1,7 @@
 //! Verbs, one module per group: arguments in; a printed result and an exit code out.
 
 mod analyze;
+mod cache;
 mod compare;
 mod coregister;
 mod files;
@@ -34,6 +35,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Run(args) => study::run(args, common),
         Verb::Plan(args) => study::plan(args, common),
         Verb::Merge(args) => study::merge(args, common),
+        Verb::Cache(args) => cache::cache(args, common),
         Verb::Verify(args) => study::verify(args, common),
         Verb::Report(args) => study::report(args, common),
         Verb::Pack(args) => study::pack(args, common),

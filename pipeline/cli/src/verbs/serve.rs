@@ -124,7 +124,7 @@ fn start_log(args: &Serve, common: &Common) {
 }
 
 /// A number of bytes, such as `10G`, `512M` or `1.5GiB`.
-fn bytes(option: &str, text: &str) -> Result<u64, Failure> {
+pub(super) fn bytes(option: &str, text: &str) -> Result<u64, Failure> {
     let end = text.find(|c: char| !(c.is_ascii_digit() || c == '.')).unwrap_or(text.len());
     let (number, unit) = text.split_at(end);
     let factor = match unit.trim().to_ascii_uppercase().trim_end_matches("IB").trim_end_matches('B') {

@@ -9,9 +9,11 @@ use sastrugi_report::{Companions, ReportError};
 use sastrugi_schemas::manifest::ItemNote;
 use sastrugi_stages::loaded;
 use sastrugi_stages::packing;
-use sastrugi_stages::runner::execute::Limits;
+use sastrugi_stages::runner::division::{Cost, Division, ShardCost};
+use sastrugi_stages::runner::execute::{Failure as Failed, Limits};
 use sastrugi_stages::runner::progress::Progress;
 use sastrugi_stages::runner::shard::Part;
+use sastrugi_stages::runner::shared::{self, Sharing, Tally};
 use sastrugi_stages::studies::{self, RunRequest, RunSummary};
 use sastrugi_stages::verbs::{parameters, traverse as drive};
 use sastrugi_stages::verification::{self, Difference, Recompute};
@@ -46,8 +48,22 @@ pub fn run(args: &Run, common: &Common) -> Verdict {
     let loaded = loaded::load(&args.study)?;
     print_warnings(&loaded.doubts, common);
     let Place { output, work } = &args.place;
+    let sharing = sharing(args)?;
     let request = RunRequest { output, work: work.as_deref(), part, purpose: None, replace: args.replace, limits };
-    finish_run(common, |reporter| Ok(studies::run(&loaded, &request, reporter)?))
+    finish_run(common, |reporter| match (args.ancestors, sharing) {
+        (Some(count), Some(sharing)) => Ok(studies::run_ancestors(&loaded, count, &request, sharing, reporter)?),
+        (_, sharing) => Ok(studies::run_sharing(&loaded, &request, sharing, reporter)?),
+    })
+}
+
+/// The shared cache of a run.
+fn sharing(args: &Run) -> Result<Option<Sharing>, Failure> {
+    let Some(place) = &args.cache else { return Ok(None) };
+    if studies::resolved(Path::new(place)).starts_with(studies::resolved(&args.place.output)) {
+        let message = "the shared cache lies inside the output folder, which is replaced; choose another --cache";
+        return Err(Failure::usage(message));
+    }
+    Ok(Some(Sharing::new(shared::open(place, args.cache_read_only)?)))
 }
 
 /// Prints warnings that a user should see before a long run.
@@ -113,10 +129,32 @@ pub(super) fn watch(
     );
     if failed > 0 {
         text.push_str("\nfailed items (parameters in manifest.json):");
-        summary.failures.iter().for_each(|f| text.push_str(&format!("\n  {}: {}", f.item, f.message)));
+        summary.failures.iter().for_each(|f| text.push_str(&failure(f, &summary)));
+    }
+    if let Some(tally) = &summary.cache {
+        text.push_str(&used(tally));
     }
     text.push_str(&notes(&summary));
     Ok((summary, text))
+}
+
+/// A failed item, after a merge with its shard.
+fn failure(failure: &Failed, summary: &RunSummary) -> String {
+    let shard = summary.failed_in.get(&failure.item.to_string());
+    let shard = shard.map_or_else(String::new, |shard| format!("shard {shard}, "));
+    format!("\n  {shard}{}: {}", failure.item, failure.message)
+}
+
+/// What a run did with its shared cache.
+fn used(tally: &Tally) -> String {
+    let Tally { fetched, published, damaged, read_only, problems } = tally;
+    let published = if *read_only { "only read".to_owned() } else { format!("{published} published to it") };
+    let mut text = format!("\n  shared cache: {fetched} items copied from it, {published}");
+    if !damaged.is_empty() {
+        text.push_str(&format!(", {} entries were damaged and replaced", damaged.len()));
+    }
+    problems.iter().take(NOTES_MAX).for_each(|problem| text.push_str(&format!("\n  shared cache: {problem}")));
+    text
 }
 
 /// Notes on items: first verdicts on fits, then the other notes if they are few.
@@ -136,6 +174,12 @@ fn notes(summary: &RunSummary) -> String {
 /// `plan`.
 pub fn plan(args: &Plan, common: &Common) -> Verdict {
     let loaded = loaded::load(&args.study)?;
+    if let Some(count) = args.shards {
+        print_warnings(&loaded.doubts, common);
+        let division = studies::plan_shards(&loaded, count);
+        print(common.json, &serde_json::to_value(&division).map_err(Failure::failed)?, &divided(&division))?;
+        return Ok(Code::Done);
+    }
     let part = args.shard.as_deref().map(Part::parse).transpose()?;
     let plan = studies::plan_of(&loaded, &args.place.output, args.place.work.as_deref(), part)?;
     print_warnings(&loaded.doubts, common);
@@ -162,6 +206,33 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     }
     print(common.json, &serde_json::to_value(&plan).map_err(Failure::failed)?, &text)?;
     Ok(Code::Done)
+}
+
+/// A table of shards, and what to know about them.
+fn divided(division: &Division) -> String {
+    let head = ["", "own items", "with ancestors", "time", "memory", "artifacts", "time with --cache"];
+    let mut rows = vec![head.map(str::to_owned).to_vec()];
+    let cells = |name: String, own: String, needed: &Cost, left: Option<f64>| {
+        let Cost { items, seconds: time, bytes: size, memory_bytes } = needed;
+        let left = left.map_or_else(String::new, seconds);
+        vec![name, own, items.to_string(), seconds(*time), bytes(*memory_bytes as f64), bytes(*size), left]
+    };
+    let shard = |s: &ShardCost| cells(format!("shard {}", s.shard), s.own.to_string(), &s.needed, Some(s.left.seconds));
+    let common = &division.common_ancestors;
+    rows.push(cells("study".to_owned(), division.study.items.to_string(), &division.study, None));
+    rows.push(cells("common ancestors".to_owned(), String::new(), common, Some(common.seconds)));
+    rows.extend(division.shards.iter().take(PLAN_LINES).map(shard));
+    let mut text = columns(&rows);
+    if division.shards.len() > PLAN_LINES {
+        text.push_str(&format!("\nand {} more (--json lists all)", division.shards.len() - PLAN_LINES));
+    }
+    text.push_str(&format!(
+        "\nall shards together, on one core: {} without a shared cache, {} with one",
+        seconds(division.seconds_without_cache),
+        seconds(division.seconds_with_cache)
+    ));
+    division.advice.iter().for_each(|line| text.push_str(&format!("\n{line}")));
+    text
 }
 
 /// `verify`.

@@ -6,6 +6,8 @@
 
 use super::graph::{Graph, Ingredients};
 use super::lock;
+use super::shared::Sharing;
+use crate::error::Error;
 use crate::job::{ItemRef, Outcome, Product};
 use sastrugi_store::atomic::{self, Draft};
 use sastrugi_store::digest;
@@ -16,7 +18,8 @@ use std::fs::{self, File};
 use std::io;
 use std::path::{Path, PathBuf};
 
-const RECORD: &str = "record.json";
+/// The record in the folder of a result.
+pub const RECORD: &str = "record.json";
 const FAILURE: &str = "failure.json";
 /// File that marks a work area.
 const MARK: &str = "CACHEDIR.TAG";
@@ -42,6 +45,13 @@ pub struct Record {
     pub files: Vec<StoredFile>,
     /// Its notes.
     pub notes: Vec<String>,
+}
+
+impl Record {
+    /// Names of the files of its folder, the record last.
+    pub fn names(&self) -> impl Iterator<Item = &str> {
+        self.files.iter().map(|f| f.product.file.as_str()).chain([RECORD])
+    }
 }
 
 /// The last failure of an item.
@@ -95,6 +105,7 @@ fn io_error<'a>(action: &'static str, path: &'a Path) -> impl FnOnce(io::Error) 
 #[derive(Debug)]
 pub struct Cache {
     folder: PathBuf,
+    sharing: Option<Sharing>,
     _lock: Option<File>,
 }
 
@@ -108,7 +119,7 @@ impl Cache {
         let path = folder.join("lock");
         let lock = lock::take(&path).map_err(io_error("cannot lock", &path))?;
         let lock = lock.ok_or_else(|| CacheError::Busy(folder.to_owned()))?;
-        let cache = Self { folder: folder.to_owned(), _lock: Some(lock) };
+        let cache = Self { folder: folder.to_owned(), sharing: None, _lock: Some(lock) };
         cache.for_each_result(
             |path, name| if name.starts_with(UNFINISHED) { fs::remove_dir_all(path) } else { Ok(()) },
         )?;
@@ -117,7 +128,34 @@ impl Cache {
 
     /// Opens a work area read-only, without taking its lock.
     pub fn look(folder: &Path) -> Self {
-        Self { folder: folder.to_owned(), _lock: None }
+        Self { folder: folder.to_owned(), sharing: None, _lock: None }
+    }
+
+    /// The same work area with a shared cache behind it.
+    pub fn sharing(self, sharing: Option<Sharing>) -> Self {
+        Self { sharing, ..self }
+    }
+
+    /// The shared cache behind it.
+    pub fn shared(&self) -> Option<&Sharing> {
+        self.sharing.as_ref()
+    }
+
+    /// Copies a result from the shared cache, if it has an intact one.
+    pub fn fetch(&self, item: &ItemRef, key: &str) -> Option<Record> {
+        let sharing = self.sharing.as_ref()?;
+        // Errors of the work area return when the item is computed.
+        let folder = self.begin(item, key).ok()?;
+        let record = sharing.fetch(item, key, Draft(&folder))?;
+        self.put_in_place(&folder, &record).ok()?;
+        Some(record)
+    }
+
+    /// Offers a result to the shared cache.
+    pub fn publish(&self, record: &Record) {
+        if let Some(sharing) = &self.sharing {
+            sharing.publish(record, &self.result_folder(&record.item, &record.key));
+        }
     }
 
     /// The work area's folder.
@@ -206,6 +244,12 @@ impl Cache {
         let path = folder.join(RECORD);
         let text = serde_json::to_vec(&record).map_err(|e| io_error("cannot encode", &path)(e.into()))?;
         atomic::write(&Draft(folder).file(RECORD), &text).map_err(io_error("cannot write", &path))?;
+        self.put_in_place(folder, &record)?;
+        Ok(record)
+    }
+
+    /// Gives a complete folder the name of its result.
+    fn put_in_place(&self, folder: &Path, record: &Record) -> Result<(), CacheError> {
         let target = self.result_folder(&record.item, &record.key);
         if target.exists() {
             fs::remove_dir_all(&target).map_err(io_error("cannot clear", &target))?;
@@ -213,8 +257,7 @@ impl Cache {
         let parent = self.item_folder(&record.item);
         atomic::sync_folder(folder).map_err(io_error("cannot flush", folder))?;
         fs::rename(folder, &target).map_err(io_error("cannot rename to", &target))?;
-        atomic::sync_folder(&parent).map_err(io_error("cannot flush", &parent))?;
-        Ok(record)
+        atomic::sync_folder(&parent).map_err(io_error("cannot flush", &parent))
     }
 
     /// Removes every result that does not belong to an item of the graph. Returns their number.
@@ -271,7 +314,11 @@ fn mark(folder: &Path) -> Result<(), CacheError> {
 
 /// True for the name of a folder with a result, finished or unfinished.
 fn is_result(name: &str) -> bool {
-    let key = name.strip_prefix(UNFINISHED).unwrap_or(name);
+    is_key(name.strip_prefix(UNFINISHED).unwrap_or(name))
+}
+
+/// True for the form of a key.
+pub fn is_key(key: &str) -> bool {
     key.len() == KEY_DIGITS && key.bytes().all(|b| b.is_ascii_hexdigit())
 }
 
@@ -303,6 +350,20 @@ fn children(folder: &Path) -> Result<Vec<PathBuf>, CacheError> {
 pub fn load_record(folder: &Path) -> Option<Record> {
     let record: Record = read_json(&folder.join(RECORD))?;
     are_complete(folder, &record.files).then_some(record)
+}
+
+/// Copies the files of a result and then its record into an existing folder, each flushed to disk.
+///
+/// # Errors
+/// I/O errors.
+pub fn copy_result(record: &Record, from: &Path, to: &Path) -> Result<(), Error> {
+    for name in record.names() {
+        let target = to.join(name);
+        fs::copy(from.join(name), &target)
+            .and_then(|_| File::open(&target)?.sync_all())
+            .map_err(|e| Error::at(&target, e))?;
+    }
+    Ok(())
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Option<T> {

@@ -4,6 +4,7 @@ use super::cache::Cache;
 use super::graph::Graph;
 use super::progress::{End, Progress};
 use crate::job::{Cause, ItemRef, JobError, Work};
+use rayon::prelude::*;
 use sastrugi_store::atomic::Draft;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -54,8 +55,14 @@ pub struct Execution {
     pub done: Vec<usize>,
     /// Items without one, in graph order.
     pub failures: Vec<Failure>,
-    /// Wall time of each item that ran, s.
+    /// Wall time of each item that was computed, s.
     pub seconds: BTreeMap<String, f64>,
+}
+
+/// An item with a result.
+struct Ran {
+    notes: Vec<String>,
+    is_fetched: bool,
 }
 
 struct State {
@@ -78,7 +85,8 @@ struct Run<'a> {
     changed: Condvar,
 }
 
-/// Computes results for the `needed` items, which must include their parents.
+/// Computes results for the `needed` items, which must include their parents. With a shared cache behind the work area, what it has is
+/// copied instead, and what it lacks is published, also results that were ready.
 ///
 /// The process may be killed at any moment: an unfinished item leaves no result.
 ///
@@ -93,6 +101,10 @@ pub fn execute(
 ) -> Result<Execution, Stopped> {
     let (ready, missing): (Vec<usize>, Vec<usize>) =
         needed.iter().partition(|&&p| cache.holds(&graph.node(p).item, graph.key(p)));
+    if cache.shared().is_some() {
+        let records = ready.par_iter().filter_map(|&p| cache.load(&graph.node(p).item, graph.key(p)));
+        records.for_each(|record| cache.publish(&record));
+    }
     let seconds = missing.iter().map(|&p| graph.node(p).job.estimate().seconds).sum();
     progress.begin(needed.len(), ready.len(), seconds);
     let run = Run {
@@ -184,9 +196,13 @@ impl Run<'_> {
         state.ready.iter().copied().find(fits)
     }
 
-    fn run_item(&self, position: usize) -> Result<Vec<String>, JobError> {
+    /// Copies a result from the shared cache, or computes it.
+    fn run_item(&self, position: usize) -> Result<Ran, JobError> {
         let node = self.graph.node(position);
         let key = self.graph.key(position);
+        if let Some(record) = self.cache.fetch(&node.item, key) {
+            return Ok(Ran { notes: record.notes, is_fetched: true });
+        }
         let folder = self.cache.begin(&node.item, key).map_err(JobError::io)?;
         let parents = self
             .graph
@@ -207,18 +223,21 @@ impl Run<'_> {
             }
         })?;
         let record = self.cache.finish(self.graph, position, &folder, outcome).map_err(JobError::io)?;
-        Ok(record.notes)
+        self.cache.publish(&record);
+        Ok(Ran { notes: record.notes, is_fetched: false })
     }
 
-    fn settle(&self, position: usize, end: Result<Vec<String>, JobError>, seconds: f64) {
+    fn settle(&self, position: usize, end: Result<Ran, JobError>, seconds: f64) {
         let job = &self.graph.node(position).job;
         let item = &self.graph.node(position).item;
         let mut state = self.lock();
         state.running -= 1;
         state.memory_bytes -= job.memory_bytes();
-        state.execution.seconds.insert(item.to_string(), seconds);
+        if !end.as_ref().is_ok_and(|ran| ran.is_fetched) {
+            state.execution.seconds.insert(item.to_string(), seconds);
+        }
         match end {
-            Ok(notes) => {
+            Ok(Ran { notes, .. }) => {
                 state.execution.done.push(position);
                 self.release_children(&mut state, position);
                 self.progress.ended(item, &End::Done(notes), job.estimate().seconds);

@@ -2,8 +2,8 @@
 //!
 //! 1. A [`graph::Graph`] holds the items of a study ([`crate::loaded::load`]), parents before children, each with its key.
 //! 2. [`plan::plan`] compares them with a work area, a [`cache::Cache`], and says what a run would compute, and why.
-//! 3. [`execute::execute`] runs what is missing, in parallel as far as workers and memory allow.
-//! 4. [`shard::write`] keeps the part of one machine, and [`shard::join`] merges the parts.
+//! 3. [`execute::execute`] runs what is missing, in parallel as far as workers and memory allow. What a [shared cache](shared) has is copied.
+//! 4. [`shard::write`] keeps the part of one machine, and [`shard::join`] merges the parts; [`division::divide`] says what each part costs.
 //! 5. [`assemble::assemble`] seals the results in a release, with the merged tables ([`tables::Fragments`]).
 //!
 //! ```
@@ -48,12 +48,14 @@
 pub mod assemble;
 pub mod cache;
 pub mod damage;
+pub mod division;
 pub mod execute;
 pub mod graph;
 mod lock;
 pub mod plan;
 pub mod progress;
 pub mod shard;
+pub mod shared;
 pub mod tables;
 
 #[cfg(test)]

@@ -4,7 +4,7 @@
 //! items.
 
 use super::assemble::{DestinationLock, fewer_items};
-use super::cache::{Cache, Record, StoredFile, load_record};
+use super::cache::{Cache, Record, StoredFile, copy_result, load_record};
 use super::execute::Failure;
 use super::graph::Graph;
 use crate::error::Error;
@@ -15,11 +15,13 @@ use sastrugi_store::release::{Staging, check_path};
 use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs::{self, File};
+use std::fs;
 use std::path::{Path, PathBuf};
 
 const DESCRIPTION: &str = sastrugi_store::release::SHARD;
 const STUDY: &str = "study.toml";
+/// Maximum number of items that one message names.
+const ITEMS_NAMED: usize = 5;
 /// Maximum number of parts of a run.
 const PARTS_MAX: u32 = 100_000;
 
@@ -64,14 +66,14 @@ impl Part {
 
     /// True if a key belongs to this part.
     pub fn owns(self, key: &str) -> bool {
-        self.owner(key) == Some(self.index)
+        owner(key, self.count) == Some(self.index)
     }
+}
 
-    /// Number of the part that owns a key, from 1.
-    fn owner(self, key: &str) -> Option<u32> {
-        let n = u64::from_str_radix(key.get(..15)?, 16).ok()?;
-        Some((n % u64::from(self.count)) as u32 + 1)
-    }
+/// Number of the part that owns a key, 1 to `count`.
+pub fn owner(key: &str, count: u32) -> Option<u32> {
+    let n = u64::from_str_radix(key.get(..15)?, 16).ok()?;
+    Some((n % u64::from(count)) as u32 + 1)
 }
 
 /// Description of a shard, stored in its folder.
@@ -114,7 +116,9 @@ pub fn write(
     for &position in &own {
         let (item, key) = (&graph.node(position).item, graph.key(position));
         if let Some(record) = cache.load(item, key) {
-            copy_result(&record, &cache.result_folder(item, key), &item_folder(staging.path(), item))?;
+            let to = item_folder(staging.path(), item);
+            fs::create_dir_all(&to).map_err(|e| Error::at(&to, e))?;
+            copy_result(&record, &cache.result_folder(item, key), &to)?;
         }
     }
     let owned = |f: &&Failure| graph.find(&f.item).is_some_and(|p| own.contains(&p));
@@ -173,18 +177,6 @@ fn item_folder(shard: &Path, item: &ItemRef) -> PathBuf {
     shard.join("items").join(&item.stage).join(&item.id)
 }
 
-fn copy_result(record: &Record, from: &Path, to: &Path) -> Result<(), Error> {
-    fs::create_dir_all(to).map_err(|e| Error::at(to, e))?;
-    let names = record.files.iter().map(|f| f.product.file.as_str()).chain(["record.json"]);
-    for name in names {
-        let target = to.join(name);
-        fs::copy(from.join(name), &target)
-            .and_then(|_| File::open(&target)?.sync_all())
-            .map_err(|e| Error::at(&target, e))?;
-    }
-    Ok(())
-}
-
 /// Merged shards: the study, and the folder of each result.
 pub struct Joined {
     /// Text of the study.
@@ -193,6 +185,8 @@ pub struct Joined {
     pub results: Vec<PathBuf>,
     /// Items without a result.
     pub failures: Vec<Failure>,
+    /// Shard of each of them, by the item's name.
+    pub failed_in: BTreeMap<String, u32>,
     /// Assignment of terrains to train, validation and test.
     pub splits: Splits,
 }
@@ -200,33 +194,94 @@ pub struct Joined {
 /// Merges the shards of one study.
 ///
 /// # Errors
-/// Folders that are not shards; shards of different studies or programs; missing, repeated or incomplete shards. All are listed.
+/// Folders that are not shards; shards of different studies or programs; missing, repeated or incomplete shards. All are listed, with what to
+/// run again. Nothing that is complete is computed again.
 pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
-    let shards = folders.iter().map(|f| read(f)).collect::<Result<Vec<_>, Error>>()?;
-    check_set(folders, &shards)?;
-    let Some(first) = shards.first() else { return Err(Error::Usage("no shards given".to_owned())) };
-    let study = sastrugi_store::file::read_text(&folders[0].join(STUDY))
-        .map_err(|e| Error::Input(format!("{}: {e}", folders[0].display())))?;
+    let (shards, mut problems) = read_all(folders);
+    problems.extend(check_set(&shards));
+    if !problems.is_empty() {
+        return Err(Error::Input(problems.join("; ")));
+    }
+    let Some((folder, first)) = shards.first() else { return Err(Error::Usage("no shards given".to_owned())) };
+    let study = sastrugi_store::file::read_text(&folder.join(STUDY))
+        .map_err(|e| Error::Input(format!("{}: {e}", folder.display())))?;
     if sastrugi_store::digest::of_text(&study) != first.study_sha256 {
-        return Err(Error::Input(format!(
-            "{}: study.toml was changed after the shard was written",
-            folders[0].display()
-        )));
+        return Err(Error::Input(format!("{}: study.toml was changed after the shard was written", folder.display())));
     }
     let failures: BTreeMap<ItemRef, Failure> =
-        shards.iter().flat_map(|s| &s.failures).map(|f| (f.item.clone(), f.clone())).collect();
-    let by_part: BTreeMap<u32, &PathBuf> = shards.iter().map(|s| s.part.index).zip(folders).collect();
-    let mut results = Vec::new();
-    for (item, key) in &first.items {
-        let owner = first.part.owner(key);
-        let folder = owner.and_then(|o| by_part.get(&o)).map(|f| item_folder(f, item));
-        let result = folder.filter(|f| load_record(f).is_some_and(|r| r.key == *key && is_intact(&r, f)));
-        if result.is_none() && !failures.contains_key(item) {
-            return Err(Error::Input(format!("{item} is missing or damaged in its shard; run that shard again")));
+        shards.iter().flat_map(|(_, s)| &s.failures).map(|f| (f.item.clone(), f.clone())).collect();
+    let failed_in = shards.iter().flat_map(|(_, s)| s.failures.iter().map(|f| (f.item.to_string(), s.part.index)));
+    Ok(Joined {
+        study,
+        results: results(&shards, &failures)?,
+        failed_in: failed_in.collect(),
+        failures: failures.into_values().collect(),
+        splits: first.splits.clone(),
+    })
+}
+
+/// A shard and its folder.
+type Placed<'a> = (&'a PathBuf, Description);
+
+/// The shards, and why other folders are not shards.
+fn read_all(folders: &[PathBuf]) -> (Vec<Placed<'_>>, Vec<String>) {
+    let (mut shards, mut problems) = (Vec::new(), Vec::new());
+    for folder in folders {
+        match read(folder) {
+            Ok(description) => shards.push((folder, description)),
+            Err(e) => problems.push(e.to_string()),
         }
-        results.extend(result);
     }
-    Ok(Joined { study, results, failures: failures.into_values().collect(), splits: first.splits.clone() })
+    (shards, problems)
+}
+
+/// The folders of all results, parents before children.
+fn results(shards: &[Placed<'_>], failures: &BTreeMap<ItemRef, Failure>) -> Result<Vec<PathBuf>, Error> {
+    let by_part: BTreeMap<u32, &PathBuf> = shards.iter().map(|(folder, s)| (s.part.index, *folder)).collect();
+    let Some((_, first)) = shards.first() else { return Ok(Vec::new()) };
+    let mut results = Vec::new();
+    let mut missing: BTreeMap<u32, Vec<&ItemRef>> = BTreeMap::new();
+    for (item, key) in &first.items {
+        let part = owner(key, first.part.count).unwrap_or(1);
+        let Some(folder) = by_part.get(&part).map(|folder| item_folder(folder, item)) else { continue };
+        if load_record(&folder).is_some_and(|r| r.key == *key && is_intact(&r, &folder)) {
+            results.push(folder);
+        } else if !failures.contains_key(item) {
+            missing.entry(part).or_default().push(item);
+        }
+    }
+    let problem = |(part, items): (&u32, &Vec<&ItemRef>)| {
+        let folder = by_part.get(part).map_or_else(String::new, |folder| folder.display().to_string());
+        let names: Vec<String> = items.iter().take(ITEMS_NAMED).map(ToString::to_string).collect();
+        let more =
+            if items.len() > ITEMS_NAMED { format!(" and {} more", items.len() - ITEMS_NAMED) } else { String::new() };
+        format!(
+            "shard {part} ({folder}): {}{more} missing or damaged; {}",
+            names.join(", "),
+            mend(&[*part], first.part.count)
+        )
+    };
+    let problems: Vec<String> = missing.iter().map(problem).collect();
+    if problems.is_empty() { Ok(results) } else { Err(Error::Input(problems.join("; "))) }
+}
+
+/// What to do about missing or damaged shards.
+fn mend(numbers: &[u32], count: u32) -> String {
+    let shards = match numbers {
+        [one] => format!("`--shard {one}/{count}`"),
+        several => format!("`--shard I/{count}` for I = {}", ranges(several)),
+    };
+    format!("run the study again with {shards}, then merge again; what is complete is not computed again")
+}
+
+/// Sorted numbers as a list of ranges, such as `2,5-7`: the form that Slurm's `--array` takes.
+fn ranges(numbers: &[u32]) -> String {
+    let runs = numbers.chunk_by(|a, b| a + 1 == *b);
+    let text = |run: &[u32]| match run {
+        [first, .., last] => format!("{first}-{last}"),
+        other => other.iter().map(u32::to_string).collect(),
+    };
+    runs.map(text).collect::<Vec<String>>().join(",")
 }
 
 /// True if every file still has its recorded hash.
@@ -246,16 +301,17 @@ fn read(folder: &Path) -> Result<Description, Error> {
     Ok(description)
 }
 
-fn check_set(folders: &[PathBuf], shards: &[Description]) -> Result<(), Error> {
-    let Some(first) = shards.first() else { return Ok(()) };
+/// Why shards do not form one complete study.
+fn check_set(shards: &[Placed<'_>]) -> Vec<String> {
+    let Some((first_folder, first)) = shards.first() else { return Vec::new() };
     let mut problems = Vec::new();
     let mut seen: BTreeMap<u32, &PathBuf> = BTreeMap::new();
-    for (shard, folder) in shards.iter().zip(folders) {
+    for (folder, shard) in shards {
         let name = folder.display();
         if shard.study_sha256 != first.study_sha256 || shard.items != first.items {
             problems.push(format!(
                 "{name} is from another study, or another revision of the program, than {}",
-                folders[0].display()
+                first_folder.display()
             ));
         } else if shard.program != first.program || shard.part.count != first.part.count {
             problems.push(format!(
@@ -266,12 +322,19 @@ fn check_set(folders: &[PathBuf], shards: &[Description]) -> Result<(), Error> {
             problems.push(format!("{name} and {} are both shard {}", other.display(), shard.part.index));
         }
     }
-    let missing: Vec<String> =
-        (1..=first.part.count).filter(|i| !seen.contains_key(i)).map(|i| i.to_string()).collect();
+    let count = first.part.count;
+    let missing: Vec<u32> = (1..=count).filter(|i| !seen.contains_key(i)).collect();
     if problems.is_empty() && !missing.is_empty() {
-        problems.push(format!("shard {} of {} is missing", missing.join(", "), first.part.count));
+        let are = if missing.len() == 1 { ("shard", "is") } else { ("shards", "are") };
+        problems.push(format!(
+            "{} {} of {count} {} missing; {}",
+            are.0,
+            ranges(&missing),
+            are.1,
+            mend(&missing, count)
+        ));
     }
-    if problems.is_empty() { Ok(()) } else { Err(Error::Input(problems.join("; "))) }
+    problems
 }
 
 #[cfg(test)]
@@ -293,7 +356,6 @@ mod tests {
     /// The owner is the remainder of the first 15 digits, so it does not depend on the rest of the key: 0xa = 10 = 7 + 3.
     #[test]
     fn val_owners_of_keys() {
-        let owner = |key: &str, count: u32| Part { index: 1, count }.owner(key);
         assert_eq!(owner("00000000000000a00000000000000000", 7), Some(4));
         assert_eq!(owner("00000000000000affffffffffffffff0", 7), Some(4));
         assert_eq!(owner("fffffffffffffff00000000000000000", 1), Some(1));
@@ -339,11 +401,15 @@ mod tests {
     fn val_only_complete_sets_are_merged() {
         let folders = ["one", "two", "three"].map(PathBuf::from);
         let check = |shards: &[Description]| {
-            check_set(&folders[..shards.len()], shards).map_err(|e| e.to_string()).err().unwrap_or_default()
+            let placed: Vec<Placed<'_>> = folders.iter().zip(shards.iter().cloned()).collect();
+            check_set(&placed).join("; ")
         };
         assert_eq!(check(&[description(3, 3), description(1, 3), description(2, 3)]), "");
-        assert_eq!(check(&[description(1, 3), description(3, 3)]), "shard 2 of 3 is missing");
-        assert_eq!(check(&[description(1, 3)]), "shard 2, 3 of 3 is missing");
+        assert_eq!(
+            check(&[description(1, 3), description(3, 3)]),
+            format!("shard 2 of 3 is missing; {}", mend(&[2], 3))
+        );
+        assert_eq!(check(&[description(1, 3)]), format!("shards 2-3 of 3 are missing; {}", mend(&[2, 3], 3)));
         assert_eq!(check(&[description(1, 2), description(1, 2)]), "two and one are both shard 1");
         let counted = "two is one of 3 shards by sastrugi; expected one of 2 by sastrugi";
         assert_eq!(check(&[description(1, 2), description(2, 3)]), counted);
@@ -353,6 +419,20 @@ mod tests {
             let error = check(&[description(1, 2), stranger]);
             assert_eq!(error, "two is from another study, or another revision of the program, than one");
         }
+    }
+
+    /// The numbers of shards to run again can be given to Slurm as they are.
+    #[test]
+    fn val_ranges_of_shards() {
+        let check = |numbers: &[u32], expected: &str| assert_eq!(ranges(numbers), expected);
+        check(&[2], "2");
+        check(&[2, 3], "2-3");
+        check(&[1, 3, 5], "1,3,5");
+        check(&[1, 2, 3, 7, 9, 10], "1-3,7,9-10");
+        check(&[], "");
+        let advice = "then merge again; what is complete is not computed again";
+        assert_eq!(mend(&[2], 3), format!("run the study again with `--shard 2/3`, {advice}"));
+        assert_eq!(mend(&[2, 3], 8), format!("run the study again with `--shard I/8` for I = 2-3, {advice}"));
     }
 
     /// Descriptions come from outside: they must not name places beyond the folder of the shard.

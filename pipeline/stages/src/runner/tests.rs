@@ -1,5 +1,8 @@
 //! Keys, work area, plan and execution, with jobs that only write a line of text.
 
+mod division;
+mod shared;
+
 use super::cache::{Cache, CacheError};
 use super::execute::{Execution, Limits, execute};
 use super::graph::{Graph, InputFile, Node};

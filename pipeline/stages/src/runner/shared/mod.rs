@@ -1,0 +1,225 @@
+//! The shared cache: finished items by key, for any number of runs on any number of machines at the same time.
+//!
+//! An entry holds what the folder of a result in a work area holds: the files of an item and `record.json`. It is named by the item's key,
+//! appears complete or not at all, and never changes. Two runs that publish the same item made the same bytes, so it does not matter who is
+//! first. Nothing relies on locks, because network file systems and object stores do not offer them.
+//!
+//! An entry is used only if every file has the SHA-256 that the record states. A damaged entry counts as missing; the run that meets it
+//! removes it, computes the item and publishes it again. The hashes find damage, not malice: whoever may write to a cache decides what its
+//! readers get.
+//!
+//! A cache saves work and decides nothing: a run computes what it cannot read, and notes what it cannot publish.
+
+mod eviction;
+mod folder;
+
+pub use eviction::{DRAFT_AGE_MAX, Keep, Pruned, prune};
+pub use folder::Folder;
+
+use super::cache::{RECORD, Record, is_key};
+use crate::error::Error;
+use crate::job::ItemRef;
+use sastrugi_store::atomic::{AtomicFile, Draft};
+use sastrugi_store::digest::Hashed;
+use sastrugi_store::release::check_path;
+use serde::Serialize;
+use std::collections::BTreeSet;
+use std::fmt::Debug;
+use std::io::Write;
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::time::SystemTime;
+
+/// Folder of the entries in a cache.
+const ENTRIES: &str = "entries";
+
+/// A place for entries. Names of entries are relative paths, `entries/<first two digits of the key>/<key>`.
+pub trait Shared: Debug + Send + Sync {
+    /// Copies a file of an entry; false if the file does not exist.
+    ///
+    /// # Errors
+    /// The place cannot be read.
+    fn read(&self, name: &str, file: &str, to: &mut dyn Write) -> Result<bool, Error>;
+
+    /// Publishes the files in a folder as an entry; false if the entry exists already.
+    ///
+    /// # Errors
+    /// The place cannot be written to.
+    fn publish(&self, name: &str, record: &Record, folder: &Path) -> Result<bool, Error>;
+
+    /// Notes that an entry was used, where that is cheap.
+    fn mark_used(&self, name: &str) {
+        let _ = name;
+    }
+
+    /// Removes an entry or a draft; success if it does not exist.
+    ///
+    /// # Errors
+    /// The place cannot be written to.
+    fn remove(&self, name: &str) -> Result<(), Error>;
+
+    /// Everything in the place, in any order.
+    ///
+    /// # Errors
+    /// The place cannot be read.
+    fn list(&self) -> Result<Vec<Entry>, Error>;
+
+    /// True if nothing is written to the place.
+    fn is_read_only(&self) -> bool;
+}
+
+/// An entry, or something incomplete.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Entry {
+    /// Name.
+    pub name: String,
+    /// Size of its files, bytes.
+    pub bytes: u64,
+    /// Time of its last use; of its last change if it is a draft.
+    pub used: SystemTime,
+    /// False for an entry under construction, and for what a killed run left of one.
+    pub is_complete: bool,
+}
+
+/// Opens the shared cache at a place: a folder, which is created if it does not exist.
+///
+/// # Errors
+/// A folder with other files, or one that cannot be used.
+pub fn open(place: &str, read_only: bool) -> Result<Box<dyn Shared>, Error> {
+    Ok(Box::new(Folder::open(Path::new(place), read_only)?))
+}
+
+/// Name of the entry of a key.
+fn name_of(key: &str) -> String {
+    let digits = key.get(..2).unwrap_or_default();
+    format!("{ENTRIES}/{digits}/{key}")
+}
+
+/// True for the name of an entry, which ends in a key.
+fn is_entry(name: &str) -> bool {
+    name.rsplit('/').next().is_some_and(|key| is_key(key) && name_of(key) == name)
+}
+
+/// What a run did with its shared cache.
+#[derive(Clone, Debug, Default, PartialEq, Serialize)]
+pub struct Tally {
+    /// Items copied from it.
+    pub fetched: usize,
+    /// Items published to it.
+    pub published: usize,
+    /// Items whose entries were damaged; they were computed.
+    pub damaged: BTreeSet<String>,
+    /// Whether it was only read.
+    pub read_only: bool,
+    /// Why it could not be read or written, each reason once.
+    pub problems: BTreeSet<String>,
+}
+
+/// A shared cache in use by a run.
+#[derive(Debug)]
+pub struct Sharing {
+    place: Box<dyn Shared>,
+    tally: Mutex<Tally>,
+}
+
+/// What was found under a key.
+enum Found {
+    Intact(Record),
+    Damaged,
+    Nothing,
+}
+
+impl Sharing {
+    /// Starts to use a cache.
+    pub fn new(place: Box<dyn Shared>) -> Self {
+        let tally = Tally { read_only: place.is_read_only(), ..Tally::default() };
+        Self { place, tally: Mutex::new(tally) }
+    }
+
+    /// What has been done so far.
+    pub fn tally(&self) -> Tally {
+        self.lock().clone()
+    }
+
+    fn lock(&self) -> MutexGuard<'_, Tally> {
+        self.tally.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Copies an intact entry into an empty folder. Without one, the folder may hold parts of an entry afterwards.
+    pub fn fetch(&self, item: &ItemRef, key: &str, folder: Draft<'_>) -> Option<Record> {
+        let name = name_of(key);
+        match copy(&*self.place, &name, item, key, folder) {
+            Ok(Found::Intact(record)) => {
+                self.place.mark_used(&name);
+                self.lock().fetched += 1;
+                Some(record)
+            }
+            Ok(Found::Damaged) => {
+                self.lock().damaged.insert(item.to_string());
+                if !self.place.is_read_only() {
+                    self.note(self.place.remove(&name));
+                }
+                None
+            }
+            Ok(Found::Nothing) => None,
+            Err(error) => {
+                self.note::<()>(Err(error));
+                None
+            }
+        }
+    }
+
+    /// Offers a result in a work area to the cache.
+    pub fn publish(&self, record: &Record, folder: &Path) {
+        if self.place.is_read_only() {
+            return;
+        }
+        if self.note(self.place.publish(&name_of(&record.key), record, folder)) == Some(true) {
+            self.lock().published += 1;
+        }
+    }
+
+    /// Keeps the message of an error.
+    fn note<T>(&self, result: Result<T, Error>) -> Option<T> {
+        result.map_err(|error| self.lock().problems.insert(error.to_string())).ok()
+    }
+}
+
+/// Copies an entry into a folder, checking every file on the way.
+fn copy(place: &dyn Shared, name: &str, item: &ItemRef, key: &str, folder: Draft<'_>) -> Result<Found, Error> {
+    let mut text = Vec::new();
+    if !place.read(name, RECORD, &mut text)? {
+        return Ok(Found::Nothing);
+    }
+    let Some(record) = record_of(&text, item, key) else { return Ok(Found::Damaged) };
+    for stored in &record.files {
+        let file = &stored.product.file;
+        if copy_file(place, name, file, folder)? != Some((stored.bytes, stored.sha256.clone())) {
+            return Ok(Found::Damaged);
+        }
+    }
+    let path = folder.0.join(RECORD);
+    sastrugi_store::atomic::write(&folder.file(RECORD), &text).map_err(|e| Error::at(&path, e))?;
+    Ok(Found::Intact(record))
+}
+
+/// The record of an item, if the text is one and names only files in its own folder.
+fn record_of(text: &[u8], item: &ItemRef, key: &str) -> Option<Record> {
+    let record: Record = serde_json::from_slice(text).ok()?;
+    let stays = |file: &str| check_path(file).is_ok() && !file.contains('/') && file != RECORD;
+    let is_own = record.item == *item && record.key == key && record.files.iter().all(|f| stays(&f.product.file));
+    is_own.then_some(record)
+}
+
+/// Size and SHA-256 of a copied file; `None` if it does not exist.
+fn copy_file(place: &dyn Shared, name: &str, file: &str, folder: Draft<'_>) -> Result<Option<(u64, String)>, Error> {
+    let path = folder.0.join(file);
+    let at = |e| Error::at(&path, e);
+    let mut copied = Hashed::new(AtomicFile::create(&folder.file(file)).map_err(at)?);
+    if !place.read(name, file, &mut copied)? {
+        return Ok(None);
+    }
+    let (target, bytes, sha256) = copied.finish();
+    target.commit().map_err(at)?;
+    Ok(Some((bytes, sha256)))
+}
