@@ -74,8 +74,9 @@ fn violations(dependencies: &[Dependency], [rooms, sole]: &[Rules; 2]) -> Vec<St
             may.contains("any") || may.contains(other) || may_in_tests
         }
         None => {
-            let owner = sole.iter().find(|(_, crates)| crates.contains(&dependency.on));
-            OBSERVERS.contains(&dependency.room.as_str()) || owner.is_none_or(|(room, _)| *room == dependency.room)
+            let mut owners = sole.iter().filter(|(_, crates)| crates.contains(&dependency.on)).peekable();
+            let is_free = OBSERVERS.contains(&dependency.room.as_str()) || owners.peek().is_none();
+            is_free || owners.any(|(room, _)| *room == dependency.room)
         }
     };
     dependencies.iter().filter(|d| !allows(d)).map(|d| format!("{} -> {}", d.room, d.on)).collect()
@@ -100,8 +101,12 @@ fn val_the_rules_can_be_broken() {
             assert!(dependencies.iter().any(|d| d.room == *room && d.on == *name), "{room} does not use {name}");
         }
     }
-    let broken =
-        [("numeric", "sastrugi-store", false), ("terrain", "sastrugi-texture", true), ("report", "parquet", false)];
+    let broken = [
+        ("numeric", "sastrugi-store", false),
+        ("terrain", "sastrugi-texture", true),
+        ("report", "parquet", false),
+        ("stages", "tokio", false),
+    ];
     for (room, on, is_dev) in broken {
         let dependency = Dependency { room: room.to_owned(), on: on.to_owned(), is_dev };
         assert_eq!(violations(&[dependency], &rules), [format!("{room} -> {on}")]);

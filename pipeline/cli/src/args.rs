@@ -50,7 +50,10 @@ pub enum Verb {
     #[command(
         after_help = "Examples:\n  sastrugi run study.toml -o release\n  sastrugi run study.toml -o part1 --shard 1/3\n  \
         sastrugi run study.toml --ancestors 3 --cache cache\n  \
-        sastrugi run study.toml -o part1 --shard 1/3 --cache cache"
+        sastrugi run study.toml -o part1 --shard 1/3 --cache cache\n  \
+        sastrugi run study.toml -o s3://terrains/snow\n\n\
+        For s3:// the variables AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT_URL apply. The\n\
+        release is assembled in the work area and uploaded, its manifest last."
     )]
     Run(Run),
     /// Show what a run would compute, its cost, and why each stale item is stale.
@@ -296,9 +299,9 @@ pub struct Run {
     /// Compute only what more than one of N shards needs, publish it to --cache, and write no release.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "cache", conflicts_with = "shard")]
     pub ancestors: Option<u32>,
-    /// Shared cache: a folder that any number of runs may use at the same time, also over a network. Items in it are copied, others are
-    /// published to it.
-    #[arg(long, value_name = "DIR")]
+    /// Shared cache: a folder, or s3://BUCKET/PREFIX, that any number of runs may use at the same time, also over a network. Items in it are
+    /// copied, others are published to it.
+    #[arg(long, value_name = "DIR|s3://...")]
     pub cache: Option<String>,
     /// Read the shared cache without writing to it.
     #[arg(long, requires = "cache", conflicts_with = "ancestors")]
@@ -331,7 +334,7 @@ pub struct Plan {
 #[derive(Debug, Args)]
 pub struct Cache {
     /// Shared cache.
-    #[arg(value_name = "DIR")]
+    #[arg(value_name = "DIR|s3://...")]
     pub place: String,
     /// Remove the longest unused entries until the rest is no larger, such as 500G.
     #[arg(long, value_name = "BYTES")]
@@ -347,8 +350,8 @@ pub struct Merge {
     /// Folders written by `run --shard`.
     #[arg(required = true)]
     pub shards: Vec<PathBuf>,
-    /// Release folder.
-    #[arg(short, long, value_name = "DIR", default_value = "release")]
+    /// Release: a folder, or s3://BUCKET/PREFIX.
+    #[arg(short, long, value_name = "DIR|s3://...", default_value = "release")]
     pub output: PathBuf,
     /// Replace an existing release of this study even if it has fewer failed items than the new one.
     #[arg(long)]
@@ -358,7 +361,7 @@ pub struct Merge {
 /// `verify`.
 #[derive(Debug, Args)]
 pub struct Verify {
-    /// Release folder.
+    /// Release: a folder, or s3://BUCKET/PREFIX, which is downloaded to the folder for temporary files.
     pub release: PathBuf,
     /// Also recompute all or K of the items and compare their bytes.
     #[arg(long, value_name = "all|K")]

@@ -7,6 +7,7 @@ use crate::runner::cache::CacheError;
 use crate::runner::execute::Stopped;
 use crate::study::Refusals;
 use sastrugi_schemas::ParameterError;
+use sastrugi_store::objects::ObjectError;
 use sastrugi_store::release::ReleaseError;
 use sastrugi_texture::FitError;
 use std::path::Path;
@@ -109,6 +110,18 @@ impl From<ReleaseError> for Error {
             ReleaseError::Occupied { .. } => Self::Usage(error.to_string()),
             _ if error.unusable_input() => Self::Input(error.to_string()),
             _ => Self::io(error),
+        }
+    }
+}
+
+impl From<ObjectError> for Error {
+    /// An address or an environment that is wrong is bad usage.
+    fn from(error: ObjectError) -> Self {
+        match error {
+            ObjectError::Address(_) | ObjectError::Environment { .. } => Self::Usage(error.to_string()),
+            ObjectError::Request { .. } if error.may_pass() => Self::Retry(error.to_string()),
+            ObjectError::Request { .. } => Self::Failed(error.to_string()),
+            ObjectError::File { path, source } => Self::at(&path, source),
         }
     }
 }

@@ -8,7 +8,8 @@
 //! 2. [`studies::plan_of`] compares the keys of the items with the work area: what would be computed, and why.
 //! 3. [`studies::run`] computes the missing items, each in a folder of its own in the work area, and assembles their files, the tables, the
 //!    report and the manifest into a release.
-//! 4. [`studies::merge`] does the last step for shards; [`verification::verify`] checks a release, and [`packing::pack`] makes one file of it.
+//! 4. [`studies::merge`] does the last step for shards; [`verification::verify`] checks a release, and [`packing::pack`] makes one file of it;
+//!    [`remote`] keeps releases in an object store.
 //!
 //! [`verbs`] do the same work for single files. Nothing here prints: a run tells a [`runner::progress::Progress`].
 //!
@@ -70,6 +71,7 @@ mod machine;
 pub mod operations;
 pub mod packing;
 pub mod registry;
+pub mod remote;
 mod revision;
 pub mod runner;
 pub mod schema;

@@ -86,8 +86,8 @@ pub fn verify(
         return Ok(verification);
     }
     let loaded = load(&folder.join("study.toml"))?;
-    let holder = Scratch::new()?;
-    let scratch = holder.0.clone();
+    let holder = Scratch::new("verify")?;
+    let scratch = holder.path().to_owned();
     match recompute {
         Recompute::All => recompute_all(&release, &loaded, &scratch, limits, progress, &mut verification)?,
         Recompute::Some(count) => {
@@ -109,15 +109,21 @@ fn problem_text(kind: ProblemKind, message: &str) -> String {
 }
 
 /// A private temporary folder, removed on drop.
-struct Scratch(PathBuf);
+pub(crate) struct Scratch(PathBuf);
 
 impl Scratch {
-    fn new() -> Result<Self, Error> {
-        let path = std::env::temp_dir().join(format!("sastrugi-verify-{}", std::process::id()));
+    /// A new folder, named by its purpose.
+    pub(crate) fn new(purpose: &str) -> Result<Self, Error> {
+        let path = std::env::temp_dir().join(format!("sastrugi-{purpose}-{}", std::process::id()));
         // Left by a killed process with the same id.
         let _ = fs::remove_dir_all(&path);
         fs::create_dir(&path).map_err(|e| Error::at(&path, e))?;
         Ok(Self(path))
+    }
+
+    /// Its path.
+    pub(crate) fn path(&self) -> &Path {
+        &self.0
     }
 }
 

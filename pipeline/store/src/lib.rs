@@ -1,7 +1,8 @@
 //! File input and output: DEM formats, point clouds, masks, transects, altimetry, GeoJSON, pictures, vehicles as MJCF and URDF,
-//! atomic writes, Parquet tables, MCAP recordings, and the release folder with its checksums.
+//! atomic writes, Parquet tables, MCAP recordings, the release folder with its checksums, and objects in a bucket.
 //!
-//! The only room that depends on `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las` and `tar`.
+//! The only room that depends on `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las`, `tar` and
+//! `object_store`.
 //! It does no analysis: heights, rows and recordings are read and written unchanged. The exceptions are gridding of point clouds
 //! ([`dem::points`]), rasterising of polygons to masks ([`mask`]), decimation of meshes ([`dem::decimate`]), and resampling of
 //! heights to the posts of a simulator ([`dem::simulators`]).
@@ -64,6 +65,7 @@ pub mod geojson;
 pub mod mask;
 pub mod mcap;
 pub mod mechanism;
+pub mod objects;
 pub mod parquet;
 pub mod picture;
 pub mod release;

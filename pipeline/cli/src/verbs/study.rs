@@ -9,6 +9,7 @@ use sastrugi_report::{Companions, ReportError};
 use sastrugi_schemas::manifest::ItemNote;
 use sastrugi_stages::loaded;
 use sastrugi_stages::packing;
+use sastrugi_stages::remote;
 use sastrugi_stages::runner::division::{Cost, Division, ShardCost};
 use sastrugi_stages::runner::execute::{Failure as Failed, Limits};
 use sastrugi_stages::runner::progress::Progress;
@@ -48,11 +49,18 @@ pub fn run(args: &Run, common: &Common) -> Verdict {
     let loaded = loaded::load(&args.study)?;
     print_warnings(&loaded.doubts, common);
     let Place { output, work } = &args.place;
+    if remote::address(output).is_some() && (part.is_some() || args.ancestors.is_some()) {
+        return Err(Failure::usage(
+            "a shard is a folder; merge writes the release to an object store: choose a folder with -o",
+        ));
+    }
     let sharing = sharing(args)?;
     let request = RunRequest { output, work: work.as_deref(), part, purpose: None, replace: args.replace, limits };
     finish_run(common, |reporter| match (args.ancestors, sharing) {
         (Some(count), Some(sharing)) => Ok(studies::run_ancestors(&loaded, count, &request, sharing, reporter)?),
-        (_, sharing) => Ok(studies::run_sharing(&loaded, &request, sharing, reporter)?),
+        (_, sharing) => Ok(remote::releasing(output, work.as_deref(), reporter, |output, work| {
+            studies::run_sharing(&loaded, &RunRequest { output, work, ..request }, sharing, reporter)
+        })?),
     })
 }
 
@@ -75,7 +83,11 @@ fn print_warnings(doubts: &[String], common: &Common) {
 
 /// `merge`.
 pub fn merge(args: &Merge, common: &Common) -> Verdict {
-    finish_run(common, |reporter| Ok(studies::merge(&args.shards, &args.output, args.replace, reporter)?))
+    finish_run(common, |reporter| {
+        Ok(remote::releasing(&args.output, None, reporter, |output, _| {
+            studies::merge(&args.shards, output, args.replace, reporter)
+        })?)
+    })
 }
 
 /// `traverse`.
@@ -239,7 +251,10 @@ fn divided(division: &Division) -> String {
 pub fn verify(args: &Verify, common: &Common) -> Verdict {
     let recompute = args.recompute.as_deref().map(parse_recompute).transpose()?;
     let reporter = Reporter::new(common.quiet);
-    let found = verification::verify(&args.release, recompute, limits(None)?, &reporter);
+    let limits = limits(None)?;
+    let found = remote::with_folder(&args.release, &reporter, |folder| {
+        verification::verify(folder, recompute, limits, &reporter)
+    });
     reporter.close();
     let verification = found?;
     let mut text = format!("{} files, {} checked", verification.files, bytes(verification.bytes as f64));

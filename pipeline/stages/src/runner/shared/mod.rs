@@ -12,24 +12,29 @@
 
 mod eviction;
 mod folder;
+mod objects;
 
 pub use eviction::{DRAFT_AGE_MAX, Keep, Pruned, prune};
 pub use folder::Folder;
+pub use objects::Objects;
 
 use super::cache::{RECORD, Record, is_key};
 use crate::error::Error;
 use crate::job::ItemRef;
 use sastrugi_store::atomic::{AtomicFile, Draft};
 use sastrugi_store::digest::Hashed;
+use sastrugi_store::objects::Bucket;
 use sastrugi_store::release::check_path;
 use serde::Serialize;
 use std::collections::BTreeSet;
 use std::fmt::Debug;
 use std::io::Write;
 use std::path::Path;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
+/// Maximum number of problems that a run keeps.
+const PROBLEMS_MAX: usize = 10;
 /// Folder of the entries in a cache.
 const ENTRIES: &str = "entries";
 
@@ -81,11 +86,14 @@ pub struct Entry {
     pub is_complete: bool,
 }
 
-/// Opens the shared cache at a place: a folder, which is created if it does not exist.
+/// Opens the shared cache at a place: a bucket, `s3://bucket/prefix`, or a folder, which is created if it does not exist.
 ///
 /// # Errors
-/// A folder with other files, or one that cannot be used.
+/// A folder with other files, or a place that cannot be used.
 pub fn open(place: &str, read_only: bool) -> Result<Box<dyn Shared>, Error> {
+    if Bucket::is_address(place) {
+        return Ok(Box::new(Objects::new(Arc::new(Bucket::open(place)?), read_only)));
+    }
     Ok(Box::new(Folder::open(Path::new(place), read_only)?))
 }
 
@@ -111,7 +119,7 @@ pub struct Tally {
     pub damaged: BTreeSet<String>,
     /// Whether it was only read.
     pub read_only: bool,
-    /// Why it could not be read or written, each reason once.
+    /// Why it could not be read or written: the first reasons, each once.
     pub problems: BTreeSet<String>,
 }
 
@@ -181,7 +189,11 @@ impl Sharing {
 
     /// Keeps the message of an error.
     fn note<T>(&self, result: Result<T, Error>) -> Option<T> {
-        result.map_err(|error| self.lock().problems.insert(error.to_string())).ok()
+        let keep = |error: Error| {
+            let mut tally = self.lock();
+            tally.problems.len() < PROBLEMS_MAX && tally.problems.insert(error.to_string())
+        };
+        result.map_err(keep).ok()
     }
 }
 

@@ -5,10 +5,12 @@ use crate::runner::cache::Cache;
 use crate::runner::execute::execute;
 use crate::runner::graph::Graph;
 use crate::runner::progress::Silent;
-use crate::runner::shared::{Entry, Folder, Keep, Shared, Sharing, Tally, prune};
+use crate::runner::shared::{Entry, Folder, Keep, Objects, Shared, Sharing, Tally, prune};
+use sastrugi_store::objects::Bucket;
 use std::collections::BTreeSet;
 use std::fs;
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 use std::time::{Duration, SystemTime};
 
 fn hours(count: u64) -> Duration {
@@ -21,8 +23,13 @@ fn cache_of(area: &Area, shared: &Path) -> Cache {
 
 /// Runs a graph in a new work area with the shared cache; returns the names of the jobs that ran, and what the cache did.
 fn run_fresh(make: impl Fn(&Area) -> Graph, shared: &Path) -> (Vec<String>, Tally) {
+    run_with(make, Box::new(Folder::open(shared, false).unwrap()))
+}
+
+/// The same with any place.
+fn run_with(make: impl Fn(&Area) -> Graph, place: Box<dyn Shared>) -> (Vec<String>, Tally) {
     let area = Area::new();
-    let (graph, cache) = (make(&area), cache_of(&area, shared));
+    let (graph, cache) = (make(&area), area.cache().sharing(Some(Sharing::new(place))));
     assert_eq!(run(&graph, &cache, 2).done, all(&graph));
     assert_eq!(text_of(&graph, &cache, graph.len() - 1), "d < b < a < c < a");
     let mut ran = area.ran();
@@ -242,4 +249,40 @@ fn val_vanished_and_repeated_entries() {
         })
         .collect();
     assert_eq!(published.iter().filter(|is_new| **is_new).count(), 1, "{published:?}");
+}
+
+/// A bucket serves as a folder does: each item once, damage computed again, what a killed run left neither used nor in the way.
+#[test]
+fn val_a_bucket_is_a_shared_cache() {
+    let bucket = Arc::new(Bucket::in_memory("s3://bucket/cache").unwrap());
+    let place = |is_read_only: bool| -> Box<dyn Shared> { Box::new(Objects::new(Arc::clone(&bucket), is_read_only)) };
+    let ran = || run_with(diamond, place(false));
+    let (jobs, tally) = ran();
+    assert_eq!((jobs.len(), tally.fetched, tally.published), (4, 0, 4));
+    let (jobs, tally) = ran();
+    assert_eq!((jobs.len(), tally.fetched, tally.published), (0, 4, 0));
+    let entry_of = |id: &str| {
+        let is_of = |name: &String| {
+            let mut record = Vec::new();
+            bucket.read(&format!("{name}/record.json"), &mut record).unwrap()
+                && serde_json::from_slice::<serde_json::Value>(&record).unwrap()["item"]["id"] == id
+        };
+        place(false).list().unwrap().into_iter().map(|entry| entry.name).find(is_of).unwrap()
+    };
+    let other = tempfile::NamedTempFile::new().unwrap();
+    fs::write(other.path(), "b < A").unwrap();
+    let [b, c] = [entry_of("b"), entry_of("c")];
+    bucket.replace_from(&format!("{b}/{FILE}"), other.path()).unwrap();
+    bucket.remove(&format!("{c}/record.json")).unwrap();
+    bucket.replace_from(&format!("{c}/{FILE}"), other.path()).unwrap();
+    let drafts = || prune(&*place(false), Keep::default(), SystemTime::now()).unwrap().drafts;
+    assert_eq!(drafts(), 1, "an entry without its record is a draft");
+    let (jobs, tally) = run_with(diamond, place(true));
+    assert_eq!((jobs, tally.published, tally.damaged.len()), (vec!["b".to_owned(), "c".to_owned()], 0, 1));
+    let (jobs, tally) = ran();
+    assert_eq!((jobs, tally.published, tally.damaged.len()), (vec!["b".to_owned(), "c".to_owned()], 2, 1));
+    assert!(ran().0.is_empty() && drafts() == 0);
+    let left = prune(&*place(false), Keep { bytes: Some(0), age: None }, SystemTime::now()).unwrap();
+    assert_eq!((left.entries, left.removed, bucket.list("").unwrap().len()), (0, 4, 0));
+    assert!(prune(&*place(true), Keep { bytes: Some(0), age: None }, SystemTime::now()).unwrap().removed == 0);
 }

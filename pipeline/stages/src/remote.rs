@@ -1,0 +1,206 @@
+//! Releases in an object store, `s3://bucket/prefix`.
+//!
+//! A release is assembled in the work area and then uploaded: its content first, then the checksums, the manifest last. Without a manifest
+//! there is no release, so an interrupted upload never looks like one; the next one goes on with it. Nothing that is there is overwritten:
+//! objects with the same bytes are kept, others are refused.
+
+use crate::error::Error;
+use crate::runner::cache::Cache;
+use crate::runner::progress::Progress;
+use crate::studies::{RunSummary, default_work};
+use crate::verification::Scratch;
+use rayon::prelude::*;
+use sastrugi_store::atomic::{AtomicFile, Draft};
+use sastrugi_store::digest;
+use sastrugi_store::objects::{Bucket, Object};
+use sastrugi_store::release::{MANIFEST, Release, SUMS};
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::sync::atomic::{AtomicU64, Ordering};
+
+/// The address of a release in an object store; `None` for a folder.
+pub fn address(release: &Path) -> Option<&str> {
+    release.to_str().filter(|text| Bucket::is_address(text))
+}
+
+/// Makes a release: in its folder, or in the work area and then in an object store. `make` gets the folder and the work area.
+///
+/// # Errors
+/// Those of `make`; a store that fails; another release at the address.
+pub fn releasing(
+    output: &Path,
+    work: Option<&Path>,
+    progress: &dyn Progress,
+    make: impl FnOnce(&Path, Option<&Path>) -> Result<RunSummary, Error>,
+) -> Result<RunSummary, Error> {
+    let Some(address) = address(output) else { return make(output, work) };
+    // Opened first: what is wrong with it should not come to light after the run.
+    let bucket = Bucket::open(address)?;
+    let work = work.map_or_else(|| default_work(&local_name(address)), Path::to_owned);
+    // Marks the folder as a work area, and refuses any other.
+    drop(Cache::open(&work)?);
+    let folder = work.join("release");
+    let summary = make(&folder, Some(&work))?;
+    upload(&Release::open(&folder)?, &bucket, progress)?;
+    Ok(RunSummary { output: output.to_owned(), ..summary })
+}
+
+/// Last name of an address.
+fn local_name(address: &str) -> PathBuf {
+    PathBuf::from(address.trim_end_matches('/').rsplit('/').next().unwrap_or("release"))
+}
+
+/// Calls `check` with the folder of a release; one in an object store is downloaded to a temporary folder.
+///
+/// # Errors
+/// Those of `check`; a store that fails; an address without a release.
+pub fn with_folder<T>(
+    release: &Path,
+    progress: &dyn Progress,
+    check: impl FnOnce(&Path) -> Result<T, Error>,
+) -> Result<T, Error> {
+    let Some(address) = address(release) else { return check(release) };
+    let bucket = Bucket::open(address)?;
+    if !bucket.contains(MANIFEST)? && !bucket.contains(SUMS)? {
+        return Err(Error::Input(format!("{address}: not a sastrugi release: it has neither {MANIFEST} nor {SUMS}")));
+    }
+    let scratch = Scratch::new("download")?;
+    download(&bucket, scratch.path(), progress)?;
+    check(scratch.path())
+}
+
+/// Uploads a sealed release.
+///
+/// # Errors
+/// Another release, or other objects under the names of its files ([`Error::Usage`]); a store or a file that fails.
+pub fn upload(release: &Release, bucket: &Bucket, progress: &dyn Progress) -> Result<(), Error> {
+    let manifest = release.path(MANIFEST);
+    let sha256 = |path: &Path| digest::of_file(path).map(|(_, sha256)| sha256).map_err(|e| Error::at(path, e));
+    let manifest_sha256 = sha256(&manifest)?;
+    match bucket.sha256(MANIFEST)? {
+        Some(there) if there == manifest_sha256 => return Ok(()),
+        Some(_) => return Err(occupied(bucket, MANIFEST)),
+        None => {}
+    }
+    let artifacts = &release.manifest().artifacts;
+    progress.phase(&format!("uploading {} files to {}", artifacts.len() + 2, bucket.address()));
+    let total = artifacts.iter().map(|artifact| artifact.bytes).sum();
+    let done = AtomicU64::new(0);
+    progress.copied(0, total);
+    artifacts.par_iter().try_for_each(|artifact| {
+        create(bucket, &artifact.path, &release.path(&artifact.path), &artifact.sha256)?;
+        let before = done.fetch_add(artifact.bytes, Ordering::Relaxed);
+        progress.copied(before + artifact.bytes, total);
+        Ok::<(), Error>(())
+    })?;
+    let sums = release.path(SUMS);
+    create(bucket, SUMS, &sums, &sha256(&sums)?)?;
+    create(bucket, MANIFEST, &manifest, &manifest_sha256)
+}
+
+/// Creates an object, or finds it with the same bytes.
+fn create(bucket: &Bucket, name: &str, path: &Path, sha256: &str) -> Result<(), Error> {
+    if bucket.create_from(name, path)? || bucket.sha256(name)?.is_some_and(|there| there == sha256) {
+        return Ok(());
+    }
+    Err(occupied(bucket, name))
+}
+
+fn occupied(bucket: &Bucket, name: &str) -> Error {
+    let what =
+        if name == MANIFEST { "another release" } else { "an object with other bytes, as of an unfinished upload" };
+    let address = bucket.address();
+    Error::Usage(format!("{address}: {what} is there already ({name}); remove it, or choose another address with -o"))
+}
+
+/// Copies all objects into an empty folder.
+fn download(bucket: &Bucket, folder: &Path, progress: &dyn Progress) -> Result<(), Error> {
+    let objects = bucket.list("")?;
+    progress.phase(&format!("downloading {} files from {}", objects.len(), bucket.address()));
+    let total = objects.iter().map(|object| object.bytes).sum();
+    let done = AtomicU64::new(0);
+    progress.copied(0, total);
+    objects.par_iter().try_for_each(|Object { name, bytes, .. }| {
+        let path = folder.join(name);
+        let at = |e| Error::at(&path, e);
+        fs::create_dir_all(path.parent().unwrap_or(folder)).map_err(at)?;
+        let mut file = AtomicFile::create(&Draft(folder).file(name)).map_err(at)?;
+        bucket.read(name, &mut file)?;
+        file.commit().map_err(at)?;
+        progress.copied(done.fetch_add(*bytes, Ordering::Relaxed) + bytes, total);
+        Ok(())
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::runner::progress::Silent;
+    use sastrugi_schemas::manifest::Origin;
+    use sastrugi_store::release::{Head, ReleaseBuilder, verify};
+
+    fn release(folder: &Path, text: &str) -> Release {
+        let dest = folder.join("release");
+        let head = Head {
+            name: "demo".to_owned(),
+            study_sha256: "ab".repeat(32),
+            seed: 7,
+            version: "0.1.0".to_owned(),
+            license: "CC-BY-4.0".to_owned(),
+        };
+        let mut builder = ReleaseBuilder::beside(&dest, head).unwrap();
+        builder.write_text("README.md", text, Origin::default()).unwrap();
+        builder.write_text("dem/a.asc", "ncols 1", Origin::default()).unwrap();
+        builder.seal(&dest).unwrap()
+    }
+
+    /// What is uploaded is downloaded and verifies; uploading it again changes nothing; another release is refused.
+    #[test]
+    fn val_a_release_is_uploaded_once() {
+        let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let bucket = Bucket::in_memory("s3://bucket/demo").unwrap();
+        let first = release(one.path(), "# Demo");
+        upload(&first, &bucket, &Silent).unwrap();
+        let before = bucket.list("").unwrap();
+        assert_eq!(
+            before.iter().map(|o| o.name.as_str()).collect::<Vec<_>>(),
+            ["README.md", SUMS, "dem/a.asc", MANIFEST]
+        );
+        upload(&first, &bucket, &Silent).unwrap();
+        assert_eq!(bucket.list("").unwrap(), before);
+        let refused = upload(&release(two.path(), "# Other"), &bucket, &Silent).unwrap_err();
+        assert!(matches!(&refused, Error::Usage(why) if why.contains("another release is there already")), "{refused}");
+        assert_eq!(bucket.list("").unwrap(), before);
+        let back = tempfile::tempdir().unwrap();
+        download(&bucket, back.path(), &Silent).unwrap();
+        let report = verify(back.path()).unwrap();
+        assert_eq!((report.problems, report.files), (Vec::new(), 3));
+    }
+
+    /// An upload that was interrupted has no manifest. The same release goes on with it; another one does not overwrite it.
+    #[test]
+    fn val_an_interrupted_upload_is_continued() {
+        let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let bucket = Bucket::in_memory("s3://bucket/demo").unwrap();
+        let first = release(one.path(), "# Demo");
+        upload(&first, &bucket, &Silent).unwrap();
+        bucket.remove(MANIFEST).unwrap();
+        bucket.remove("dem/a.asc").unwrap();
+        let refused = upload(&release(two.path(), "# Other"), &bucket, &Silent).unwrap_err();
+        assert!(
+            matches!(&refused, Error::Usage(why) if why.contains("unfinished upload is there already (README.md)")),
+            "{refused}"
+        );
+        assert!(!bucket.contains(MANIFEST).unwrap());
+        upload(&first, &bucket, &Silent).unwrap();
+        assert_eq!(bucket.list("").unwrap().len(), 4);
+    }
+
+    #[test]
+    fn val_addresses_of_releases() {
+        assert_eq!(address(Path::new("s3://bucket/a")), Some("s3://bucket/a"));
+        assert_eq!(address(Path::new("a/s3")), None);
+        assert_eq!(local_name("s3://bucket/a/b/"), Path::new("b"));
+        assert_eq!(local_name("s3://bucket"), Path::new("bucket"));
+    }
+}

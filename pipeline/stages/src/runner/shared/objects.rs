@@ -1,0 +1,72 @@
+//! A shared cache in a bucket of an object store: `s3://bucket/prefix`.
+//!
+//! The objects of an entry are `entries/ab/ab12.../<file>`. There is no rename, so the record is written last, and only if there is none: an
+//! entry exists when its record does. It disappears with its record, which is removed first. Writers that meet write the same bytes; a
+//! reader that meets a removal finds a file missing and computes the item. Entries age from their publication.
+
+use super::{Entry, Shared, is_entry};
+use crate::error::Error;
+use crate::runner::cache::{RECORD, Record};
+use sastrugi_store::objects::{Bucket, Object};
+use std::collections::BTreeMap;
+use std::io::Write;
+use std::path::Path;
+use std::sync::Arc;
+
+/// A shared cache in a bucket.
+#[derive(Debug)]
+pub struct Objects {
+    bucket: Arc<Bucket>,
+    is_read_only: bool,
+}
+
+impl Objects {
+    /// The cache in a bucket.
+    pub fn new(bucket: Arc<Bucket>, is_read_only: bool) -> Self {
+        Self { bucket, is_read_only }
+    }
+}
+
+impl Shared for Objects {
+    fn read(&self, name: &str, file: &str, to: &mut dyn Write) -> Result<bool, Error> {
+        Ok(self.bucket.read(&format!("{name}/{file}"), to)?)
+    }
+
+    fn publish(&self, name: &str, record: &Record, folder: &Path) -> Result<bool, Error> {
+        let own = format!("{name}/{RECORD}");
+        if self.bucket.contains(&own)? {
+            return Ok(false);
+        }
+        for stored in &record.files {
+            let file = &stored.product.file;
+            // What a killed run left under this name is replaced.
+            self.bucket.replace_from(&format!("{name}/{file}"), &folder.join(file))?;
+        }
+        Ok(self.bucket.create_from(&own, &folder.join(RECORD))?)
+    }
+
+    fn remove(&self, name: &str) -> Result<(), Error> {
+        self.bucket.remove(&format!("{name}/{RECORD}"))?;
+        for object in self.bucket.list(name)? {
+            self.bucket.remove(&object.name)?;
+        }
+        Ok(())
+    }
+
+    fn list(&self) -> Result<Vec<Entry>, Error> {
+        let mut entries: BTreeMap<String, Entry> = BTreeMap::new();
+        for Object { name, bytes, modified } in self.bucket.list(super::ENTRIES)? {
+            let Some((name, file)) = name.rsplit_once('/').filter(|(name, _)| is_entry(name)) else { continue };
+            let new = Entry { name: name.to_owned(), bytes: 0, used: modified, is_complete: false };
+            let entry = entries.entry(name.to_owned()).or_insert(new);
+            entry.bytes += bytes;
+            entry.used = entry.used.max(modified);
+            entry.is_complete |= file == RECORD;
+        }
+        Ok(entries.into_values().collect())
+    }
+
+    fn is_read_only(&self) -> bool {
+        self.is_read_only
+    }
+}
