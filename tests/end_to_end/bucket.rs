@@ -177,12 +177,13 @@ fn val_addresses_are_checked_first() {
     let folder = area();
     let path = folder.path();
     write(path, "study.toml", &small_study());
-    for (arguments, words) in [
-        (&["-o", "s3://"][..], "expected s3://bucket"),
+    let cases: [(&[&str], &str); 4] = [
+        (&["-o", "s3://"], "expected s3://bucket"),
         (&["-o", "s3:///a"], "expected s3://bucket"),
         (&["-o", "a", "--cache", "s3://b/../c"], "expected s3://bucket"),
         (&["-o", "s3://b/part-1", "--shard", "1/2"], "a shard is a folder"),
-    ] {
+    ];
+    for (arguments, words) in cases {
         let run = [&["run", "study.toml", "--quiet"], arguments].concat();
         let call = called(Command::new(program()).args(&run).current_dir(path));
         assert!(call.code == 2 && call.stderr.contains(words), "{arguments:?}: {} {}", call.code, call.stderr);
