@@ -286,3 +286,41 @@ fn val_merge_says_what_to_mend() {
     assert_eq!(sastrugi_in(path, &["run", "study.toml", "-o", "undivided", "--quiet"]).code, 3);
     assert_eq!(differing(&sums(&path.join("undivided")), &sums(&path.join("with-failure"))), [""; 0]);
 }
+
+/// The steps of the recipes, called as an engine calls them: a step that is killed asks for another try, and the release is right.
+#[cfg(unix)]
+#[test]
+fn val_the_steps_of_the_recipes_make_the_release() {
+    use std::os::unix::fs::PermissionsExt;
+    let folder = area();
+    let path = folder.path();
+    let whole = run_study(path, &small_study(), &[]);
+    // A program that is killed when it is called for the second shard the first time.
+    let killed = format!(
+        "#!/bin/bash\nif [[ \"$*\" == *\"--shard 2/\"* ]] && mkdir once 2>/dev/null; then\n  {0} \"$@\" & sleep 0.03; kill -9 $!; wait $!\n\
+         else\n  exec {0} \"$@\"\nfi\n",
+        program().display()
+    );
+    let sastrugi = write(path, "killed-once", &killed);
+    fs::set_permissions(&sastrugi, fs::Permissions::from_mode(0o755)).unwrap();
+    let step = |arguments: &[&str]| {
+        let mut command = Command::new(sastrugi_fixtures::workspace_root().join("fixtures/cluster/step"));
+        command.args(arguments).current_dir(path).env("SASTRUGI", &sastrugi).env("THREADS", "1");
+        command.envs([
+            ("STUDY", "study.toml"),
+            ("SHARDS", "3"),
+            ("CACHE", "cache"),
+            ("PARTS", "parts"),
+            ("RELEASE", "merged"),
+        ]);
+        called(&mut command)
+    };
+    assert_eq!(step(&["ancestors"]).code, 0);
+    let codes = ["1", "2", "3"].map(|index| step(&["shard", index]).code);
+    assert_eq!(codes, [0, 75, 0]);
+    let call = step(&["merge"]);
+    assert!(call.code == 65 && call.stderr.contains("shard 2 of 3 is missing"), "{} {}", call.code, call.stderr);
+    assert_eq!((step(&["shard", "2"]).code, step(&["merge"]).code), (0, 0));
+    assert_eq!(differing(&whole, &sums(&path.join("merged"))), [""; 0]);
+    assert_eq!((step(&["all"]).code, step(&[]).code), (2, 2));
+}
