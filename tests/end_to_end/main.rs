@@ -11,6 +11,7 @@ mod inputs;
 mod machine;
 mod perturb;
 mod photoclinometry;
+mod recipes;
 mod route;
 mod rover;
 mod serve;

@@ -132,7 +132,7 @@ pub struct Sharing {
 
 /// What was found under a key.
 enum Found {
-    Intact(Record),
+    Intact(Box<Record>),
     Damaged,
     Nothing,
 }
@@ -160,7 +160,7 @@ impl Sharing {
             Ok(Found::Intact(record)) => {
                 self.place.mark_used(&name);
                 self.lock().fetched += 1;
-                Some(record)
+                Some(*record)
             }
             Ok(Found::Damaged) => {
                 self.lock().damaged.insert(item.to_string());
@@ -212,7 +212,7 @@ fn copy(place: &dyn Shared, name: &str, item: &ItemRef, key: &str, folder: Draft
     }
     let path = folder.0.join(RECORD);
     sastrugi_store::atomic::write(&folder.file(RECORD), &text).map_err(|e| Error::at(&path, e))?;
-    Ok(Found::Intact(record))
+    Ok(Found::Intact(Box::new(record)))
 }
 
 /// The record of an item, if the text is one and names only files in its own folder.
