@@ -4,7 +4,7 @@
 //! cache that already has it. All costs are estimates for one core and an empty work area.
 
 use super::graph::Graph;
-use super::shard::{Part, owner};
+use super::shard::owner;
 use serde::Serialize;
 
 /// The share of reserved time that must be used for a number of shards to be recommended.
@@ -162,7 +162,7 @@ fn recommended(graph: &Graph, study: Cost) -> u32 {
         let (common, longest) = phases(graph, *count);
         common + f64::from(*count) * longest <= study.seconds / USED_MIN
     };
-    std::iter::successors(Some(1), |count| Some(count * 2))
+    std::iter::successors(Some(1u32), |count: &u32| Some(count * 2))
         .take_while(|count| *count <= most)
         .filter(is_busy)
         .max()
@@ -198,13 +198,10 @@ fn advice(graph: &Graph, division: &Division, count: u32) -> Vec<String> {
     advice
 }
 
-/// The item that takes longest in a shard, as a clause.
+/// The item that takes longest in a shard beside the common ancestors, as a clause.
 fn longest_item(graph: &Graph, shard: u32, count: u32) -> String {
-    let part = Part { index: shard, count };
-    let seconds = |p: &usize| graph.node(*p).job.estimate().seconds;
-    let own = (0..graph.len()).filter(|p| part.owns(graph.key(*p)));
-    match own.max_by(|a, b| seconds(a).total_cmp(&seconds(b))) {
-        Some(p) => format!("{:.1} s of it for {}", seconds(&p), graph.node(p).item),
-        None => "all of it for ancestors".to_owned(),
-    }
+    let left = needs(graph, count).into_iter().enumerate().filter(|(_, need)| *need == Need::One(shard));
+    let timed = left.map(|(position, _)| (graph.node(position).job.estimate().seconds, &graph.node(position).item));
+    let longest = timed.max_by(|a, b| a.0.total_cmp(&b.0));
+    longest.map_or_else(String::new, |(seconds, item)| format!("{seconds:.1} s of it for {item}"))
 }
