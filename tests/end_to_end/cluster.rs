@@ -178,6 +178,20 @@ fn val_damaged_entries_are_never_used() {
     assert_eq!(differing(&whole, &sums(&path.join("third"))), [""; 0]);
 }
 
+/// Another study finds what it has in common with the first, and its release is the one that it makes by itself.
+#[test]
+fn val_studies_share_what_they_have_in_common() {
+    let folder = area();
+    let path = folder.path();
+    run_study(path, &small_study(), &["--cache", "cache"]);
+    let other = small_study().replace("name = \"small\"", "name = \"other\"").replace("count = 3", "count = 2");
+    write(path, "other.toml", &other);
+    let shared = json(path, &["run", "other.toml", "-o", "shared", "--cache", "cache"]);
+    assert!(computed(&shared) > 0 && shared["cache"]["fetched"].as_u64().unwrap() > 0, "{shared}");
+    assert_eq!(computed(&json(path, &["run", "other.toml", "-o", "alone"])), ITEMS);
+    assert_eq!(differing(&sums(&path.join("alone")), &sums(&path.join("shared"))), [""; 0]);
+}
+
 /// A cache that is only read is left as it is.
 #[test]
 fn val_a_cache_that_is_only_read() {
