@@ -5,7 +5,8 @@
 //! 3. [`fft::RealFft2`], [`fft::even_spectrum`] and [`filters::gaussian_low_pass`] transform and smooth grids; [`ops`] and [`sums`] combine
 //!    and summarise them in a fixed order.
 //! 4. [`resample`] crops, coarsens and refines grids; [`triangulate`] decimates them to a mesh.
-//! 5. A [`Surface`] has heights and gradients between the cell centres; [`Ground`] adds the class and the albedo that vehicles meet.
+//! 5. A [`Surface`] has heights and gradients between the cell centres; [`Ground`] adds the class and the albedo that vehicles meet;
+//!    [`height_patch`] is what a vehicle sees around itself.
 //!
 //! ```
 //! use sastrugi_numeric::fft::RealFft2;
@@ -53,6 +54,7 @@ pub mod filters;
 pub mod grid;
 pub mod ground;
 pub mod ops;
+pub mod patch;
 pub mod resample;
 mod simd;
 pub mod streams;
@@ -64,6 +66,7 @@ pub mod turns;
 pub use counter::{Counter, Poisson};
 pub use grid::{Geometry, Grid};
 pub use ground::{Ground, GroundClass, GroundGrid, GroundPoint, NoGround};
+pub use patch::{PatchShape, height_patch};
 pub use streams::{Stream, Streams};
 pub use surface::Surface;
 pub use triangulation::{Triangulation, triangulate};

@@ -1,0 +1,161 @@
+//! Heights around a vehicle, in its own frame: what a learner sees of the ground.
+//!
+//! A patch is a square of points centred on the vehicle and turned with its heading. It is laid out as a grid whose north is
+//! ahead: row 0 lies farthest ahead, column 0 farthest to the left. Point `(row, col)` of `n x n` points lies
+//! `a = ((n - 1) / 2 - row) cell` ahead and `l = ((n - 1) / 2 - col) cell` to the left of the vehicle, at
+//! `x + a cos h - l sin h`, `y + a sin h + l cos h`, where `(x, y)` is the position (m) and `h` the heading (rad, counterclockwise
+//! from east). Cost: one bilinear height for each point.
+
+use crate::surface::Surface;
+
+/// Shape of a square patch.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PatchShape {
+    points: usize,
+    cell_m: f64,
+}
+
+impl PatchShape {
+    /// Most points a side.
+    pub const POINTS_MAX: usize = 512;
+
+    /// A patch of side `size_m` with points `cell_m` apart, each in the middle of its cell. `None` unless both are finite and above 0, and
+    /// the side is a whole number of cells (within 1e-6) from 1 to [`PatchShape::POINTS_MAX`].
+    ///
+    /// ```
+    /// use sastrugi_numeric::PatchShape;
+    ///
+    /// assert_eq!(PatchShape::new(3.2, 0.1).map(|shape| shape.points()), Some(32));
+    /// assert_eq!(PatchShape::new(3.25, 0.1), None);
+    /// ```
+    pub fn new(size_m: f64, cell_m: f64) -> Option<Self> {
+        let cells = size_m / cell_m;
+        let points = cells.round();
+        let is_whole = cell_m > 0.0 && (cells - points).abs() <= 1e-6;
+        let is_valid = is_whole && (1.0..=Self::POINTS_MAX as f64).contains(&points);
+        is_valid.then_some(Self { points: points as usize, cell_m })
+    }
+
+    /// Points a side.
+    pub fn points(&self) -> usize {
+        self.points
+    }
+
+    /// Distance between neighbouring points, m.
+    pub fn cell_m(&self) -> f64 {
+        self.cell_m
+    }
+}
+
+/// Heights (m) of a surface around a position (m), turned to a heading (rad, counterclockwise from east): `points * points` values, row by
+/// row from the row farthest ahead, each from left to right; `NaN` where the surface is undefined.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, PatchShape, height_patch};
+///
+/// // A plane that rises by 1 m per metre to the east, seen by a vehicle that heads east.
+/// let values = (0..5).flat_map(|_| [0.5, 1.5, 2.5, 3.5, 4.5]).collect();
+/// let plane = Grid::new(Geometry::square(5, 5, 1.0), values);
+/// let shape = PatchShape::new(2.0, 1.0).unwrap();
+/// // Ahead it is higher than behind, and left as high as right.
+/// assert_eq!(height_patch(&plane, [2.5, 2.5], 0.0, &shape), [3.0, 3.0, 2.0, 2.0]);
+/// ```
+pub fn height_patch(surface: &impl Surface, position_m: [f64; 2], heading_rad: f64, shape: &PatchShape) -> Vec<f64> {
+    let (sin, cos) = libm::sincos(heading_rad);
+    let middle = 0.5 * (shape.points - 1) as f64;
+    let offset = |k: usize| (middle - k as f64) * shape.cell_m;
+    let height = |ahead: f64, left: f64| {
+        let [x, y] = [position_m[0] + ahead * cos - left * sin, position_m[1] + ahead * sin + left * cos];
+        surface.height(x, y).unwrap_or(f64::NAN)
+    };
+    let line = |row: usize| (0..shape.points).map(move |col| height(offset(row), offset(col)));
+    (0..shape.points).flat_map(line).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::grid::{Geometry, Grid};
+    use std::f64::consts::{FRAC_PI_2, PI};
+
+    /// 20 x 30 cells of 0.5 m whose heights no symmetry repeats, with its south-west corner at (100, 200).
+    fn ground() -> Grid {
+        let geometry = Geometry { rows: 20, cols: 30, cell: [0.5; 2], origin: [100.0, 200.0] };
+        let height = |k: usize| libm::sin(0.7 * k as f64) + 0.01 * k as f64;
+        Grid::new(geometry, (0..geometry.len()).map(height).collect())
+    }
+
+    /// Bilinear heights are exact on a plane: in the vehicle's frame its slope is the gradient turned by the heading.
+    #[test]
+    fn val_a_plane_is_a_plane_in_the_frame_of_the_vehicle() {
+        let geometry = Geometry { rows: 20, cols: 30, cell: [0.5; 2], origin: [100.0, 200.0] };
+        let plane = |x: f64, y: f64| 3.0 + 0.2 * (x - 107.0) - 0.5 * (y - 204.0);
+        let values = (0..20).flat_map(|r| (0..30).map(move |c| plane(geometry.x(c), geometry.y(r)))).collect();
+        let grid = Grid::new(geometry, values);
+        let shape = PatchShape::new(2.0, 0.25).unwrap();
+        let heading = 0.4;
+        let (sin, cos) = libm::sincos(heading);
+        let (ahead_slope, left_slope) = (0.2 * cos - 0.5 * sin, -0.2 * sin - 0.5 * cos);
+        let patch = height_patch(&grid, [107.0, 204.0], heading, &shape);
+        assert_eq!(patch.len(), 64);
+        for (k, z) in patch.iter().enumerate() {
+            let [ahead, left] = [k / 8, k % 8].map(|n| 0.25 * (3.5 - n as f64));
+            let expected = 3.0 + ahead_slope * ahead + left_slope * left;
+            assert!((z - expected).abs() < 1e-12, "{k}: {z} {expected}");
+        }
+    }
+
+    /// A vehicle that heads north sees the map as it is printed: north above, west on the left.
+    #[test]
+    fn val_heading_north_is_the_map_itself() {
+        let grid = ground();
+        let shape = PatchShape::new(2.0, 0.5).unwrap();
+        let patch = height_patch(&grid, [107.0, 205.0], FRAC_PI_2, &shape);
+        let window = grid.window(8, 12, 4, 4);
+        patch.iter().zip(&window.values).for_each(|(a, b)| assert!((a - b).abs() < 1e-12, "{a} {b}"));
+    }
+
+    /// A quarter turn of the vehicle to the left turns the patch a quarter to the right, half a turn reverses it.
+    #[test]
+    fn prop_turning_the_vehicle_turns_the_patch() {
+        let (grid, at) = (ground(), [107.3, 204.9]);
+        let shape = PatchShape::new(3.0, 0.2).unwrap();
+        let n = shape.points();
+        let of = |heading: f64| height_patch(&grid, at, heading, &shape);
+        let (plain, quarter, half) = (of(0.3), of(0.3 + FRAC_PI_2), of(0.3 + PI));
+        for (row, col) in (0..n).flat_map(|row| (0..n).map(move |col| (row, col))) {
+            // What lay to the left (column 0) now lies ahead (row 0).
+            let turned = plain[(n - 1 - col) * n + row];
+            assert!((quarter[row * n + col] - turned).abs() < 1e-12, "{row} {col}");
+            assert!((half[row * n + col] - plain[(n - 1 - row) * n + n - 1 - col]).abs() < 1e-12, "{row} {col}");
+        }
+    }
+
+    /// Undefined beyond the outer cell centres and next to holes, and nowhere else.
+    #[test]
+    fn val_points_beyond_the_surface_are_nan() {
+        let mut grid = Grid::filled(Geometry::square(8, 8, 1.0), 1.0);
+        let shape = PatchShape::new(4.0, 1.0).unwrap();
+        // Columns at x = -0.25, 0.75, 1.75, 2.75 while heading north: the first lies beyond the outer centres at 0.5.
+        let patch = height_patch(&grid, [1.25, 4.0], FRAC_PI_2, &shape);
+        for (k, z) in patch.iter().enumerate() {
+            assert_eq!(z.is_nan(), k % 4 == 0, "{k}: {z}");
+        }
+        let whole = height_patch(&grid, [4.2, 4.2], 1.0, &shape);
+        assert!(whole.iter().all(|z| *z == 1.0));
+        grid.values[3 * 8 + 4] = f64::NAN;
+        let holed = height_patch(&grid, [4.2, 4.2], 1.0, &shape);
+        assert!(holed.iter().any(|z| z.is_nan()) && holed.contains(&1.0));
+    }
+
+    #[test]
+    fn val_a_side_is_a_whole_number_of_cells() {
+        let points = |size, cell| PatchShape::new(size, cell).map(|shape| shape.points());
+        assert_eq!([points(3.2, 0.1), points(0.3, 0.1), points(1.0, 1.0)], [Some(32), Some(3), Some(1)]);
+        let refused =
+            [(3.25, 0.1), (0.0, 0.1), (-3.2, -0.1), (1.0, 0.0), (f64::NAN, 0.1), (1.0, f64::NAN), (51.3, 0.1)];
+        refused.iter().for_each(|(size, cell)| assert_eq!(points(*size, *cell), None, "{size} {cell}"));
+        assert_eq!(points(51.2, 0.1), Some(512));
+        assert_eq!(points(f64::INFINITY, 0.1), None);
+    }
+}
