@@ -1,5 +1,5 @@
 //! File input and output: DEM formats, point clouds, masks, transects, altimetry, GeoJSON, pictures, vehicles as MJCF and URDF,
-//! atomic writes, Parquet tables, MCAP recordings, the release folder with its checksums, and objects in a bucket.
+//! atomic writes, Parquet tables, MCAP recordings, LeRobot datasets, the release folder with its checksums, and objects in a bucket.
 //!
 //! The only room that depends on `arrow`, `parquet`, `mcap`, `foxglove`, `prost`, `geotiff-*`, `tiff`, `png`, `las`, `tar` and
 //! `object_store`.
@@ -62,6 +62,7 @@ pub mod dem;
 pub mod digest;
 pub mod file;
 pub mod geojson;
+pub mod lerobot;
 pub mod mask;
 pub mod mcap;
 pub mod mechanism;

@@ -39,7 +39,7 @@ const BATCH_ROWS: usize = 4096;
 /// Rows of a row group: about 28 MiB in memory for the widest table.
 const ROW_GROUP_ROWS: usize = 1 << 16;
 /// Name that Parquet gives the elements of a list.
-const ELEMENT: &str = "element";
+pub(crate) const ELEMENT: &str = "element";
 /// Zstandard level: the fastest; higher levels gain 3 % on samples.
 const ZSTD_LEVEL: i32 = 1;
 
@@ -97,14 +97,14 @@ impl TableError {
     }
 
     /// An error of the encoder, or of the file system behind it.
-    fn encoding(path: &Path, source: ParquetError, refused: &Refused) -> Self {
+    pub(crate) fn encoding(path: &Path, source: ParquetError, refused: &Refused) -> Self {
         match refused.error() {
             Some(error) => Self::io(path, error),
             None => Self::Encoding { path: path.to_owned(), source },
         }
     }
 
-    fn io(path: &Path, source: io::Error) -> Self {
+    pub(crate) fn io(path: &Path, source: io::Error) -> Self {
         Self::Io { path: path.to_owned(), source }
     }
 }
@@ -169,7 +169,7 @@ fn data_type(column: ColumnType) -> DataType {
 }
 
 /// The field of a list's elements.
-fn element(data_type: DataType) -> FieldRef {
+pub(crate) fn element(data_type: DataType) -> FieldRef {
     Arc::new(Field::new(ELEMENT, data_type, true))
 }
 

@@ -7,6 +7,7 @@ mod verify;
 #[cfg(test)]
 mod tests;
 
+pub(crate) use builder::sync_tree;
 pub use builder::{Head, Incoming, PartWriter, ReleaseBuilder, Staging, TablePart, beside};
 pub use pack::{Packed, pack};
 pub use verify::{Problem, ProblemKind, VerifyReport, verify};
@@ -90,7 +91,7 @@ impl ReleaseError {
         }
     }
 
-    fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
+    pub(crate) fn io(path: &Path) -> impl FnOnce(io::Error) -> Self {
         let path = path.to_owned();
         move |source| Self::Io { path, source }
     }
@@ -178,11 +179,24 @@ impl Release {
     /// # Errors
     /// A file cannot be read, or has changed since it was sealed.
     pub fn sealed_parts(&self, table: &str) -> impl Iterator<Item = Result<PathBuf, ReleaseError>> {
-        self.parts(table).map(|part| {
-            let file = self.path(&part.path);
-            let (_, sha256) = digest::of_file(&file).map_err(ReleaseError::io(&file))?;
-            if sha256 == part.sha256 { Ok(file) } else { Err(ReleaseError::Changed { path: file }) }
-        })
+        self.parts(table).map(|part| self.unchanged(part))
+    }
+
+    /// A file listed in the manifest, checked.
+    ///
+    /// # Errors
+    /// The manifest does not list it, it cannot be read, or it has changed since it was sealed.
+    pub fn sealed(&self, path: &str) -> Result<PathBuf, ReleaseError> {
+        match self.manifest.artifacts.iter().find(|artifact| artifact.path == path) {
+            Some(artifact) => self.unchanged(artifact),
+            None => Err(ReleaseError::not_a_release(&self.folder, format!("{MANIFEST} does not list \"{path}\""))),
+        }
+    }
+
+    fn unchanged(&self, artifact: &Artifact) -> Result<PathBuf, ReleaseError> {
+        let file = self.path(&artifact.path);
+        let (_, sha256) = digest::of_file(&file).map_err(ReleaseError::io(&file))?;
+        if sha256 == artifact.sha256 { Ok(file) } else { Err(ReleaseError::Changed { path: file }) }
     }
 }
 

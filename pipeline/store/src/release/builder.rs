@@ -402,7 +402,7 @@ impl Drop for Staging {
 }
 
 /// Syncs every file and folder of a tree to disk.
-fn sync_tree(folder: &Path) -> Result<(), ReleaseError> {
+pub(crate) fn sync_tree(folder: &Path) -> Result<(), ReleaseError> {
     let entries =
         fs::read_dir(folder).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(ReleaseError::io(folder))?;
     entries.par_iter().map(std::fs::DirEntry::path).try_for_each(|path| {
