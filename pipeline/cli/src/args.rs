@@ -170,16 +170,20 @@ pub enum Verb {
         sastrugi compare site.json synthetic.json --equivalence-sigma 0.05 --fail-on-difference")]
     Compare(Compare),
     /// Convert between DEM formats by file extension (.tif .asc .hgt .png .npy, meshes .obj .glb .usda), grid point clouds (.las
-    /// .laz), or export for a simulator: a terrain as a folder, or a vehicle as a file (.xml for MuJoCo, .urdf).
+    /// .laz), or export: a terrain as a folder for a simulator, a vehicle as a file (.xml for MuJoCo, .urdf), the missions of a release
+    /// for a learner.
     #[command(
         after_help = "With --for, OUT is a folder with the heights, README.md (import steps) and import.json (all\n\
         numbers). Where the simulator accepts only certain sizes, the heights are resampled (bilinear,\n\
         same extent) and README.md states by how much heights change; with --crop, the middle is cut out\n\
         and no height changes.\n\n\
+        With --for lerobot, INPUT is a release and OUT a LeRobot dataset (format 3.0): an episode is one\n\
+        mission, with state, height patch, command and split of every sample.\n\n\
         Examples:\n  sastrugi convert N44W072.hgt tile.tif\n  sastrugi convert scan.laz scan.tif --cell 0.05 --fill 2\n  \
         sastrugi convert terrain.tif terrain.glb\n  sastrugi convert terrain.tif unreal-terrain --for unreal\n  \
         sastrugi convert terrain.tif terrain.obj --max-error 0.01\n  sastrugi convert husky_a200 husky.xml\n  \
-        sastrugi convert mine.toml mine.urdf --surface hard_soil"
+        sastrugi convert mine.toml mine.urdf --surface hard_soil\n  \
+        sastrugi convert release dataset --for lerobot --patch 3.2 --patch-cell 0.1"
     )]
     Convert(Convert),
     /// Draw a DEM as PNG: coloured by height, lit from the north-west.
@@ -369,7 +373,7 @@ pub struct Verify {
 }
 
 /// Compression of a GeoTIFF.
-#[derive(Clone, Copy, Debug, Default, ValueEnum)]
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, ValueEnum)]
 pub enum Compress {
     /// Uncompressed.
     None,
@@ -986,16 +990,25 @@ pub struct Writing {
 /// `convert`.
 #[derive(Debug, Args)]
 pub struct Convert {
-    /// DEM to read, or the vehicle to write: its name (see `kinds vehicle`) or a vehicle file.
+    /// DEM to read, or the vehicle to write: its name (see `kinds vehicle`) or a vehicle file; for lerobot a release.
     pub input: PathBuf,
     /// DEM or vehicle file (.xml for MJCF, .urdf) to write; with --for a folder.
     pub output: PathBuf,
-    /// Export to a folder for this simulator.
-    #[arg(long = "for", value_name = "SIMULATOR", value_parser = simulators())]
-    pub simulator: Option<Simulator>,
+    /// Export to a folder: a DEM for this simulator, or the missions of a release for a learner (lerobot).
+    #[arg(long = "for", value_name = "TARGET", value_parser = targets())]
+    pub target: Option<Target>,
     /// Where the simulator accepts only certain sizes, crop the middle to the largest of them instead of resampling.
-    #[arg(long, requires = "simulator")]
+    #[arg(long, requires = "target")]
     pub crop: bool,
+    /// For lerobot: side of the height patch around the vehicle, a whole number of cells, m (3.2).
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub patch: Option<f64>,
+    /// For lerobot: distance between the points of the height patch, m (0.1).
+    #[arg(long, value_name = "M", allow_hyphen_values = true)]
+    pub patch_cell: Option<f64>,
+    /// For lerobot: only the missions of this traverse. May be repeated.
+    #[arg(long, value_name = "ID")]
+    pub traverse: Vec<String>,
     /// Decimate a mesh; maximum vertical distance of any cell centre from it, m.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub max_error: Option<f64>,
@@ -1019,10 +1032,38 @@ pub struct Convert {
     pub writing: Writing,
 }
 
-fn simulators() -> impl TypedValueParser<Value = Simulator> {
-    let named =
-        |name: String| Simulator::ALL.into_iter().find(|s| s.name() == name).ok_or("no simulator has this name");
-    PossibleValuesParser::new(Simulator::ALL.map(Simulator::name)).try_map(named)
+impl Convert {
+    /// The simulator to export for, if any.
+    pub fn simulator(&self) -> Option<Simulator> {
+        match self.target {
+            Some(Target::Simulator(simulator)) => Some(simulator),
+            Some(Target::Lerobot) | None => None,
+        }
+    }
+}
+
+/// What a folder is exported for.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Target {
+    /// A simulator.
+    Simulator(Simulator),
+    /// LeRobot.
+    Lerobot,
+}
+
+impl Target {
+    const LEROBOT: &str = "lerobot";
+
+    fn named(name: &str) -> Option<Self> {
+        let simulator = Simulator::ALL.into_iter().find(|simulator| simulator.name() == name);
+        simulator.map(Self::Simulator).or_else(|| (name == Self::LEROBOT).then_some(Self::Lerobot))
+    }
+}
+
+fn targets() -> impl TypedValueParser<Value = Target> {
+    let names = Simulator::ALL.map(Simulator::name).into_iter().chain([Target::LEROBOT]);
+    let named = |name: String| Target::named(&name).ok_or("no target has this name");
+    PossibleValuesParser::new(names).try_map(named)
 }
 
 /// `info`.

@@ -1,8 +1,8 @@
 //! Verbs on single files.
 
-use super::{options, reading};
+use super::{lerobot, options, reading};
 use crate::Verdict;
-use crate::args::{self, Common, Convert, Info};
+use crate::args::{self, Common, Convert, Info, Target};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use sastrugi_stages::operations::dem::to_metres;
@@ -26,7 +26,12 @@ fn failure(error: DemError) -> Failure {
 
 /// `convert`.
 pub fn convert(args: &Convert, common: &Common) -> Verdict {
-    let of_vehicle = mechanism::Format::of_name(&args.output).filter(|_| args.simulator.is_none());
+    if args.target == Some(Target::Lerobot) {
+        return lerobot::convert(args, common);
+    }
+    lerobot::check_unused(args)?;
+    let simulator = args.simulator();
+    let of_vehicle = mechanism::Format::of_name(&args.output).filter(|_| simulator.is_none());
     if let Some(format) = of_vehicle {
         return convert_vehicle(args, format, common);
     }
@@ -39,7 +44,7 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     let mut options = options(&args.writing, &args.output)?;
     let format = dem::Format::of_name(&args.output);
     let limits = mesh_limits(args, format)?;
-    match (args.simulator, format) {
+    match (simulator, format) {
         (Some(_), _) if args.output.exists() && !args.output.is_dir() => {
             return Err(Failure::usage(format!("{output} is a file; with --for, OUT must be a folder")));
         }
@@ -55,12 +60,12 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     }
     let window = args.window.as_deref().map(|w| numbers::<4>("--window", w)).transpose()?;
     let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
-    args.simulator.map_or(Ok(()), |simulator| simulators::check_folder(&args.output, simulator)).map_err(failure)?;
+    simulator.map_or(Ok(()), |simulator| simulators::check_folder(&args.output, simulator)).map_err(failure)?;
     let Read { dem, notes, .. } = read_as_it_is(&args.input, &reading)?;
     let geographic = dem.info.crs.geographic;
-    let in_metres = args.simulator.is_some() || format.is_some_and(dem::Format::in_metres);
+    let in_metres = simulator.is_some() || format.is_some_and(dem::Format::in_metres);
     let (Dem { grid, info }, converted) = if in_metres { to_metres(dem) } else { (dem, None) };
-    let lost = match args.simulator {
+    let lost = match simulator {
         Some(simulator) => {
             let fit = if args.crop { Fit::Crop } else { Fit::Resample };
             let export = if geographic { simulators::export_from_degrees } else { simulators::export };
@@ -99,7 +104,7 @@ fn mesh_limits(args: &Convert, format: Option<dem::Format>) -> Result<Option<Mes
     if limits == MeshLimits::default() {
         return Ok(None);
     }
-    let has_mesh = args.simulator.map_or(format.is_some_and(dem::Format::is_mesh), simulators::has_mesh);
+    let has_mesh = args.simulator().map_or(format.is_some_and(dem::Format::is_mesh), simulators::has_mesh);
     if has_mesh {
         return Ok(Some(limits));
     }

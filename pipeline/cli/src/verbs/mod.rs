@@ -8,6 +8,7 @@ mod files;
 mod fits;
 mod generate;
 mod init;
+mod lerobot;
 mod lists;
 mod navigate;
 mod photoclinometry;

@@ -14,8 +14,9 @@ pub mod terms;
 mod viewer_layout;
 mod zenodo;
 
-pub use described::Described;
+pub use described::{Described, folded, quoted, source_line};
 pub use license::license_warning;
+pub use readme::hub_license;
 
 /// All documents of a release: path and text.
 pub fn all(described: &Described<'_>) -> Vec<(&'static str, String)> {

@@ -119,7 +119,7 @@ fn data_files(table: &Table, described: &Described<'_>) -> String {
 }
 
 /// Licence in the names of dataset hubs; licences unknown to them are given as `other` with their name.
-fn hub_license(license: &str) -> String {
+pub fn hub_license(license: &str) -> String {
     let of_hub = |id: &str| {
         let known = HUB_NAMES.iter().find(|(spdx, _)| *spdx == id).map(|(_, name)| (*name).to_owned());
         known.or_else(|| HUB_IDENTIFIERS.contains(&id).then(|| id.to_lowercase()))

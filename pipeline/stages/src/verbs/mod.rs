@@ -6,6 +6,7 @@ pub mod coregister;
 pub mod fit;
 pub mod fits;
 pub mod hillshade;
+pub mod lerobot;
 pub mod local;
 pub mod navigate;
 pub mod parameters;
