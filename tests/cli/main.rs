@@ -6,6 +6,7 @@ mod bad_input;
 mod compare;
 mod coregister;
 mod fit_outputs;
+mod lerobot;
 mod metadata;
 mod minus;
 mod navigate;

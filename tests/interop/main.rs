@@ -6,6 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
+mod lerobot;
 mod page;
 mod photoclinometry;
 mod rover;

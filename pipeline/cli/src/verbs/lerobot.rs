@@ -7,7 +7,7 @@ use crate::failure::{Code, Failure};
 use crate::output::print;
 use sastrugi_stages::verbs::Reading;
 use sastrugi_stages::verbs::lerobot::{self, PATCH_CELL_M, PATCH_M, Settings};
-use serde_json::json;
+use serde_json::{Value, json};
 
 /// The missions of a release as a LeRobot dataset.
 pub fn convert(args: &Convert, common: &Common) -> Verdict {
@@ -15,7 +15,8 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     let patch = lerobot::patch(args.patch.unwrap_or(PATCH_M), args.patch_cell.unwrap_or(PATCH_CELL_M))?;
     let settings = Settings { patch, traverses: args.traverse.iter().cloned().collect() };
     let converted = lerobot::convert(&args.input, &args.output, &settings)?;
-    let splits: Vec<String> = converted.splits.iter().map(|(split, range)| format!("{split} {range}")).collect();
+    let named = |(split, range): (&String, &Value)| format!("{split} {}", range.as_str().unwrap_or_default());
+    let splits: Vec<String> = converted.splits.iter().map(named).collect();
     let mut text = format!(
         "{}: {} episodes, {} frames at {} Hz, {} tasks; episodes of {}",
         args.output.display(),

@@ -23,7 +23,7 @@ use sastrugi_store::parquet::TableReader;
 use sastrugi_store::release::{Release, ReleaseError};
 use sastrugi_store::{PROGRAM, dem};
 use serde::Serialize;
-use serde_json::json;
+use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Write as _;
 use std::path::{Path, PathBuf};
@@ -114,8 +114,8 @@ pub struct Converted {
     pub fps: u32,
     /// Texts of the tasks.
     pub tasks: Vec<String>,
-    /// Splits: range of episodes by name, as `first:end`.
-    pub splits: BTreeMap<String, String>,
+    /// Splits in their order: range of episodes by name, as `first:end`.
+    pub splits: Map<String, Value>,
     /// Notes for the reader.
     pub notes: Vec<String>,
 }
@@ -347,7 +347,7 @@ impl Export<'_> {
         let readme = readme(release.manifest()).into_bytes();
         let Summary { episodes, frames, tasks, splits } =
             writer.finish(output, &[("README.md", readme), ("LICENSE", license)]).map_err(refused)?;
-        let splits = splits.into_iter().map(|(name, first, end)| (name, format!("{first}:{end}"))).collect();
+        let splits = splits.into_iter().map(|(name, first, end)| (name, json!(format!("{first}:{end}")))).collect();
         let (folder, fps, notes) = (output.to_owned(), chosen.fps, counts.notes());
         Ok(Converted { folder, episodes, frames, fps, tasks, splits, notes })
     }
