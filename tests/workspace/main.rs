@@ -1,7 +1,10 @@
-//! The rooms: who may import whom, as `docs/ARCHITECTURE.md` states it.
+//! The rooms: who may import whom, as `docs/ARCHITECTURE.md` states it. Licences of what others made, and pages whose commands are followed.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
+mod licences;
+mod notice;
+mod offline;
 mod walk;
 
 use std::collections::{BTreeMap, BTreeSet};

@@ -45,25 +45,32 @@ fn inserted(text: &str, after: &str, lines: &str) -> String {
 }
 
 /// Runs a command line in a folder; its output is shown when it fails.
-fn run(folder: &Path, line: &str) {
+pub fn run(folder: &Path, line: &str) {
     let output = Command::new("bash").args(["-euo", "pipefail", "-c", line]).current_dir(folder).output().unwrap();
     let [out, err] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
     assert!(output.status.success(), "{line}\n{out}{err}");
 }
 
-/// A copy of the files under version control, with the compiled libraries, so that only what the walk touches is built again.
-fn scratch() -> PathBuf {
-    let root = sastrugi_fixtures::workspace_root();
-    let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join("walk");
+/// A copy of the files under version control, in a folder of this name beside the tests' own files.
+pub fn checkout(name: &str) -> PathBuf {
+    let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
     if copy.exists() {
         fs::remove_dir_all(&copy).unwrap();
     }
-    fs::create_dir_all(copy.join("target/release/deps")).unwrap();
-    let to = copy.display();
-    run(&root, &format!("git ls-files -z | xargs -0 cp -p --parents -t '{to}'"));
+    fs::create_dir_all(&copy).unwrap();
+    let files = format!("git ls-files -z | xargs -0 cp -p --parents -t '{}'", copy.display());
+    run(&sastrugi_fixtures::workspace_root(), &files);
+    copy
+}
+
+/// A checkout with the compiled libraries, so that only what the walk touches is built again.
+fn scratch() -> PathBuf {
+    let copy = checkout("walk");
+    fs::create_dir_all(copy.join("target/release")).unwrap();
     let target = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("release");
     let libraries = "find deps -name '*.rlib' -o -name '*.rmeta' -o -name '*.so'; find .fingerprint build -type f";
-    run(&target, &format!("{{ {libraries}; }} | xargs -d '\\n' cp -p --parents -t '{to}/target/release'"));
+    let to = copy.join("target/release");
+    run(&target, &format!("{{ {libraries}; }} | xargs -d '\\n' cp -p --parents -t '{}'", to.display()));
     copy
 }
 
