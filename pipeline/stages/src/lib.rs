@@ -11,7 +11,7 @@
 //! 4. [`studies::merge`] does the last step for shards; [`verification::verify`] checks a release, and [`packing::pack`] makes one file of it;
 //!    [`remote`] keeps releases in an object store.
 //!
-//! [`verbs`] do the same work for single files. Nothing here prints: a run tells a [`runner::progress::Progress`].
+//! [`verbs`] do the same work for single files, [`arrays`] for surfaces in memory. Nothing here prints: a run tells a [`runner::progress::Progress`].
 //!
 //! # Example
 //!
@@ -60,6 +60,7 @@
 //! # }
 //! ```
 
+pub mod arrays;
 mod builder;
 mod documents;
 mod error;

@@ -2,7 +2,7 @@
 
 use crate::job::JobError;
 use sastrugi_schemas::coregistration::{Coregistration, Minus};
-use sastrugi_store::dem::Dem;
+use sastrugi_store::dem::{Crs, Dem};
 use sastrugi_texture::coregister::{Coregistered, SIGNIFICANCE, coregister};
 
 /// Conversion of degrees to metres starts at each DEM's own corner, so the relative position of two DEMs would be lost.
@@ -14,15 +14,23 @@ pub const IN_DEGREES: &str =
 /// # Errors
 /// DEMs in different coordinate systems, or that cannot be co-registered.
 pub fn coregistered(dem: &Dem, other: &Dem) -> Result<Coregistered, JobError> {
-    let (one, two) = (dem.info.crs.epsg, other.info.crs.epsg);
-    if let (Some(one), Some(two)) = (one, two)
+    check_systems(&dem.info.crs, &other.info.crs)?;
+    coregister(&dem.grid, &other.grid).map_err(JobError::input)
+}
+
+/// Refuses two DEMs in different coordinate systems.
+///
+/// # Errors
+/// When both have an EPSG code and the codes differ.
+pub fn check_systems(one: &Crs, two: &Crs) -> Result<(), JobError> {
+    if let (Some(one), Some(two)) = (one.epsg, two.epsg)
         && one != two
     {
         return Err(JobError::input(format!(
             "the DEMs are in EPSG:{one} and EPSG:{two}; reproject the second: gdalwarp -t_srs EPSG:{one} -r bilinear"
         )));
     }
-    coregister(&dem.grid, &other.grid).map_err(JobError::input)
+    Ok(())
 }
 
 /// A sentence on the subtracted DEM and its co-registration.

@@ -4,6 +4,7 @@ use super::cache::Cache;
 use super::graph::Graph;
 use super::progress::{End, Progress};
 use crate::job::{Cause, ItemRef, JobError, Work};
+use crate::machine::Fault;
 use rayon::prelude::*;
 use sastrugi_store::atomic::Draft;
 use serde::{Deserialize, Serialize};
@@ -198,6 +199,12 @@ impl Run<'_> {
 
     /// Copies a result from the shared cache, or computes it.
     fn run_item(&self, position: usize) -> Result<Ran, JobError> {
+        if self.progress.is_cancelled() {
+            return Err(JobError {
+                message: "not started: interrupted".to_owned(),
+                cause: Cause::Machine(Fault::Passing),
+            });
+        }
         let node = self.graph.node(position);
         let key = self.graph.key(position);
         if let Some(record) = self.cache.fetch(&node.item, key) {

@@ -24,6 +24,10 @@ pub trait Progress: Sync {
     fn step(&self, text: &str) {
         let _ = text;
     }
+    /// Asked before each item. Once true, no item starts any more, and the run ends with [`crate::Error::Retry`]; results so far are kept.
+    fn is_cancelled(&self) -> bool {
+        false
+    }
 }
 
 /// How an item ended.

@@ -358,6 +358,28 @@ fn val_an_error_of_the_machine_stops_the_run() {
     assert_eq!(reasons, ["new", "new"]);
 }
 
+/// Whoever watches a run can end it: no further item starts, nothing counts as failed, and another run does the rest.
+#[test]
+fn val_a_cancelled_run_starts_no_further_item() {
+    struct Once(Mutex<usize>);
+    impl Progress for Once {
+        fn ended(&self, _item: &ItemRef, _end: &End, _seconds: f64) {
+            *self.0.lock().unwrap() += 1;
+        }
+        fn is_cancelled(&self) -> bool {
+            *self.0.lock().unwrap() > 0
+        }
+    }
+    let area = Area::new();
+    let (graph, cache) = (graph(["a", "b", "c"].map(|name| node(area.line(name), &[])).into()), area.cache());
+    let stopped = execute(&graph, &cache, &all(&graph), limits(1), &Once(Mutex::default())).unwrap_err();
+    assert_eq!(stopped.error.cause, Cause::Machine(Fault::Passing));
+    assert_eq!(area.ran(), ["a"]);
+    let execution = run(&graph, &cache, 1);
+    assert_eq!((execution.done, execution.failures.len()), (all(&graph), 0));
+    assert_eq!(area.ran(), ["b", "c"]);
+}
+
 /// The items that run at the same time stay below the limit together; one beyond it runs alone.
 #[test]
 fn val_memory_is_limited() {

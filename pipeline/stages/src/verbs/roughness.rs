@@ -10,7 +10,8 @@ pub use sastrugi_roughness::{
     AerodynamicRoughness, ArealFigures, Detrender, ObstacleHeight, Ride, WindEstimate, WindSettings,
 };
 use sastrugi_roughness::{
-    BandError, Summary, WaveBand, WindError, aerodynamic_roughness, classify, describe, moore_gradient,
+    BandError, DescribeSettings, Summary, WaveBand, WindError, aerodynamic_roughness, classify, describe,
+    moore_gradient,
 };
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::RoughnessSection;
@@ -78,19 +79,44 @@ pub struct Described {
 /// # Errors
 /// Unknown settings, a DEM that cannot be read or does not contain the band or the outer scale, a map that cannot be written.
 pub fn roughness(request: &Request<'_>) -> Result<(Described, Vec<String>), Error> {
-    parameters::check_schema(&request.parameters, &schema_of::<RoughnessSection>(), "roughness")?;
-    let section: RoughnessSection = read_parameters(&request.parameters)?;
-    check_roughness(&section)?;
-    let settings = settings(&section)?;
-    let band = request.ride.as_ref().map(|ride| band(&ride.bumps)).transpose()?;
+    let wanted = Wanted::new(&request.parameters, request.ride.as_ref(), request.wind.as_ref())?;
     let Read { dem, notes, .. } = read(request.dem, &request.reading)?;
-    let ride = request.ride.as_ref().zip(band).map(|(ride, band)| ride_over(&dem.grid, ride, &band)).transpose()?;
-    let aerodynamic = request.wind.as_ref().map(|wind| aerodynamic_over(&dem.grid, wind)).transpose()?;
+    let described = wanted.of(&dem.grid)?;
     if let Some(path) = request.classes {
-        let classes = classify(&moore_gradient(&dem.grid), &settings.thresholds);
+        let classes = classify(&moore_gradient(&dem.grid), &wanted.settings.thresholds);
         store::write_classes(path, &classes, &dem.info.crs).map_err(Error::failed)?;
     }
-    Ok((Described { summary: describe(&dem.grid, &settings), ride, aerodynamic }, notes))
+    Ok((described, notes))
+}
+
+/// What is to be computed of a surface, checked before it is read.
+pub(crate) struct Wanted<'a> {
+    settings: DescribeSettings,
+    ride: Option<(&'a RideRequest<'a>, WaveBand)>,
+    wind: Option<&'a WindSettings>,
+}
+
+impl<'a> Wanted<'a> {
+    /// Checks settings, ride and wind.
+    pub(crate) fn new(
+        parameters: &Value,
+        ride: Option<&'a RideRequest<'a>>,
+        wind: Option<&'a WindSettings>,
+    ) -> Result<Self, Error> {
+        parameters::check_schema(parameters, &schema_of::<RoughnessSection>(), "roughness")?;
+        let section: RoughnessSection = read_parameters(parameters)?;
+        check_roughness(&section)?;
+        let settings = settings(&section)?;
+        let ride = ride.map(|ride| Ok::<_, Error>((ride, band(&ride.bumps)?))).transpose()?;
+        Ok(Self { settings, ride, wind })
+    }
+
+    /// The roughness of a surface in metres; writes the ride's map if there is one.
+    pub(crate) fn of(&self, dem: &Grid) -> Result<Described, Error> {
+        let ride = self.ride.as_ref().map(|(ride, band)| ride_over(dem, ride, band)).transpose()?;
+        let aerodynamic = self.wind.map(|wind| aerodynamic_over(dem, wind)).transpose()?;
+        Ok(Described { summary: describe(dem, &self.settings), ride, aerodynamic })
+    }
 }
 
 /// Roughness length by wind direction.

@@ -1,6 +1,7 @@
 //! `terrain`: generates one heightfield and writes it to a file.
 
 use super::parameters;
+use crate::arrays::Raster;
 use crate::error::Error;
 use crate::jobs::terrain::STAGE;
 use crate::operations::inputs::{self, Loaded};
@@ -9,6 +10,7 @@ use sastrugi_numeric::Streams;
 use sastrugi_store::dem::{self, Crs, Format, WriteOptions};
 use sastrugi_terrain::{Generator, Holds, Input, Terrain};
 use serde_json::{Map, Value, json};
+use std::collections::BTreeMap;
 use std::path::Path;
 
 /// What to generate.
@@ -64,8 +66,11 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     }))
 }
 
+/// Inputs of a generator that are not files, by the name that its parameters give them.
+pub(crate) type Given<'a> = BTreeMap<&'a str, &'a Raster>;
+
 /// A generator with its parameters and streams.
-pub(super) struct Prepared {
+pub(crate) struct Prepared {
     kind: String,
     generator: Box<dyn Generator>,
     seed: u64,
@@ -76,18 +81,27 @@ pub(super) struct Prepared {
 pub(super) fn prepare(spec: &str, set: &[String], seed: Option<u64>) -> Result<Prepared, Error> {
     let (kind, mut params, own_seed) = read_spec(spec)?;
     parameters::assign(&mut params, set)?;
-    if let Some(known) = sastrugi_terrain::kinds().iter().find(|k| k.kind == kind) {
-        parameters::check(&params, known)?;
-    }
-    let generator = sastrugi_terrain::prepare(&kind, &params)?;
-    let seed = seed.or(own_seed).unwrap_or(0);
-    Ok(Prepared { kind, generator, seed, streams: Streams::for_seed(seed, STAGE) })
+    Prepared::new(kind, &params, seed.or(own_seed).unwrap_or(0))
 }
 
 impl Prepared {
-    /// The generated terrain, and the coordinate system of its first input.
+    /// The generator of this kind, with its parameters checked.
+    pub(crate) fn new(kind: String, params: &Value, seed: u64) -> Result<Self, Error> {
+        if let Some(known) = sastrugi_terrain::kinds().iter().find(|k| k.kind == kind) {
+            parameters::check(params, known)?;
+        }
+        let generator = sastrugi_terrain::prepare(&kind, params)?;
+        Ok(Self { kind, generator, seed, streams: Streams::for_seed(seed, STAGE) })
+    }
+
+    /// The generated terrain, and the coordinate system of its first input. Inputs are files.
     pub(super) fn make(&self) -> Result<(Terrain, Crs), Error> {
-        let (inputs, crs) = read_inputs(self.generator.as_ref())?;
+        self.make_from(&Given::new())
+    }
+
+    /// The same; inputs that are not `given` are files.
+    pub(crate) fn make_from(&self, given: &Given<'_>) -> Result<(Terrain, Crs), Error> {
+        let (inputs, crs) = read_inputs(self.generator.as_ref(), given)?;
         Ok((generate(self.generator.as_ref(), &self.streams, &inputs)?, crs))
     }
 
@@ -97,13 +111,13 @@ impl Prepared {
     }
 
     /// Its full parameters.
-    pub(super) fn parameters(&self) -> Value {
+    pub(crate) fn parameters(&self) -> Value {
         self.generator.parameters()
     }
 
     /// Its inputs.
     pub(super) fn inputs(&self) -> Result<Vec<Input>, Error> {
-        Ok(read_inputs(self.generator.as_ref())?.0)
+        Ok(read_inputs(self.generator.as_ref(), &Given::new())?.0)
     }
 
     /// Its random streams.
@@ -117,20 +131,21 @@ impl Prepared {
     }
 
     /// Notes on its parameters.
-    pub(super) fn notes(&self) -> Vec<String> {
+    pub(crate) fn notes(&self) -> Vec<String> {
         self.generator.notes()
     }
 }
 
-/// Reads a generator's inputs, surfaces in metres, and the coordinate system of the first.
-fn read_inputs(generator: &dyn Generator) -> Result<(Vec<Input>, Crs), Error> {
+/// A generator's inputs, surfaces in metres, and the coordinate system of the first; those that are not given are read.
+fn read_inputs(generator: &dyn Generator, given: &Given<'_>) -> Result<(Vec<Input>, Crs), Error> {
     let mut read_inputs = Vec::new();
     let mut crs = None;
     for named in generator.inputs() {
         let path = Path::new(&named.name);
-        let read = match named.holds {
-            Holds::Heights => heights(path)?,
-            Holds::Values | Holds::Points => inputs::read(&named, path)?,
+        let read = match (given.get(named.name.as_str()), named.holds) {
+            (Some(raster), Holds::Heights | Holds::Values) => raster.loaded(),
+            (None, Holds::Heights) => heights(path)?,
+            (None, Holds::Values) | (_, Holds::Points) => inputs::read(&named, path)?,
         };
         if let Some(own) = read.crs {
             inputs::check_systems(&named, crs.as_ref(), &own)?;
