@@ -5,8 +5,11 @@
 //! are sorted by their keys, which are never null; a `NaN` is stored as null, also within a list. Memory is bounded by one row
 //! group, whatever the number of rows.
 
+mod stream;
 #[cfg(test)]
 mod tests;
+
+pub use stream::{Batches, FFI_ArrowArrayStream, FFI_ArrowSchema, TableFiles};
 
 use crate::PROGRAM;
 use crate::atomic::{AtomicFile, Refused, Target};
