@@ -23,6 +23,18 @@ pub enum Code {
     Retry = 75,
 }
 
+impl Code {
+    /// The exit code of an error.
+    pub fn of(error: &Error) -> Self {
+        match error {
+            Error::Study { .. } | Error::Usage(_) => Self::Usage,
+            Error::Input(_) => Self::Input,
+            Error::Failed(_) => Self::Failed,
+            Error::Retry(_) => Self::Retry,
+        }
+    }
+}
+
 impl From<Code> for ExitCode {
     fn from(code: Code) -> Self {
         Self::from(code as u8)
@@ -51,12 +63,7 @@ impl Failure {
 
     /// Its exit code.
     pub fn code(&self) -> Code {
-        match self.0 {
-            Error::Study { .. } | Error::Usage(_) => Code::Usage,
-            Error::Input(_) => Code::Input,
-            Error::Failed(_) => Code::Failed,
-            Error::Retry(_) => Code::Retry,
-        }
+        Code::of(&self.0)
     }
 }
 

@@ -1,13 +1,12 @@
 //! Results on stdout: JSON for machines, aligned lines for people; messages on stderr.
 
-use crate::failure::Failure;
+use crate::failure::{Code, Failure};
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use sastrugi_stages::Error;
 use sastrugi_stages::study::{Refusals, StudyError};
 use serde_json::Value;
 use std::io::{IsTerminal, Write};
 use std::ops::Range;
-use std::process::ExitCode;
 
 /// Places farther right are given by line and column only: drawing such a long line is useless, and `miette` counts columns in 16 bits.
 const COLUMNS_SHOWN: usize = 1000;
@@ -40,13 +39,13 @@ pub fn warn(line: &str) {
 }
 
 /// Prints the message of a failure on stderr and returns the exit code.
-pub fn report(failure: Failure) -> ExitCode {
+pub fn report(failure: Failure) -> Code {
     let code = failure.code();
     match failure.0 {
         Error::Study { name, text, refusals } => print_refusals(&name, &text, &refusals),
         Error::Usage(m) | Error::Input(m) | Error::Failed(m) | Error::Retry(m) => warn(&format!("sastrugi: {m}")),
     }
-    code.into()
+    code
 }
 
 /// Prints the errors in a study, each with its source line.
