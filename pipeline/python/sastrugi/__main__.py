@@ -1,0 +1,7 @@
+"""`python -m sastrugi`."""
+
+import sys
+
+from ._main import main
+
+sys.exit(main())

@@ -1,0 +1,194 @@
+"""Fits of measured surfaces, and textures from them."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import _native
+from ._errors import SastrugiError
+from ._heightfield import Heightfield, heights_of
+from ._values import USAGE, numbers, optional, pair, to_json
+
+if TYPE_CHECKING:
+    import matplotlib.axes
+
+
+class Fit:
+    """The covariance of a surface: a model with its parameters, from a DEM or stated.
+
+    Units end the names: `sigma_m` is the standard deviation, `range_m` the correlation length b. Covariances are in m², never semivariances.
+
+    A stated model needs nothing else:
+
+    >>> snow = Fit({"model": "exponential", "parameters": {"sigma_m": 0.03, "range_m": 0.28}})
+    >>> snow.parameters
+    {'sigma_m': 0.03, 'range_m': 0.28}
+    >>> snow.texture(size=(4.0, 2.0), cell=0.05, seed=1).shape
+    (40, 80)
+    """
+
+    __slots__ = ("_text", "_content", "_quoted")
+
+    def __init__(self, content: Mapping[str, Any] | str) -> None:
+        self._text = content if isinstance(content, str) else to_json(content) + "\n"
+        self._content: dict[str, Any] = json.loads(self._text)
+        self._quoted: dict[str, Any] = json.loads(_native.quoted(self._text))
+
+    @classmethod
+    def load(cls, path: str | os.PathLike[str]) -> Fit:
+        """Reads a fit file. Raises SastrugiError (65) for a file that is missing or is not one."""
+        return cls(_native.load_fit(os.fspath(path)))
+
+    def save(self, path: str | os.PathLike[str]) -> None:
+        """Writes the fit file, which `sastrugi texture` and `Fit.load` read."""
+        _native.save_fit(os.fspath(path), self._text)
+
+    def to_dict(self) -> dict[str, Any]:
+        """Everything in the fit file."""
+        content: dict[str, Any] = json.loads(self._text)
+        return content
+
+    @property
+    def model(self) -> str:
+        """Name of the covariance model."""
+        return str(self._content["model"])
+
+    @property
+    def parameters(self) -> dict[str, float]:
+        """Parameters of the model by name."""
+        return dict(self._content["parameters"])
+
+    @property
+    def intervals(self) -> dict[str, tuple[float, float]]:
+        """Interval of each parameter that has one, and of `sigma2_over_range_m`; an open end is infinite.
+
+        A parameter whose search ended at its bound has only a lower limit, and is not estimated; see `is_estimated`.
+        """
+        found = {}
+        for name, quoted in self._quoted["parameters"].items():
+            if "at_least" in quoted:
+                found[name] = (quoted["at_least"], math.inf)
+            elif quoted.get("interval") is not None:
+                low, high = quoted["interval"]
+                found[name] = (-math.inf if low is None else low, math.inf if high is None else high)
+        return found
+
+    @property
+    def interval_level(self) -> float | None:
+        """Confidence level of the intervals, or None without intervals."""
+        level: float | None = self._quoted["level"]
+        return level
+
+    @property
+    def interval_kind(self) -> str | None:
+        """How the intervals were found, or None without intervals."""
+        kind: str | None = self._quoted["kind"]
+        return kind
+
+    def is_estimated(self, name: str) -> bool:
+        """Whether the value of a parameter is an estimate. It is not if the search for the range ended at its bound."""
+        quoted = self._quoted["parameters"].get(name)
+        if quoted is None:
+            known = ", ".join(self._quoted["parameters"])
+            raise SastrugiError(f"the fit has no parameter `{name}`; it has {known}", USAGE)
+        return "value" in quoted
+
+    @property
+    def verdict(self) -> str:
+        """What describes the surface at this scale, and what the fit may be used for; empty for a stated model."""
+        return str(self._content.get("verdict", ""))
+
+    @property
+    def warnings(self) -> list[str]:
+        """Warnings about the fit, the most important first."""
+        return list(self._content.get("warnings", []))
+
+    def texture(
+        self,
+        size: float | Sequence[float],
+        cell: float,
+        seed: int = 0,
+        *,
+        method: str = "fft_ma",
+        **parameters: Any,
+    ) -> Heightfield:
+        """Synthesises a heightfield with this covariance, as `sastrugi texture` does.
+
+        size: extent east-west and north-south, m; one number for a square.
+        cell: size of its cells, m.
+        seed: of the random streams; the same seed gives the same heights.
+        method: fft_ma, cholesky, gaussians or quasi_wavelets; its parameters (`sastrugi kinds`) as keywords.
+
+        >>> snow = Fit({"model": "exponential", "parameters": {"sigma_m": 0.03, "range_m": 0.28}})
+        >>> tile = snow.texture(20.0, 0.1, seed=3)
+        >>> abs(float(np.sqrt(np.mean(np.square(tile)))) - 0.03) < 1e-9
+        True
+        """
+        parameters = {"size_m": pair("size", size), "cell_m": cell, **parameters}
+        parts, info = _native.texture(self._text, method, to_json(parameters), seed)
+        return Heightfield(*parts, notes=json.loads(info)["notes"])
+
+    def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
+        """Draws the measured covariance and the model, both as detrending and trimming leave them, by lag. Needs matplotlib."""
+        lags = np.asarray(self._content.get("lags_m", []), dtype=float)
+        if lags.size == 0:
+            raise SastrugiError("a stated model has no measured covariance to draw", USAGE)
+        pyplot = optional("matplotlib.pyplot", "matplotlib", "plot")
+        ax = pyplot.gca() if ax is None else ax
+        ax.plot(lags, np.asarray(self._content["covariance_m2"], dtype=float), "o", label="measured")
+        ax.plot(lags, np.asarray(self._content["model_m2"], dtype=float), "-", label=self.model)
+        ax.set_xlabel("lag, m")
+        ax.set_ylabel("covariance, m²")
+        ax.legend()
+        return ax
+
+    def __repr__(self) -> str:
+        numbers = ", ".join(f"{name}={value:.4g}" for name, value in self.parameters.items())
+        return f"Fit({self.model}: {numbers})"
+
+
+def fit(
+    dem: Any,
+    *,
+    outer_scale: float,
+    cell: float | Sequence[float] | None = None,
+    window: Sequence[float] | None = None,
+    minus: str | os.PathLike[str] | None = None,
+    seed: int = 0,
+    **parameters: Any,
+) -> Fit:
+    """Fits the covariance of a measured surface, as `sastrugi fit` does.
+
+    dem: a file, a Heightfield, or an array (rows, columns) of heights in m with `cell`.
+    outer_scale: window of the moving average, m: what is wider is background.
+    cell: size of the cells, m, for arrays and for files that state none.
+    window: part of a file, (x0, y0, x1, y1) in its own coordinates.
+    minus: another file, which is co-registered to `dem` (then a file too) and subtracted.
+    seed: of the replicates.
+    parameters: as in a study (`sastrugi kinds covariance`): mode, trim, model, bootstrap, inner_scale_m, noise_sigma_m ...
+
+    The file that `save` writes is that of the program for the same file and parameters. Ctrl-C returns at once; the fit then ends in the
+    background without effect.
+
+    >>> site = Fit({"model": "exponential", "parameters": {"sigma_m": 0.05, "range_m": 0.2}}).texture(
+    ...     16.0, 0.1, seed=1, phase="gaussian", periodic=False)
+    >>> found = fit(site, outer_scale=1.0, model="exponential", bootstrap=0)
+    >>> found.model, abs(found.parameters["sigma_m"] / 0.05 - 1) < 0.2
+    ('exponential', True)
+    """
+    text = to_json({"outer_scale_m": outer_scale, **parameters})
+    if isinstance(dem, (str, os.PathLike)):
+        sides = None if cell is None else pair("cell", cell)
+        part = numbers("window", window, 4)
+        other = None if minus is None else os.fspath(minus)
+        fitted, _ = _native.fit_file(os.fspath(dem), text, seed, sides, part, other)
+        return Fit(fitted)
+    if window is not None or minus is not None:
+        raise SastrugiError("`window` and `minus` apply to a file; cut an array, or use `coregister`", USAGE)
+    return Fit(_native.fit_array(heights_of(dem, cell), text, seed))

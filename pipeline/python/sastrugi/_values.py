@@ -1,0 +1,62 @@
+"""Conversions between Python's values and those that the program takes."""
+
+from __future__ import annotations
+
+import importlib
+import json
+import os
+from collections.abc import Mapping, Sequence
+from types import ModuleType
+from typing import Any
+
+import numpy as np
+
+from ._errors import SastrugiError
+
+USAGE = 2
+INPUT = 65
+RETRY = 75
+
+
+def to_json(parameters: Mapping[str, Any]) -> str:
+    """Parameters as JSON; NumPy's numbers and arrays and paths count as Python's."""
+    try:
+        return json.dumps(parameters, allow_nan=False, default=_plain)
+    except ValueError as error:
+        raise SastrugiError(f"a parameter is not a finite number: {error}", USAGE) from None
+    except TypeError as error:
+        raise SastrugiError(f"a parameter cannot be passed to the program: {error}", USAGE) from None
+
+
+def _plain(value: Any) -> Any:
+    if isinstance(value, (np.generic, np.ndarray)):
+        return value.tolist()
+    if isinstance(value, os.PathLike):
+        return os.fspath(value)
+    raise TypeError(f"{value!r} has the type {type(value).__name__}")
+
+
+def numbers(name: str, value: Sequence[float] | None, count: int) -> tuple[float, ...] | None:
+    """So many numbers; None stays None."""
+    if value is None:
+        return None
+    found = tuple(float(v) for v in value)
+    if len(found) != count:
+        raise SastrugiError(f"`{name}` must be {count} numbers, got {value!r}", USAGE)
+    return found
+
+
+def pair(name: str, value: float | Sequence[float]) -> tuple[float, float]:
+    """A number, which stands for both, or two numbers."""
+    found = np.asarray(value, dtype=np.float64).ravel().tolist()
+    if len(found) not in (1, 2):
+        raise SastrugiError(f"`{name}` must be one or two numbers, got {value!r}", USAGE)
+    return found[0], found[-1]
+
+
+def optional(module: str, package: str, purpose: str) -> ModuleType:
+    """A package that only some functions need."""
+    try:
+        return importlib.import_module(module)
+    except ImportError:
+        raise SastrugiError(f"{purpose} needs {package}: pip install {package}", USAGE) from None

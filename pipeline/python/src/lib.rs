@@ -1,0 +1,45 @@
+//! `sastrugi._native`: what the Python package takes from the program. Thin: every function is one call into the stages or a kernel, with the
+//! interpreter's lock released while it works. Parameters and results that are not arrays pass as JSON; `sastrugi/*.py` gives them their shape.
+
+mod errors;
+mod rasters;
+mod releases;
+mod runs;
+mod surfaces;
+mod waiting;
+
+use pyo3::prelude::*;
+use std::ffi::OsString;
+
+/// Runs the command line: arguments with the name of the program first; returns the exit code.
+#[pyfunction]
+fn main(py: Python<'_>, arguments: Vec<OsString>) -> u8 {
+    py.detach(move || sastrugi_cli::run(arguments) as u8)
+}
+
+/// The functions and classes behind `sastrugi`.
+#[pymodule]
+fn _native(module: &Bound<'_, PyModule>) -> PyResult<()> {
+    module.add("__version__", env!("CARGO_PKG_VERSION"))?;
+    module.add_class::<rasters::Crs>()?;
+    module.add_class::<releases::Table>()?;
+    module.add_class::<releases::Ground>()?;
+    module.add_function(wrap_pyfunction!(main, module)?)?;
+    module.add_function(wrap_pyfunction!(rasters::read, module)?)?;
+    module.add_function(wrap_pyfunction!(rasters::write, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::terrain, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::fit_array, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::fit_file, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::load_fit, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::save_fit, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::quoted, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::texture, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::roughness, module)?)?;
+    module.add_function(wrap_pyfunction!(surfaces::coregister, module)?)?;
+    module.add_function(wrap_pyfunction!(runs::run, module)?)?;
+    module.add_function(wrap_pyfunction!(runs::traverse, module)?)?;
+    module.add_function(wrap_pyfunction!(runs::navigate, module)?)?;
+    module.add_function(wrap_pyfunction!(runs::analyze, module)?)?;
+    module.add_function(wrap_pyfunction!(releases::recording, module)?)?;
+    Ok(())
+}

@@ -1,0 +1,134 @@
+//! Long calls: the work is done on a thread of its own, while the caller waits for it, tells how far it is, and watches for Ctrl-C.
+//!
+//! Kernels cannot be stopped in the middle. On Ctrl-C the caller gets its `KeyboardInterrupt` after a moment at most; a run starts no further
+//! item, and what was begun ends in the background without effect (files appear only when they are complete).
+
+use crate::errors::refused;
+use pyo3::prelude::*;
+use sastrugi_stages::Error;
+use sastrugi_stages::job::ItemRef;
+use sastrugi_stages::runner::progress::{End, Progress};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
+use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::thread::{Builder, JoinHandle};
+use std::time::{Duration, Instant};
+
+/// Time between two looks at Python's signals.
+const POLL: Duration = Duration::from_millis(50);
+/// Time that an interrupted call waits for its work to end, so that the work area is free again.
+const GRACE: Duration = Duration::from_secs(2);
+
+/// Items done, items in total, and what happened.
+type Step = (usize, usize, String);
+
+/// The listener of the work: passes on its progress, and knows whether the caller still waits. The work has ended when it is dropped.
+pub struct Watched {
+    steps: Sender<Step>,
+    cancelled: Arc<AtomicBool>,
+    done: AtomicUsize,
+    total: AtomicUsize,
+}
+
+impl Watched {
+    fn tell(&self, text: String) {
+        let (done, total) = (self.done.load(Ordering::SeqCst), self.total.load(Ordering::SeqCst));
+        // The caller may be gone.
+        let _ = self.steps.send((done, total, text));
+    }
+}
+
+impl Progress for Watched {
+    fn begin(&self, total: usize, ready: usize, _seconds: f64) {
+        self.done.store(ready, Ordering::SeqCst);
+        self.total.store(total, Ordering::SeqCst);
+        self.tell(format!("{total} items, {ready} already computed"));
+    }
+
+    fn ended(&self, item: &ItemRef, end: &End, _seconds: f64) {
+        self.done.fetch_add(1, Ordering::SeqCst);
+        self.tell(match end {
+            End::Done(_) => item.to_string(),
+            End::Failed(why) => format!("{item} failed: {why}"),
+            End::Skipped(parent) => format!("{item} skipped because {parent} failed"),
+        });
+    }
+
+    fn phase(&self, text: &str) {
+        self.tell(text.to_owned());
+    }
+
+    fn is_cancelled(&self) -> bool {
+        self.cancelled.load(Ordering::SeqCst)
+    }
+}
+
+/// Does work that does not tell how far it is.
+pub fn waited<T: Send + 'static>(
+    py: Python<'_>,
+    work: impl FnOnce() -> Result<T, Error> + Send + 'static,
+) -> PyResult<T> {
+    watched(py, None, move |_| work())
+}
+
+/// Does work that tells a listener; `progress(done, total, what)` is called on the caller's thread.
+pub fn watched<T: Send + 'static>(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    work: impl FnOnce(&Watched) -> Result<T, Error> + Send + 'static,
+) -> PyResult<T> {
+    let (steps, told) = channel();
+    let cancelled = Arc::new(AtomicBool::new(false));
+    let listener =
+        Watched { steps, cancelled: Arc::clone(&cancelled), done: AtomicUsize::new(0), total: AtomicUsize::new(0) };
+    let worker = Builder::new().name("sastrugi".to_owned()).spawn(move || work(&listener))?;
+    match listen(py, progress, told) {
+        Ok(()) => joined(py, worker),
+        Err((interrupt, told)) => {
+            cancelled.store(true, Ordering::SeqCst);
+            py.detach(move || await_end(&told));
+            Err(interrupt)
+        }
+    }
+}
+
+/// Passes steps on until the work ends, or until the callback raises or a signal arrives.
+fn listen(
+    py: Python<'_>,
+    progress: Option<&Bound<'_, PyAny>>,
+    mut told: Receiver<Step>,
+) -> Result<(), (PyErr, Receiver<Step>)> {
+    loop {
+        let (back, step) = py.detach(move || {
+            let step = told.recv_timeout(POLL);
+            (told, step)
+        });
+        told = back;
+        let heard = match (step, progress) {
+            (Err(RecvTimeoutError::Disconnected), _) => return Ok(()),
+            (Ok(step), Some(progress)) => progress.call1(step).map(drop),
+            (Ok(_), None) | (Err(RecvTimeoutError::Timeout), _) => Ok(()),
+        };
+        if let Err(interrupt) = heard.and_then(|()| py.check_signals()) {
+            return Err((interrupt, told));
+        }
+    }
+}
+
+/// The result of work that has ended.
+fn joined<T: Send>(py: Python<'_>, worker: JoinHandle<Result<T, Error>>) -> PyResult<T> {
+    match py.detach(move || worker.join()) {
+        Ok(result) => result.map_err(refused),
+        Err(_) => Err(refused(Error::failed("internal error: the computation ended without a result"))),
+    }
+}
+
+/// Waits a moment for the end of cancelled work.
+fn await_end(told: &Receiver<Step>) {
+    let start = Instant::now();
+    while let Some(left) = GRACE.checked_sub(start.elapsed()) {
+        if told.recv_timeout(left).is_err() {
+            return;
+        }
+    }
+}

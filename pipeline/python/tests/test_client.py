@@ -1,0 +1,73 @@
+"""The client of the terrain server, against the program's own server."""
+
+import subprocess
+
+import numpy as np
+import pytest
+from conftest import program
+
+import sastrugi
+
+WORLD = """
+kind = "planetary"
+seed = 11
+size_px = [300, 200]
+cell_m = 0.02
+basic_spacing_m = 0.005
+origin_m = [-1.0, 2.0]
+processes = [
+    { kind = "texture" },
+    { kind = "rocks", coverage = 0.118 },
+    { kind = "albedo" },
+]
+"""
+PROCESSES = [{"kind": "texture"}, {"kind": "rocks", "coverage": 0.118}, {"kind": "albedo"}]
+
+
+@pytest.fixture(scope="module")
+def client(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("server")
+    (folder / "world.toml").write_text(WORLD)
+    command = [program(), "serve", "--listen", "127.0.0.1:0", "world.toml"]
+    process = subprocess.Popen(command, cwd=folder, stdout=subprocess.PIPE, stderr=subprocess.DEVNULL, text=True)
+    try:
+        address = process.stdout.readline().strip()
+        assert address.startswith("http://")
+        yield sastrugi.TerrainClient(address)
+    finally:
+        process.kill()
+        process.wait()
+        process.stdout.close()
+
+
+def test_patches_are_those_of_the_generator(client):
+    (world,) = client.collections()
+    assert world["id"] == "world" and "albedo" in world["fields"]
+    patch = client.patch("world", origin=(-1.0, 2.0), size=(60, 40), resolution=0.02)
+    made = sastrugi.terrain(
+        "planetary", seed=11, size_px=[60, 40], cell_m=0.02, basic_spacing_m=0.005, origin_m=[-1.0, 2.0], processes=PROCESSES)
+    assert patch.shape == (40, 60) and np.array_equal(patch.values, made.values.astype(np.float32))
+    assert np.allclose(patch.origin, made.origin) and np.allclose(patch.cell, made.cell)
+    albedo = client.patch("world", origin=(-1.0, 2.0), size=(60, 40), resolution=0.02, field="albedo")
+    assert np.array_equal(albedo.values, made.maps["albedo"].astype(np.float32))
+    bare = client.patch("world", origin=(-1.0, 2.0), size=(60, 40), resolution=0.02, phenomena=[])
+    assert np.ptp(bare.values) < np.ptp(patch.values)
+
+
+def test_points_and_profiles(client):
+    point = client.point("world", 0.0, 3.0)
+    profile = client.profile("world", [(0.0, 3.0), (2.0, 3.0)], 5)
+    assert isinstance(point, dict) and isinstance(profile, dict) and point and profile
+
+
+def test_errors_carry_the_servers_sentence(client):
+    with pytest.raises(sastrugi.SastrugiError, match="^404: ") as refused:
+        client.patch("mars", origin=(0.0, 0.0), size=(4, 4))
+    assert refused.value.code == 65
+    with pytest.raises(sastrugi.SastrugiError, match="^400: ") as refused:
+        client.patch("world", origin=(0.0, 0.0), size=(0, 4))
+    assert refused.value.code == 2
+    nobody = sastrugi.TerrainClient("http://127.0.0.1:9")
+    with pytest.raises(sastrugi.SastrugiError, match="http://127.0.0.1:9: no answer") as refused:
+        nobody.collections()
+    assert refused.value.code == 75

@@ -1,0 +1,65 @@
+"""Fits: what may be quoted, and what they are made of."""
+
+import math
+import pickle
+
+import pytest
+
+import sastrugi
+from sastrugi import Fit
+
+
+def snow():
+    return Fit({"model": "exponential", "parameters": {"sigma_m": 0.05, "range_m": 0.2}})
+
+
+def test_intervals_hold_the_truth():
+    site = snow().texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)
+    found = sastrugi.fit(site, outer_scale=1.0, bootstrap=19)
+    assert found.interval_level == 0.95 and "bootstrap" in found.interval_kind
+    low, high = found.intervals["sigma_m"]
+    assert low < found.parameters["sigma_m"] < high
+    assert found.is_estimated("sigma_m") and found.verdict
+    with pytest.raises(sastrugi.SastrugiError, match="the fit has no parameter `sill`; it has range_m, sigma_m"):
+        found.is_estimated("sill")
+
+
+def test_limits_are_not_estimates():
+    """A range at the bound of its search: only its lower limit may be quoted."""
+    bounded = Fit({
+        "model": "exponential",
+        "parameters": {"sigma_m": 1.0, "range_m": 420.0},
+        "intervals": {"level": 0.95, "replicates": 99, "range_m": [4.4, None]},
+        "diagnostics": {"range_at_search_bound": True},
+    })
+    assert bounded.intervals == {"range_m": (4.4, math.inf)}
+    assert not bounded.is_estimated("range_m") and not bounded.is_estimated("sigma_m")
+
+
+def test_files(tmp_path):
+    snow().save(tmp_path / "fit.json")
+    again = Fit.load(tmp_path / "fit.json")
+    assert (again.model, again.parameters) == ("exponential", {"range_m": 0.2, "sigma_m": 0.05})
+    (tmp_path / "other.json").write_text("{}")
+    with pytest.raises(sastrugi.SastrugiError, match="not a fit file: `model` and `parameters` are required") as refused:
+        Fit.load(tmp_path / "other.json")
+    assert refused.value.code == 65
+
+
+def test_plot():
+    pytest.importorskip("matplotlib").use("Agg")
+    site = snow().texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)
+    axes = sastrugi.fit(site, outer_scale=1.0, bootstrap=0).plot()
+    assert [line.get_label() for line in axes.lines] == ["measured", "exponential"]
+    with pytest.raises(sastrugi.SastrugiError, match="a stated model has no measured covariance"):
+        snow().plot()
+
+
+def test_errors_are_those_of_the_program():
+    with pytest.raises(sastrugi.SastrugiError) as refused:
+        snow().texture(4.0, 0.1, phases="unit")
+    assert str(refused.value) == "`fft_ma` has no parameter `phases`; did you mean `phase`?"
+    with pytest.raises(sastrugi.SastrugiError, match="a parameter is not a finite number"):
+        snow().texture(4.0, math.nan)
+    again = pickle.loads(pickle.dumps(refused.value))
+    assert (str(again), again.code) == (str(refused.value), 2)

@@ -1,0 +1,73 @@
+"""Heightfields: rows from the north, holes, files, other libraries."""
+
+import numpy as np
+import pytest
+from conftest import DEMS
+
+import sastrugi
+from sastrugi import Heightfield
+
+
+def test_row_0_is_north(tmp_path):
+    """An ESRI grid lists rows from the north; its corner is that in the south-west."""
+    (tmp_path / "a.asc").write_text("ncols 3\nnrows 2\nxllcorner 10\nyllcorner 20\ncellsize 0.5\nNODATA_value -1\n1 2 3\n4 5 -1\n")
+    read = Heightfield.read(tmp_path / "a.asc")
+    assert np.array_equal(read.values, [[1, 2, 3], [4, 5, np.nan]], equal_nan=True)
+    assert read.x.tolist() == [10.25, 10.75, 11.25]
+    assert read.y.tolist() == [20.75, 20.25]
+    part = Heightfield.read(tmp_path / "a.asc", window=(10.5, 20.0, 11.5, 20.5))
+    assert np.array_equal(part.values, [[5, np.nan]], equal_nan=True)
+    assert part.origin == (10.5, 20.0)
+
+
+def test_files_keep_place_and_system(tmp_path):
+    dem = Heightfield.read(DEMS / "pozo_blanca.tif")
+    assert dem.crs.epsg == 26911
+    dem.save(tmp_path / "b.tif", compress="zstd")
+    back = Heightfield.read(tmp_path / "b.tif")
+    assert (back.cell, back.origin, back.crs.epsg) == (dem.cell, dem.origin, 26911)
+    assert np.array_equal(back.values, dem.values, equal_nan=True)
+    notes = dem.save(tmp_path / "b.npy")
+    assert any("coordinate reference system" in note for note in notes)
+    assert np.array_equal(np.load(tmp_path / "b.npy"), dem.values, equal_nan=True)
+
+
+def test_arrays_of_any_layout(tmp_path):
+    """Transposed, sliced and integer arrays are taken by their elements."""
+    values = np.arange(12).reshape(3, 4)
+    for name, array in {"turned": values.T, "thinned": values[:, ::2], "fortran": np.asfortranarray(values)}.items():
+        Heightfield(array, cell=1.0).save(tmp_path / f"{name}.npy")
+        assert np.array_equal(np.load(tmp_path / f"{name}.npy"), array), name
+
+
+def test_xarray_and_matplotlib():
+    pytest.importorskip("xarray")
+    matplotlib = pytest.importorskip("matplotlib")
+    matplotlib.use("Agg")
+    dem = Heightfield([[1.0, 2.0], [3.0, np.nan]], cell=(2.0, 1.0), origin=(10.0, 5.0))
+    array = dem.to_xarray()
+    assert float(array.sel(x=11.0, y=6.5)) == 1.0
+    assert float(array.sel(x=11.0, y=5.5)) == 3.0
+    axes = dem.plot()
+    assert list(axes.images[0].get_extent()) == [10.0, 14.0, 5.0, 7.0]
+
+
+def test_refusals():
+    for make, sentence in [
+        (lambda: Heightfield([1.0, 2.0], cell=1.0), "heights must be an array (rows, columns), got 1 dimensions"),
+        (lambda: Heightfield([[1.0]], cell=(1.0, 2.0, 3.0)), "`cell` must be one or two numbers, got (1.0, 2.0, 3.0)"),
+        (lambda: Heightfield.read("a.tif", window=(1.0, 2.0)), "`window` must be 4 numbers, got (1.0, 2.0)"),
+        (lambda: Heightfield([[1.0, 2.0]], cell=-1.0).save("a.tif"), "`cell` is [-1.0, -1.0]; cell sizes must be finite and above 0"),
+        (lambda: Heightfield([[1.0, 2.0]], cell=1.0).save("a.tif", compress="lzma"), '`compress` is "lzma"'),
+        (lambda: sastrugi.fit(np.zeros((9, 9)), outer_scale=1.0), "an array of heights has no cell size; give `cell`, in m"),
+    ]:
+        with pytest.raises(sastrugi.SastrugiError) as refused:
+            make()
+        assert str(refused.value).startswith(sentence)
+        assert refused.value.code == 2
+    with pytest.raises(sastrugi.SastrugiError, match="A is in degrees; DEMs are co-registered in metres") as refused:
+        sastrugi.coregister(DEMS / "jacksboro.tif", DEMS / "jacksboro.tif")
+    assert refused.value.code == 65
+    with pytest.raises(sastrugi.SastrugiError, match="the height in row 0, column 1 is infinite; mark holes by NaN") as refused:
+        Heightfield([[1.0, np.inf]], cell=1.0).save("a.tif")
+    assert refused.value.code == 65

@@ -1,0 +1,134 @@
+"""Releases: tables in other libraries, missions, recordings, patches."""
+
+import math
+import pickle
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+from conftest import ROOT
+
+import sastrugi
+
+sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
+from height_patches import HeightPatches  # noqa: E402
+
+
+def test_tables_in_other_libraries(release):
+    pyarrow = pytest.importorskip("pyarrow")
+    parquet = pytest.importorskip("pyarrow.parquet")
+    missions = release.table("missions")
+    ours = pyarrow.table(missions)
+    parts = sorted((release.path / "tables" / "missions").glob("*.parquet"))
+    theirs = pyarrow.concat_tables([parquet.read_table(part) for part in parts])
+    assert ours.equals(theirs)
+    assert ours.schema.metadata[b"sastrugi.table"] == b"missions"
+    assert ours.schema.field("time_s").metadata[b"unit"] == b"s"
+    assert pyarrow.schema(missions).equals(ours.schema)
+
+    polars = pytest.importorskip("polars")
+    assert polars.DataFrame(missions)["time_s"].to_list() == theirs["time_s"].to_pylist()
+    duckdb = pytest.importorskip("duckdb")
+    # A variable of this scope is a table for duckdb.
+    assert duckdb.sql("select count(*), sum(time_s) from missions").fetchone() == (len(missions), pytest.approx(missions["time_s"].sum()))
+
+
+def test_tables_in_numpy(release):
+    parquet = pytest.importorskip("pyarrow.parquet")
+    mission = release.missions()[1]
+    samples = release.samples(mission)
+    part = parquet.read_table(release.path / "tables" / "samples" / f"part-{mission.terrain_id}.parquet")
+    wanted = [row for row in part.to_pylist() if row["mission_id"] == mission.mission_id]
+    assert 0 < len(wanted) < part.num_rows and len(samples) == len(wanted)
+    assert samples["sample"].dtype == np.int64 and samples["sample"].tolist() == [row["sample"] for row in wanted]
+    assert samples["x_m"].dtype == np.float64 and samples["x_m"].tolist() == [row["x_m"] for row in wanted]
+    assert samples["wheel_slip_ratio"][0].tolist() == wanted[0]["wheel_slip_ratio"]
+    assert samples["outcome"].tolist() == [row["outcome"] for row in wanted]
+    contact = [[math.nan if v is None else v for v in row["wheel_contact_z_m"]] for row in wanted]
+    assert np.array_equal(np.stack(samples["wheel_contact_z_m"]), contact, equal_nan=True)
+    units = {column.name: column.unit for column in samples.columns}
+    assert (units["x_m"], units["outcome"]) == ("m", "")
+    with pytest.raises(sastrugi.SastrugiError, match="table samples has no column x; known: terrain_id, mission_id"):
+        samples["x"]
+    with pytest.raises(sastrugi.SastrugiError, match="there is no table mission; known: terrains") as refused:
+        release.table("mission")
+    assert refused.value.code == 2
+    assert len(release.table("rovers")) == 0 and release.table("rovers")["rover_id"].size == 0
+
+
+def test_missions_by_split(release):
+    every = release.missions()
+    splits = {split: release.missions(split=split) for split in ("train", "validation", "test")}
+    assert sorted(m.id for part in splits.values() for m in part) == [m.id for m in every]
+    assert all(len(part) == 2 and len({m.terrain_id for m in part}) == 1 for part in splits.values())
+    assert every[0]["outcome"] == every[0].row["outcome"]
+    with pytest.raises(sastrugi.SastrugiError, match="there is no mission 'rough-0001/none'; it has rough-0001/") as refused:
+        release.samples("rough-0001/none")
+    assert refused.value.code == 2
+
+
+def test_recordings(release):
+    mission = release.missions()[0]
+    samples = release.samples(mission)
+    poses = next(stream for stream in release.recording(mission).poses() if stream.topic == "/vehicle/pose")
+    assert poses.position.shape == (len(samples), 3) and poses.orientation.shape == (len(samples), 4)
+    assert np.allclose(poses.position[:, 0], samples["x_m"], atol=1e-6)
+    seconds = (poses.time_ns - poses.time_ns[0]) / 1e9
+    assert np.allclose(seconds, samples["time_s"] - samples["time_s"][0], atol=1e-6)
+
+
+def bilinear(dem, x, y):
+    """Heights between cell centres, written down again: from the four centres around each point."""
+    column = (x - dem.x[0]) / dem.cell[0]
+    row = (dem.y[0] - y) / dem.cell[1]
+    i, j = np.floor(row).astype(int), np.floor(column).astype(int)
+    f, g = row - i, column - j
+    z = dem.values
+    return (1 - f) * ((1 - g) * z[i, j] + g * z[i, j + 1]) + f * ((1 - g) * z[i + 1, j] + g * z[i + 1, j + 1])
+
+
+def test_patches_turn_with_the_vehicle(release):
+    mission = release.missions()[0]
+    dem, track = release.terrain(mission.terrain_id), release.track(mission)
+    # Between two samples, in the middle of the mission.
+    k = len(track.time) // 2
+    time = 0.25 * track.time[k] + 0.75 * track.time[k + 1]
+    x, y, z, heading = (0.25 * values[k] + 0.75 * values[k + 1] for values in track[1:])
+    patch = release.height_patch(mission, time, (1.0, 0.6), 0.1)
+    assert patch.shape == (10, 6)
+    ahead, left = np.meshgrid(0.1 * (4.5 - np.arange(10)), 0.1 * (2.5 - np.arange(6)), indexing="ij")
+    expected = bilinear(dem, x + ahead * math.cos(heading) - left * math.sin(heading), y + ahead * math.sin(heading) + left * math.cos(heading))
+    assert np.allclose(patch, expected - z, atol=1e-9)
+    assert np.allclose(release.height_patch(mission, time, (1.0, 0.6), 0.1, relative=False), expected, atol=1e-9)
+
+
+def test_patches_reach_beyond_the_terrain(release):
+    mission = release.missions()[0]
+    wide = release.height_patch(mission, 0.0, 200.0, 1.0)
+    assert wide.shape == (200, 200) and np.isnan(wide[0, 0]) and np.isfinite(wide).any()
+    for time, size, cell, sentence in [
+        (-1.0, 4.0, 0.1, "`time` is -1.0; mission"),
+        (math.nan, 4.0, 0.1, "`time` is nan; mission"),
+        (0.0, 0.01, 0.1, "a patch has 1 to 16777216 samples, not 0 x 0"),
+        (0.0, 4.0, -0.1, "a patch has 1 to 16777216 samples, not 0 x 0"),
+        (0.0, 4e5, 0.1, "a patch has 1 to 16777216 samples, not 4000000 x 4000000"),
+    ]:
+        with pytest.raises(sastrugi.SastrugiError) as refused:
+            release.height_patch(mission, time, size, cell)
+        assert str(refused.value).startswith(sentence) and refused.value.code == 2
+
+
+def test_a_dataset_for_learners(release):
+    dataset = HeightPatches(pickle.loads(pickle.dumps(release)), split="train")
+    heights, arrived = dataset[1]
+    assert len(dataset) == 2 and heights.shape == (1, 40, 40) and heights.dtype == np.float32
+    assert np.isfinite(heights).all() and arrived in (0.0, 1.0)
+
+
+def test_what_is_no_release(tmp_path):
+    with pytest.raises(sastrugi.SastrugiError, match="not a release: it has no manifest.json") as refused:
+        sastrugi.Release(tmp_path)
+    assert refused.value.code == 65
+    # The example of the manual names files that exist.
+    assert (ROOT / "pipeline" / "python" / "examples" / "height_patches.py").is_file()

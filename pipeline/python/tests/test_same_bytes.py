@@ -1,0 +1,117 @@
+"""The same input gives the same bytes through the module and through the program."""
+
+import json
+
+import pytest
+from conftest import DEMS, sums
+
+import sastrugi
+
+TERRAINS = {
+    "multifractal": {"size_px": [90, 70], "high.fractal_dimension": 2.5},
+    "weierstrass_mandelbrot": {"size_px": [64, 48], "cell_m": 0.1},
+    "van_deusen": {"size_px": [64, 64]},
+    "planetary": {"size_px": [60, 50], "cell_m": 0.02, "basic_spacing_m": 0.005},
+}
+
+
+def nested(parameters):
+    """Dotted names as dicts."""
+    found = {}
+    for name, value in parameters.items():
+        *above, last = name.split(".")
+        table = found
+        for word in above:
+            table = table.setdefault(word, {})
+        table[last] = value
+    return found
+
+
+@pytest.mark.parametrize("kind", TERRAINS)
+def test_terrains(kind, sastrugi_program, tmp_path):
+    options = [word for name, value in TERRAINS[kind].items() for word in ("--set", f"{name}={value}")]
+    sastrugi_program("terrain", kind, *options, "--seed", 7, "-o", "program.tif")
+    made = sastrugi.terrain(kind, seed=7, **nested(TERRAINS[kind]))
+    made.save(tmp_path / "module.tif")
+    assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
+    for name, values in made.maps.items():
+        written = sastrugi.Heightfield.read(tmp_path / f"program.{name}.tif")
+        assert written.values.shape == values.shape
+        assert abs(written.values - values).max() <= 1e-6 * max(abs(values).max(), 1.0), name
+
+
+@pytest.mark.parametrize("given", ["file", "heightfield"])
+def test_elaborated_dems(given, sastrugi_program, tmp_path):
+    dem = DEMS / "jacksboro.tif"
+    window = {"origin_m": [21930.0, 20260.0], "size_px": [64, 48], "cell_m": 0.04}
+    options = [word for name, value in window.items() for word in ("--set", f"{name}={value}")]
+    sastrugi_program("terrain", "elaborate", "--set", f'dem="{dem}"', *options, "--seed", 3, "-o", "program.tif")
+    sastrugi.elaborate(dem if given == "file" else sastrugi.Heightfield.read(dem), seed=3, **window).save(tmp_path / "module.tif")
+    assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
+
+
+def test_fits_and_textures(sastrugi_program, tmp_path):
+    dem = DEMS / "otira.tif"
+    sastrugi_program("fit", dem, "--outer-scale", 0.5, "--bootstrap", 9, "--seed", 4, "-o", "program.json")
+    found = sastrugi.fit(dem, outer_scale=0.5, bootstrap=9, seed=4)
+    found.save(tmp_path / "module.json")
+    assert (tmp_path / "module.json").read_bytes() == (tmp_path / "program.json").read_bytes()
+    # From the array: the same, except that no file is its source.
+    of_array = sastrugi.fit(sastrugi.Heightfield.read(dem), outer_scale=0.5, bootstrap=9, seed=4)
+    assert {**of_array.to_dict(), "source": None} == {**found.to_dict(), "source": None}
+
+    sastrugi_program("texture", "program.json", "--size", "4x3", "--cell", 0.02, "--seed", 5, "-o", "program.tif")
+    sastrugi.Fit.load(tmp_path / "program.json").texture((4.0, 3.0), 0.02, seed=5).save(tmp_path / "module.tif")
+    assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
+
+
+def test_roughness_and_coregistration(sastrugi_program, tmp_path):
+    a = sastrugi.Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(80.0, 1.0, seed=2)
+    b = sastrugi.Heightfield(a.values + 1.0, a.cell, origin=(0.3, -0.2))
+    a.save(tmp_path / "a.tif")
+    b.save(tmp_path / "b.tif")
+    described = json.loads(sastrugi_program("roughness", "a.tif", "--band", "4:12", "--json"))
+    assert sastrugi.roughness(tmp_path / "a.tif", band=(4.0, 12.0)) == described
+
+    printed = json.loads(sastrugi_program("coregister", "a.tif", "b.tif", "-o", "program.tif", "--json"))
+    found = sastrugi.coregister(tmp_path / "a.tif", tmp_path / "b.tif")
+    assert (found.details, found.verdict) == (printed["coregistration"], printed["verdict"])
+    found.difference.save(tmp_path / "module.tif")
+    assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
+
+
+def test_studies(study, release, sastrugi_program, tmp_path):
+    sastrugi_program("run", study, "-o", "program", "--quiet")
+    assert sums(release.path) == sums(tmp_path / "program")
+
+
+def test_missions(sastrugi_program, tmp_path):
+    ground = sastrugi.terrain("multifractal", seed=3, size_px=[320, 300])
+    ground.save(tmp_path / "ground.tif")
+    rules = ["--set-missions", "length_m=5.0", "--set-missions", "border_m=1.5"]
+    sastrugi_program("traverse", "ground.tif", "--missions", 2, "--seed", 9, *rules, "-o", "program", "--quiet")
+    for name, dem in {"of-file": tmp_path / "ground.tif", "of-heightfield": ground}.items():
+        driven = sastrugi.traverse(dem, tmp_path / name, missions=2, seed=9, rules={"length_m": 5.0, "border_m": 1.5})
+        assert len(driven.missions()) == 2
+        assert sums(driven.path) == sums(tmp_path / "program"), name
+
+
+def test_routes(sastrugi_program, tmp_path):
+    hills = sastrugi.Fit({"model": "gaussian", "parameters": {"sigma_m": 0.5, "range_m": 12.0}}).texture(80.0, 1.0, seed=2)
+    hills.save(tmp_path / "hills.tif")
+    printed = json.loads(
+        sastrugi_program("navigate", "hills.tif", "--start", "10,10", "--goal", "70,60", "-o", "program.geojson", "--json")
+    )
+    route = sastrugi.navigate(tmp_path / "hills.tif", (10, 10), (70, 60), tmp_path / "module.geojson")
+    assert (tmp_path / "module.geojson").read_bytes() == (tmp_path / "program.geojson").read_bytes()
+    assert route.metrics == printed["route"]
+    assert (sastrugi.navigate(hills, (10, 10), (70, 60)).points == route.points).all()
+    assert abs(route.points[0, :2] - [10.0, 10.0]).max() < 1.0
+
+
+def test_logs(release, sastrugi_program, tmp_path):
+    logs = [release.recording(mission).path for mission in release.missions()[:2]]
+    printed = json.loads(sastrugi_program("analyze", *logs, "-o", "program.parquet", "--json"))
+    rows = sastrugi.analyze(logs, output=tmp_path / "module.parquet")
+    assert rows == [{**one["log"], "notes": one["notes"]} for one in printed]
+    assert (tmp_path / "module.parquet").read_bytes() == (tmp_path / "program.parquet").read_bytes()

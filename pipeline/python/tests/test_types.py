@@ -1,0 +1,36 @@
+"""The stub of the Rust side is true: the same names, and the same parameters."""
+
+import ast
+import inspect
+from importlib.resources import files
+
+from sastrugi import _native
+
+STUB = ast.parse(files("sastrugi").joinpath("_native.pyi").read_text(encoding="utf-8"))
+
+
+def parameters(function):
+    arguments = function.args
+    return [argument.arg for argument in arguments.posonlyargs + arguments.args + arguments.kwonlyargs]
+
+
+def test_names():
+    functions = {node.name for node in STUB.body if isinstance(node, ast.FunctionDef)}
+    classes = {node.name for node in STUB.body if isinstance(node, ast.ClassDef)}
+    ours = {name for name in dir(_native) if not name.startswith("_")}
+    assert functions | classes == ours
+    assert all(inspect.isclass(getattr(_native, name)) for name in classes)
+
+
+def test_parameters():
+    for node in STUB.body:
+        if isinstance(node, ast.FunctionDef):
+            found = list(inspect.signature(getattr(_native, node.name)).parameters)
+            assert parameters(node) == found, node.name
+        if isinstance(node, ast.ClassDef):
+            members = getattr(_native, node.name)
+            methods = [item for item in node.body if isinstance(item, ast.FunctionDef) and item.name != "__init__"]
+            for method in methods:
+                member = getattr(members, method.name)
+                if not method.decorator_list:
+                    assert parameters(method) == list(inspect.signature(member).parameters), f"{node.name}.{method.name}"

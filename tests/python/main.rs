@@ -1,0 +1,146 @@
+//! The Python package: its tests, its docstrings, its types and the notebooks, with the library that the workspace builds; and, slowly, the
+//! wheel in an empty environment.
+//!
+//! The packages that these need are installed in `.cache/python` by `./test`. Without them, the tests are skipped with a message; with CI set,
+//! that is a failure.
+
+#![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
+
+use sastrugi_tests::{Called, area, called, program};
+use std::ffi::OsString;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::process::Command;
+
+fn python() -> Option<PathBuf> {
+    sastrugi_tests::python("python", "./test")
+}
+
+fn root() -> PathBuf {
+    sastrugi_fixtures::workspace_root()
+}
+
+/// Folder of the package's sources.
+fn sources() -> PathBuf {
+    root().join("pipeline/python")
+}
+
+/// The package in a folder, without a wheel: its Python sources, and the library that was built with this test.
+fn assemble(folder: &Path) {
+    let package = folder.join("sastrugi");
+    fs::create_dir(&package).unwrap();
+    for entry in fs::read_dir(sources().join("sastrugi")).unwrap() {
+        let path = entry.unwrap().path();
+        if path.is_file() {
+            fs::copy(&path, package.join(path.file_name().unwrap())).unwrap();
+        }
+    }
+    let library = program().with_file_name("lib_native.so");
+    assert!(library.is_file(), "{} is missing: build the workspace first (./test does)", library.display());
+    fs::copy(library, package.join("_native.abi3.so")).unwrap();
+}
+
+/// Python with the assembled package, in a folder of its own.
+fn with_package(python: &Path, package: &Path, folder: &Path) -> Command {
+    let mut command = Command::new(python);
+    command.env("PYTHONPATH", package).env("PYTHONDONTWRITEBYTECODE", "1").env("SASTRUGI", program());
+    command.env("MPLBACKEND", "Agg").current_dir(folder);
+    command
+}
+
+fn notebooks() -> Vec<PathBuf> {
+    let all = fs::read_dir(root().join("docs/notebooks")).unwrap().map(|entry| entry.unwrap().path());
+    let mut notebooks: Vec<PathBuf> = all.filter(|path| path.extension().is_some_and(|e| e == "ipynb")).collect();
+    notebooks.sort();
+    assert_eq!(notebooks.len(), 3, "{notebooks:?}");
+    notebooks
+}
+
+fn check(call: &Called) {
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
+/// The tests in `pipeline/python/tests`, and the examples of every docstring.
+#[test]
+fn val_the_package_passes_its_tests() {
+    let Some(python) = python() else { return };
+    let (package, folder) = (area(), area());
+    assemble(package.path());
+    let modules = package.path().join("sastrugi");
+    let mut pytest = with_package(&python, package.path(), folder.path());
+    pytest.args(["-m", "pytest", "-q", "-p", "no:cacheprovider", "--doctest-modules"]);
+    let call = called(pytest.arg(modules).arg(sources().join("tests")));
+    check(&call);
+    assert!(call.stdout.contains(" passed") && !call.stdout.contains("skipped"), "{}", call.stdout);
+}
+
+/// The package's signatures agree with each other and with their use, strictly. That the stub is true is one of the package's own tests.
+#[test]
+fn val_the_package_is_typed() {
+    let Some(python) = python() else { return };
+    let (package, folder) = (area(), area());
+    assemble(package.path());
+    let example = sources().join("examples/height_patches.py");
+    let mut mypy = with_package(&python, package.path(), folder.path());
+    mypy.args(["-m", "mypy", "--strict", "--cache-dir", "cache"]).arg(package.path().join("sastrugi")).arg(example);
+    // Large libraries, of which a few names are used.
+    let settings = "[mypy]\n[mypy-xarray.*,matplotlib.*]\nfollow_imports = skip\n";
+    fs::write(folder.path().join("mypy.ini"), settings).unwrap();
+    check(&called(mypy.args(["--config-file", "mypy.ini"])));
+}
+
+#[test]
+fn val_notebooks_run() {
+    let Some(python) = python() else { return };
+    let (package, folder) = (area(), area());
+    assemble(package.path());
+    let mut run = with_package(&python, package.path(), folder.path());
+    check(&called(run.arg(root().join("tests/python/run_notebooks.py")).args(notebooks())));
+}
+
+/// The wheel, built by maturin and installed in an empty environment: module, program, tests and notebooks.
+#[test]
+#[ignore = "slow: builds the workspace with the features of the wheel"]
+fn val_the_wheel_runs_in_an_empty_environment() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let environment = folder.path().join("environment");
+    let target = root().join("target/wheel");
+    let mut build = Command::new(&python);
+    build.args(["-m", "maturin", "build", "--release", "--offline", "--out"]).arg(folder.path().join("wheels"));
+    build.arg("--interpreter").arg(&python).env("CARGO_TARGET_DIR", &target).current_dir(sources());
+    check(&called(&mut build));
+    let wheels: Vec<PathBuf> =
+        fs::read_dir(folder.path().join("wheels")).unwrap().map(|entry| entry.unwrap().path()).collect();
+    let [wheel] = &wheels[..] else { panic!("{wheels:?}") };
+    let name = wheel.file_name().unwrap().to_string_lossy().into_owned();
+    assert!(name.starts_with("sastrugi-") && name.contains("-cp310-abi3-"), "{name}");
+    println!("{name}: {} bytes", fs::metadata(wheel).unwrap().len());
+
+    check(&called(Command::new(&python).args(["-m", "venv"]).arg(&environment)));
+    let bin = environment.join("bin");
+    let pip = |more: Vec<OsString>| {
+        let mut pip = Command::new(bin.join("python"));
+        pip.args(["-m", "pip", "install", "--quiet", "--disable-pip-version-check"]);
+        check(&called(pip.args(more)));
+    };
+    // Alone it brings NumPy and nothing else.
+    pip(vec![wheel.into()]);
+    let call = called(Command::new(bin.join("sastrugi")).arg("--version"));
+    assert_eq!((call.code, call.stdout.trim()), (0, concat!("sastrugi ", env!("CARGO_PKG_VERSION"))));
+    let listed = called(Command::new(bin.join("python")).args(["-m", "pip", "list", "--format", "freeze"]));
+    let installed: Vec<&str> = listed.stdout.lines().filter_map(|line| line.split_once("==")).map(|(n, _)| n).collect();
+    assert!(installed.iter().all(|name| ["numpy", "pip", "sastrugi", "setuptools"].contains(name)), "{installed:?}");
+
+    pip(vec!["--requirement".into(), root().join("tests/python/requirements.txt").into()]);
+    let inside = |script: &[&str]| {
+        let mut command = Command::new(bin.join("python"));
+        command.args(script).env("SASTRUGI", bin.join("sastrugi")).env("MPLBACKEND", "Agg").current_dir(folder.path());
+        command.env("PYTHONDONTWRITEBYTECODE", "1");
+        command
+    };
+    let mut pytest = inside(&["-m", "pytest", "-q", "-p", "no:cacheprovider"]);
+    check(&called(pytest.arg(sources().join("tests"))));
+    let mut run = inside(&[]);
+    check(&called(run.arg(root().join("tests/python/run_notebooks.py")).args(notebooks())));
+}
