@@ -5,6 +5,8 @@
     dataset = HeightPatches(sastrugi.Release("release"), split="train")
     loader = torch.utils.data.DataLoader(dataset, batch_size=32, shuffle=True)
 
+With `num_workers`, add `multiprocessing_context="spawn"`: a forked process has no threads to compute with.
+
 Run it to see the shapes: python height_patches.py RELEASE
 """
 

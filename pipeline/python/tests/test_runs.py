@@ -13,7 +13,7 @@ from conftest import STUDY, program, sums
 import sastrugi
 
 # Many small items, so that a run stops between two of them.
-LONG_STUDY = STUDY.replace("count = 3", "count = 24")
+LONG_STUDY = STUDY.replace("count = 3", "count = 12")
 
 
 def test_progress_is_told(study, tmp_path):
@@ -97,7 +97,7 @@ def test_other_threads_run_meanwhile():
     counter.start()
     try:
         start, before = time.monotonic(), ticks
-        sastrugi.terrain("weierstrass_mandelbrot", seed=1, size_px=[1500, 1500])
+        sastrugi.terrain("weierstrass_mandelbrot", seed=1, size_px=[1000, 1000])
         took, counted = time.monotonic() - start, ticks - before
     finally:
         done.set()

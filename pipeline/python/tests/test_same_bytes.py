@@ -50,18 +50,29 @@ def test_elaborated_dems(given, sastrugi_program, tmp_path):
     assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
 
 
-def test_fits_and_textures(sastrugi_program, tmp_path):
-    dem = DEMS / "otira.tif"
-    sastrugi_program("fit", dem, "--outer-scale", 0.5, "--bootstrap", 9, "--seed", 4, "-o", "program.json")
-    found = sastrugi.fit(dem, outer_scale=0.5, bootstrap=9, seed=4)
+@pytest.mark.parametrize("site", ["otira.tif", "snow.tif"])
+def test_fits(site, sastrugi_program, tmp_path):
+    dem, scale, replicates = (DEMS / site, 0.5, 0) if site == "otira.tif" else (snow(tmp_path / site), 1.0, 9)
+    sastrugi_program("fit", dem, "--outer-scale", scale, "--bootstrap", replicates, "--seed", 4, "-o", "program.json")
+    found = sastrugi.fit(dem, outer_scale=scale, bootstrap=replicates, seed=4)
     found.save(tmp_path / "module.json")
     assert (tmp_path / "module.json").read_bytes() == (tmp_path / "program.json").read_bytes()
     # From the array: the same, except that no file is its source.
-    of_array = sastrugi.fit(sastrugi.Heightfield.read(dem), outer_scale=0.5, bootstrap=9, seed=4)
+    of_array = sastrugi.fit(sastrugi.Heightfield.read(dem), outer_scale=scale, bootstrap=replicates, seed=4)
     assert {**of_array.to_dict(), "source": None} == {**found.to_dict(), "source": None}
 
-    sastrugi_program("texture", "program.json", "--size", "4x3", "--cell", 0.02, "--seed", 5, "-o", "program.tif")
-    sastrugi.Fit.load(tmp_path / "program.json").texture((4.0, 3.0), 0.02, seed=5).save(tmp_path / "module.tif")
+
+def snow(path):
+    """A file of a surface with sigma 5 cm and b 20 cm."""
+    stated = sastrugi.Fit({"model": "exponential", "parameters": {"sigma_m": 0.05, "range_m": 0.2}})
+    stated.texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False).save(path)
+    return path
+
+
+def test_textures(sastrugi_program, tmp_path):
+    sastrugi.fit(snow(tmp_path / "snow.tif"), outer_scale=1.0, bootstrap=0).save(tmp_path / "program.json")
+    sastrugi_program("texture", "program.json", "--size", "8x6", "--cell", 0.05, "--seed", 5, "-o", "program.tif")
+    sastrugi.Fit.load(tmp_path / "program.json").texture((8.0, 6.0), 0.05, seed=5).save(tmp_path / "module.tif")
     assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
 
 
