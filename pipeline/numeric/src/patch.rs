@@ -1,44 +1,48 @@
 //! Heights around a vehicle, in its own frame: what a learner sees of the ground.
 //!
-//! A patch is a square of points centred on the vehicle and turned with its heading. It is laid out as a grid whose north is
-//! ahead: row 0 lies farthest ahead, column 0 farthest to the left. Point `(row, col)` of `n x n` points lies
-//! `a = ((n - 1) / 2 - row) cell` ahead and `l = ((n - 1) / 2 - col) cell` to the left of the vehicle, at
+//! A patch is a rectangle of points centred on the vehicle and turned with its heading. It is laid out as a grid whose north is
+//! ahead: row 0 lies farthest ahead, column 0 farthest to the left. Point `(row, col)` of `m x n` points lies
+//! `a = ((m - 1) / 2 - row) cell` ahead and `l = ((n - 1) / 2 - col) cell` to the left of the vehicle, at
 //! `x + a cos h - l sin h`, `y + a sin h + l cos h`, where `(x, y)` is the position (m) and `h` the heading (rad, counterclockwise
 //! from east). Cost: one bilinear height for each point.
 
 use crate::surface::Surface;
 
-/// Shape of a square patch.
+/// Shape of a patch.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PatchShape {
-    points: usize,
+    rows: usize,
+    cols: usize,
     cell_m: f64,
 }
 
 impl PatchShape {
     /// Most points a side.
-    pub const POINTS_MAX: usize = 512;
+    pub const POINTS_MAX: usize = 4096;
 
-    /// A patch of side `size_m` with points `cell_m` apart, each in the middle of its cell. `None` unless both are finite and above 0, and
-    /// the side is a whole number of cells (within 1e-6) from 1 to [`PatchShape::POINTS_MAX`].
+    /// A patch that reaches `size_m` along and across the heading, with points `cell_m` apart, each in the middle of its cell. `None` unless
+    /// both are finite and above 0, and each side is a whole number of cells (within 1e-6) from 1 to [`PatchShape::POINTS_MAX`].
     ///
     /// ```
     /// use sastrugi_numeric::PatchShape;
     ///
-    /// assert_eq!(PatchShape::new(3.2, 0.1).map(|shape| shape.points()), Some(32));
-    /// assert_eq!(PatchShape::new(3.25, 0.1), None);
+    /// let shape = PatchShape::new([3.2, 1.6], 0.1).unwrap();
+    /// assert_eq!((shape.rows(), shape.cols()), (32, 16));
+    /// assert_eq!(PatchShape::new([3.25, 1.6], 0.1), None);
     /// ```
-    pub fn new(size_m: f64, cell_m: f64) -> Option<Self> {
-        let cells = size_m / cell_m;
-        let points = cells.round();
-        let is_whole = cell_m > 0.0 && (cells - points).abs() <= 1e-6;
-        let is_valid = is_whole && (1.0..=Self::POINTS_MAX as f64).contains(&points);
-        is_valid.then_some(Self { points: points as usize, cell_m })
+    pub fn new(size_m: [f64; 2], cell_m: f64) -> Option<Self> {
+        let [rows, cols] = size_m.map(|side_m| points(side_m, cell_m));
+        Some(Self { rows: rows?, cols: cols?, cell_m })
     }
 
-    /// Points a side.
-    pub fn points(&self) -> usize {
-        self.points
+    /// Points along the heading.
+    pub fn rows(&self) -> usize {
+        self.rows
+    }
+
+    /// Points across the heading.
+    pub fn cols(&self) -> usize {
+        self.cols
     }
 
     /// Distance between neighbouring points, m.
@@ -47,8 +51,16 @@ impl PatchShape {
     }
 }
 
-/// Heights (m) of a surface around a position (m), turned to a heading (rad, counterclockwise from east): `points * points` values, row by
-/// row from the row farthest ahead, each from left to right; `NaN` where the surface is undefined.
+/// Points of a side, if it is a whole number of cells.
+fn points(side_m: f64, cell_m: f64) -> Option<usize> {
+    let cells = side_m / cell_m;
+    let points = cells.round();
+    let is_whole = cell_m > 0.0 && (cells - points).abs() <= 1e-6;
+    (is_whole && (1.0..=PatchShape::POINTS_MAX as f64).contains(&points)).then_some(points as usize)
+}
+
+/// Heights (m) of a surface around a position (m), turned to a heading (rad, counterclockwise from east): `rows * cols` values, row by row from
+/// the row farthest ahead, each from left to right; `NaN` where the surface is undefined.
 ///
 /// ```
 /// use sastrugi_numeric::{Geometry, Grid, PatchShape, height_patch};
@@ -56,20 +68,34 @@ impl PatchShape {
 /// // A plane that rises by 1 m per metre to the east, seen by a vehicle that heads east.
 /// let values = (0..5).flat_map(|_| [0.5, 1.5, 2.5, 3.5, 4.5]).collect();
 /// let plane = Grid::new(Geometry::square(5, 5, 1.0), values);
-/// let shape = PatchShape::new(2.0, 1.0).unwrap();
+/// let shape = PatchShape::new([2.0, 2.0], 1.0).unwrap();
 /// // Ahead it is higher than behind, and left as high as right.
 /// assert_eq!(height_patch(&plane, [2.5, 2.5], 0.0, &shape), [3.0, 3.0, 2.0, 2.0]);
 /// ```
 pub fn height_patch(surface: &impl Surface, position_m: [f64; 2], heading_rad: f64, shape: &PatchShape) -> Vec<f64> {
     let (sin, cos) = libm::sincos(heading_rad);
-    let middle = 0.5 * (shape.points - 1) as f64;
-    let offset = |k: usize| (middle - k as f64) * shape.cell_m;
-    let height = |ahead: f64, left: f64| {
+    // From the middle of `count` points towards the first.
+    let offset_m = |k: usize, count: usize| (0.5 * (count - 1) as f64 - k as f64) * shape.cell_m;
+    let height = |row: usize, col: usize| {
+        let (ahead, left) = (offset_m(row, shape.rows), offset_m(col, shape.cols));
         let [x, y] = [position_m[0] + ahead * cos - left * sin, position_m[1] + ahead * sin + left * cos];
         surface.height(x, y).unwrap_or(f64::NAN)
     };
-    let line = |row: usize| (0..shape.points).map(move |col| height(offset(row), offset(col)));
-    (0..shape.points).flat_map(line).collect()
+    let places = (0..shape.rows).flat_map(|row| (0..shape.cols).map(move |col| (row, col)));
+    places.map(|(row, col)| height(row, col)).collect()
+}
+
+/// As [`height_patch`], relative to the height of the surface at the position: all `NaN` if it has none there.
+pub fn relative_height_patch(
+    surface: &impl Surface,
+    position_m: [f64; 2],
+    heading_rad: f64,
+    shape: &PatchShape,
+) -> Vec<f64> {
+    let under_m = surface.height(position_m[0], position_m[1]).unwrap_or(f64::NAN);
+    let mut heights = height_patch(surface, position_m, heading_rad, shape);
+    heights.iter_mut().for_each(|height| *height -= under_m);
+    heights
 }
 
 #[cfg(test)]
@@ -92,7 +118,7 @@ mod tests {
         let plane = |x: f64, y: f64| 3.0 + 0.2 * (x - 107.0) - 0.5 * (y - 204.0);
         let values = (0..20).flat_map(|r| (0..30).map(move |c| plane(geometry.x(c), geometry.y(r)))).collect();
         let grid = Grid::new(geometry, values);
-        let shape = PatchShape::new(2.0, 0.25).unwrap();
+        let shape = PatchShape::new([2.0, 2.0], 0.25).unwrap();
         let heading = 0.4;
         let (sin, cos) = libm::sincos(heading);
         let (ahead_slope, left_slope) = (0.2 * cos - 0.5 * sin, -0.2 * sin - 0.5 * cos);
@@ -109,7 +135,7 @@ mod tests {
     #[test]
     fn val_heading_north_is_the_map_itself() {
         let grid = ground();
-        let shape = PatchShape::new(2.0, 0.5).unwrap();
+        let shape = PatchShape::new([2.0, 2.0], 0.5).unwrap();
         let patch = height_patch(&grid, [107.0, 205.0], FRAC_PI_2, &shape);
         let window = grid.window(8, 12, 4, 4);
         patch.iter().zip(&window.values).for_each(|(a, b)| assert!((a - b).abs() < 1e-12, "{a} {b}"));
@@ -119,8 +145,8 @@ mod tests {
     #[test]
     fn prop_turning_the_vehicle_turns_the_patch() {
         let (grid, at) = (ground(), [107.3, 204.9]);
-        let shape = PatchShape::new(3.0, 0.2).unwrap();
-        let n = shape.points();
+        let shape = PatchShape::new([3.0, 3.0], 0.2).unwrap();
+        let n = shape.rows();
         let of = |heading: f64| height_patch(&grid, at, heading, &shape);
         let (plain, quarter, half) = (of(0.3), of(0.3 + FRAC_PI_2), of(0.3 + PI));
         for (row, col) in (0..n).flat_map(|row| (0..n).map(move |col| (row, col))) {
@@ -135,7 +161,7 @@ mod tests {
     #[test]
     fn val_points_beyond_the_surface_are_nan() {
         let mut grid = Grid::filled(Geometry::square(8, 8, 1.0), 1.0);
-        let shape = PatchShape::new(4.0, 1.0).unwrap();
+        let shape = PatchShape::new([4.0, 4.0], 1.0).unwrap();
         // Columns at x = -0.25, 0.75, 1.75, 2.75 while heading north: the first lies beyond the outer centres at 0.5.
         let patch = height_patch(&grid, [1.25, 4.0], FRAC_PI_2, &shape);
         for (k, z) in patch.iter().enumerate() {
@@ -148,14 +174,40 @@ mod tests {
         assert!(holed.iter().any(|z| z.is_nan()) && holed.contains(&1.0));
     }
 
+    /// Rows reach along the heading, columns across it.
+    #[test]
+    fn val_a_patch_may_be_longer_than_wide() {
+        let (grid, at) = (ground(), [107.3, 204.9]);
+        let [long, square] = [[3.0, 0.6], [3.0, 3.0]].map(|size_m| {
+            let shape = PatchShape::new(size_m, 0.2).unwrap();
+            height_patch(&grid, at, 0.3, &shape)
+        });
+        for (row, col) in (0..15).flat_map(|row| (0..3).map(move |col| (row, col))) {
+            assert_eq!(long[row * 3 + col], square[row * 15 + col + 6], "{row} {col}");
+        }
+    }
+
+    #[test]
+    fn val_relative_patches_are_zero_under_the_vehicle() {
+        let (grid, at) = (ground(), [107.3, 204.9]);
+        let shape = PatchShape::new([0.6, 0.6], 0.2).unwrap();
+        let relative = relative_height_patch(&grid, at, 0.3, &shape);
+        let under = grid.height(at[0], at[1]).unwrap();
+        let heights = height_patch(&grid, at, 0.3, &shape);
+        assert!(relative[4] == 0.0 && relative.iter().zip(&heights).all(|(r, h)| *r == h - under));
+        assert!(relative_height_patch(&grid, [0.0, 0.0], 0.3, &shape).iter().all(|height| height.is_nan()));
+    }
+
     #[test]
     fn val_a_side_is_a_whole_number_of_cells() {
-        let points = |size, cell| PatchShape::new(size, cell).map(|shape| shape.points());
-        assert_eq!([points(3.2, 0.1), points(0.3, 0.1), points(1.0, 1.0)], [Some(32), Some(3), Some(1)]);
+        let shape =
+            |size: f64, cell: f64| PatchShape::new([size, cell], cell).map(|shape| [shape.rows(), shape.cols()]);
+        assert_eq!([shape(3.2, 0.1), shape(0.3, 0.1)], [Some([32, 1]), Some([3, 1])]);
         let refused =
-            [(3.25, 0.1), (0.0, 0.1), (-3.2, -0.1), (1.0, 0.0), (f64::NAN, 0.1), (1.0, f64::NAN), (51.3, 0.1)];
-        refused.iter().for_each(|(size, cell)| assert_eq!(points(*size, *cell), None, "{size} {cell}"));
-        assert_eq!(points(51.2, 0.1), Some(512));
-        assert_eq!(points(f64::INFINITY, 0.1), None);
+            [(3.25, 0.1), (0.0, 0.1), (-3.2, -0.1), (1.0, 0.0), (f64::NAN, 0.1), (1.0, f64::NAN), (409.7, 0.1)];
+        refused.iter().for_each(|(size, cell)| assert_eq!(shape(*size, *cell), None, "{size} {cell}"));
+        assert_eq!(shape(409.6, 0.1), Some([4096, 1]));
+        assert_eq!(shape(f64::INFINITY, 0.1), None);
+        assert_eq!(PatchShape::new([1.0, 0.05], 0.1), None);
     }
 }

@@ -1,7 +1,6 @@
-//! Conversion from degrees to metres, cropping, thinning, block means, stretching to other numbers of cells, and patches turned to a heading.
+//! Conversion from degrees to metres, cropping, thinning, block means and stretching to other numbers of cells.
 
 use crate::grid::{Geometry, Grid};
-use crate::surface::Surface;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -151,41 +150,6 @@ pub fn stretch(grid: &Grid, rows: usize, cols: usize) -> Grid {
     Grid::new(Geometry { rows, cols, cell, origin }, values.collect())
 }
 
-/// Heights around a point as a vehicle there sees them: `rows` x `cols` samples `cell_m` apart, centred on the point and turned to the heading.
-/// The first row lies ahead, the first column to the left. NaN where the surface is undefined.
-///
-/// `heading_rad` is counterclockwise from east, as a yaw. Towards north (a quarter turn), the patch lies like the grid: its first row is the
-/// northernmost.
-///
-/// ```
-/// use sastrugi_numeric::resample::facing;
-/// use sastrugi_numeric::{Geometry, Grid};
-///
-/// let grid = Grid::new(Geometry::square(3, 3, 1.0), (1..10).map(f64::from).collect());
-/// let patch = |heading_rad| facing(&grid, [1.5, 1.5], heading_rad, [3, 1], 1.0);
-/// // Ahead, here and behind: towards east along a row of the grid, towards west the other way.
-/// assert_eq!(patch(0.0), [6.0, 5.0, 4.0]);
-/// let west: Vec<f64> = patch(std::f64::consts::PI).iter().map(|z| z.round()).collect();
-/// assert_eq!(west, [4.0, 5.0, 6.0]);
-/// ```
-pub fn facing(
-    surface: &impl Surface,
-    centre: [f64; 2],
-    heading_rad: f64,
-    [rows, cols]: [usize; 2],
-    cell_m: f64,
-) -> Vec<f64> {
-    let (sin, cos) = libm::sincos(heading_rad);
-    // From the middle of `count` samples towards the first.
-    let offset = |k: usize, count: usize| (0.5 * (count as f64 - 1.0) - k as f64) * cell_m;
-    let height = |row: usize, col: usize| {
-        let (ahead, left) = (offset(row, rows), offset(col, cols));
-        let (x, y) = (centre[0] + ahead * cos - left * sin, centre[1] + ahead * sin + left * cos);
-        surface.height(x, y).unwrap_or(f64::NAN)
-    };
-    (0..rows).flat_map(|row| (0..cols).map(move |col| (row, col))).map(|(row, col)| height(row, col)).collect()
-}
-
 /// For each of `to` points spread evenly over `from` others: the index of the one before it, and the fraction of the distance to the next.
 fn support_points(from: usize, to: usize) -> Vec<(usize, f64)> {
     assert!(from >= 2 && to >= 2, "at least two points are needed on each axis");
@@ -209,6 +173,7 @@ fn interpolated(a: f64, b: f64, share: f64) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::Surface;
     use proptest::prelude::*;
 
     #[test]
@@ -274,28 +239,6 @@ mod tests {
             }
         }
         assert_eq!((thin(&whole, 1), thin(&whole, 0)), (whole.clone(), whole));
-    }
-
-    /// A plane, which bilinear interpolation reproduces: the slope ahead and to the left follows the heading. Beyond the grid there is nothing.
-    #[test]
-    fn val_patches_turn_with_the_heading() {
-        let g = Geometry { rows: 40, cols: 50, cell: [0.5, 0.25], origin: [3.0, -2.0] };
-        let plane = |x: f64, y: f64| 10.0 + 0.2 * x - 0.3 * y;
-        let values = (0..g.rows).flat_map(|r| (0..g.cols).map(move |c| plane(g.x(c), g.y(r)))).collect();
-        let grid = Grid::new(g, values);
-        let centre = [15.3, 3.1];
-        for heading_deg in [0.0_f64, 30.0, 90.0, 135.0, -120.0] {
-            let (sin, cos) = libm::sincos(heading_deg.to_radians());
-            let patch = facing(&grid, centre, heading_deg.to_radians(), [5, 4], 0.3);
-            for (k, z) in patch.iter().enumerate() {
-                let (ahead, left) = (0.3 * (2.0 - (k / 4) as f64), 0.3 * (1.5 - (k % 4) as f64));
-                let slopes = (0.2 * cos - 0.3 * sin, -0.2 * sin - 0.3 * cos);
-                let expected = plane(centre[0], centre[1]) + ahead * slopes.0 + left * slopes.1;
-                assert!((z - expected).abs() < 1e-12, "{heading_deg}: {k}: {z} is not {expected}");
-            }
-        }
-        let edge = facing(&grid, [3.3, 3.1], 0.0, [3, 1], 1.0);
-        assert!(edge[0].is_finite() && edge[1].is_finite() && edge[2].is_nan(), "{edge:?}");
     }
 
     #[test]

@@ -22,8 +22,8 @@ import sastrugi
 class HeightPatches:
     """The ground around the vehicle at the start of each mission, and whether the mission arrived.
 
-    An item is a pair: heights above base_link, float32 of shape (1, rows, columns), row 0 ahead; and 1.0 for `success`, otherwise 0.0. Samples
-    outside the terrain are 0, the height of base_link.
+    An item is a pair: heights above the ground under base_link, float32 of shape (1, rows, columns), row 0 ahead; and 1.0 for `success`, otherwise 0.0. Samples
+    outside the terrain are 0, the height of the ground under base_link.
     """
 
     def __init__(

@@ -245,22 +245,20 @@ class Release:
 
         time: s since the mission's start; poses between samples are interpolated.
         size: along and across the heading, m; one number for a square.
-        cell: distance between samples, m. There are round(size / cell) of them each way, centred on base_link.
-        relative: heights above base_link; otherwise as in the terrain.
+        cell: distance between samples, m; each side is a whole number of them, centred on base_link.
+        relative: heights above the ground under base_link; otherwise as in the terrain.
 
         Returns an array (rows, columns) of heights, m, bilinear between the cells of the terrain; NaN outside it and next to holes.
 
-        Raises SastrugiError (2) for a time before or after the mission, or a size below a cell.
+        Raises SastrugiError (2) for a time before or after the mission, or a size that is not a whole number of cells.
         """
         found = self._mission(mission)
         track = self._track(found.id)
         if not track.time[0] <= time <= track.time[-1]:
             span = f"{track.time[0]:g} to {track.time[-1]:g} s"
             raise SastrugiError(f"`time` is {time!r}; mission {found.id} was recorded from {span}", USAGE)
-        x, y, z, heading = (float(np.interp(time, track.time, values)) for values in track[1:])
-        shape = [round(side / cell) if cell > 0 else 0 for side in pair("size", size)]
-        patch = self._ground(found.terrain_id).patch((x, y), heading, shape, cell)
-        return patch - z if relative else patch
+        x, y, heading = (float(np.interp(time, track.time, values)) for values in (track.x, track.y, track.heading))
+        return self._ground(found.terrain_id).patch((x, y), heading, pair("size", size), cell, relative)
 
     @cached_property
     def _terrains(self) -> dict[str, str]:

@@ -6,8 +6,7 @@ use crate::waiting::waited;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 use pyo3::types::{PyCapsule, PyDict};
-use sastrugi_numeric::Grid;
-use sastrugi_numeric::resample::facing;
+use sastrugi_numeric::{Grid, PatchShape, height_patch, relative_height_patch};
 use sastrugi_schemas::log::{Log, TimedPose};
 use sastrugi_schemas::tables::ALL;
 use sastrugi_schemas::{Cell, ColumnType};
@@ -15,9 +14,6 @@ use sastrugi_stages::Error;
 use sastrugi_store::mcap::{McapError, read_log};
 use sastrugi_store::parquet::{TableError, TableFiles};
 use std::path::PathBuf;
-
-/// Most samples of a patch: 16 million.
-const PATCH_SAMPLES_MAX: usize = 1 << 24;
 
 /// A table of a release, or some of its rows.
 #[pyclass(frozen, name = "Table", module = "sastrugi._native")]
@@ -140,26 +136,28 @@ impl Ground {
     }
 
     /// Bilinear heights around (x, y), turned to the heading: row 0 ahead, column 0 to the left; NaN beyond the outer cell centres and next to
-    /// holes.
+    /// holes. With `relative`, above the height at (x, y).
     fn patch<'py>(
         &self,
         py: Python<'py>,
         centre: [f64; 2],
         heading_rad: f64,
-        shape: [usize; 2],
+        size: [f64; 2],
         cell: f64,
+        relative: bool,
     ) -> PyResult<Bound<'py, PyArray2<f64>>> {
-        let count = shape[0].checked_mul(shape[1]).filter(|count| (1..=PATCH_SAMPLES_MAX).contains(count));
-        if count.is_none() {
-            let [rows, cols] = shape;
-            return Err(usage(format!("a patch has 1 to {PATCH_SAMPLES_MAX} samples, not {rows} x {cols}")));
-        }
-        if !(cell.is_finite() && cell > 0.0) {
-            return Err(usage(format!("`cell` is {cell}; it must be finite and above 0")));
-        }
-        let grid = &self.0;
-        let heights = py.detach(|| facing(grid, centre, heading_rad, shape, cell));
-        heights.into_pyarray(py).reshape(shape)
+        let shape = PatchShape::new(size, cell).ok_or_else(|| {
+            let [along, across] = size;
+            usage(format!(
+                "`size` is {along} x {across} m with `cell` {cell} m; each side must be a whole number of cells, 1 to {}",
+                PatchShape::POINTS_MAX
+            ))
+        })?;
+        let heights = py.detach(|| match relative {
+            true => relative_height_patch(&self.0, centre, heading_rad, &shape),
+            false => height_patch(&self.0, centre, heading_rad, &shape),
+        });
+        heights.into_pyarray(py).reshape([shape.rows(), shape.cols()])
     }
 }
 

@@ -94,12 +94,12 @@ def test_patches_turn_with_the_vehicle(release):
     # Between two samples, in the middle of the mission.
     k = len(track.time) // 2
     time = 0.25 * track.time[k] + 0.75 * track.time[k + 1]
-    x, y, z, heading = (0.25 * values[k] + 0.75 * values[k + 1] for values in track[1:])
+    x, y, _, heading = (0.25 * values[k] + 0.75 * values[k + 1] for values in track[1:])
     patch = release.height_patch(mission, time, (1.0, 0.6), 0.1)
     assert patch.shape == (10, 6)
     ahead, left = np.meshgrid(0.1 * (4.5 - np.arange(10)), 0.1 * (2.5 - np.arange(6)), indexing="ij")
     expected = bilinear(dem, x + ahead * math.cos(heading) - left * math.sin(heading), y + ahead * math.sin(heading) + left * math.cos(heading))
-    assert np.allclose(patch, expected - z, atol=1e-9)
+    assert np.allclose(patch, expected - bilinear(dem, np.array([x]), np.array([y]))[0], atol=1e-9)
     assert np.allclose(release.height_patch(mission, time, (1.0, 0.6), 0.1, relative=False), expected, atol=1e-9)
 
 
@@ -110,9 +110,9 @@ def test_patches_reach_beyond_the_terrain(release):
     for time, size, cell, sentence in [
         (-1.0, 4.0, 0.1, "`time` is -1.0; mission"),
         (math.nan, 4.0, 0.1, "`time` is nan; mission"),
-        (0.0, 0.01, 0.1, "a patch has 1 to 16777216 samples, not 0 x 0"),
-        (0.0, 4.0, -0.1, "a patch has 1 to 16777216 samples, not 0 x 0"),
-        (0.0, 4e5, 0.1, "a patch has 1 to 16777216 samples, not 4000000 x 4000000"),
+        (0.0, 0.01, 0.1, "`size` is 0.01 x 0.01 m with `cell` 0.1 m; each side must be a whole number of cells, 1 to 4096"),
+        (0.0, 4.0, -0.1, "`size` is 4 x 4 m with `cell` -0.1 m"),
+        (0.0, 4e5, 0.1, "`size` is 400000 x 400000 m with `cell` 0.1 m"),
     ]:
         with pytest.raises(sastrugi.SastrugiError) as refused:
             release.height_patch(mission, time, size, cell)

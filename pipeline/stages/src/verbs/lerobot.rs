@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::operations::dem::input_error;
 use crate::splits::{OTHER, PARTS};
 use crate::studies::resolved;
-use sastrugi_numeric::{Grid, PatchShape, Surface, height_patch};
+use sastrugi_numeric::{Grid, PatchShape, relative_height_patch};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::Manifest;
 use sastrugi_schemas::tables::{MissionRow, SampleRow, TerrainRow};
@@ -32,6 +32,8 @@ use std::path::{Path, PathBuf};
 pub const PATCH_M: f64 = 3.2;
 /// Default distance between its points, m.
 pub const PATCH_CELL_M: f64 = 0.1;
+/// Most points on a side of the patch: a megabyte for each frame.
+const PATCH_POINTS_MAX: usize = 512;
 /// Largest deviation of a sample from its time at the constant rate, s.
 const TIME_TOLERANCE_S: f64 = 1e-6;
 
@@ -93,10 +95,11 @@ pub struct Settings {
 /// # Errors
 /// A side that is not a whole number of cells, or has too many.
 pub fn patch(size_m: f64, cell_m: f64) -> Result<PatchShape, Error> {
-    PatchShape::new(size_m, cell_m).ok_or_else(|| {
+    let shape = PatchShape::new([size_m; 2], cell_m).filter(|shape| shape.rows() <= PATCH_POINTS_MAX);
+    shape.ok_or_else(|| {
         Error::Usage(format!(
             "`--patch {size_m} --patch-cell {cell_m}`: the side must be a whole number of cells, 1 to {}",
-            PatchShape::POINTS_MAX
+            PATCH_POINTS_MAX
         ))
     })
 }
@@ -326,7 +329,7 @@ impl Export<'_> {
             "study_sha256": manifest.study_sha256,
             "seed": manifest.seed,
             "license": manifest.license,
-            "patch": {"points": patch.points(), "cell_m": patch.cell_m()},
+            "patch": {"points": patch.rows(), "cell_m": patch.cell_m()},
         });
         Description {
             robot: self.chosen.vehicle.clone(),
@@ -415,7 +418,7 @@ fn features(patch: &PatchShape, wheels: usize) -> Vec<Feature> {
     let measured = MEASURED.iter().map(|(name, _)| (*name).to_owned());
     let state: Vec<String> =
         owned(&FROM_START).into_iter().chain(measured).chain(OF_WHEELS.iter().flat_map(of_wheel)).collect();
-    let side = Shape::Matrix([patch.points(); 2]);
+    let side = Shape::Matrix([patch.rows(), patch.cols()]);
     let axes = || owned(&["front_to_back", "left_to_right"]);
     vec![
         feature("observation.state", Kind::F32, Shape::Vector(state.len()), state),
@@ -447,9 +450,8 @@ fn commands(rows: &[SampleRow]) -> Vec<f32> {
 /// The height patches of all frames, m above the ground under base_link; and where they are known. Elsewhere they are 0.
 fn patches(rows: &[SampleRow], ground: &Grid, shape: &PatchShape) -> (Vec<f32>, Vec<bool>) {
     let of = |row: &SampleRow| {
-        let heights = height_patch(ground, [row.x_m, row.y_m], row.yaw_deg.to_radians(), shape);
-        let under_m = ground.height(row.x_m, row.y_m).unwrap_or(f64::NAN);
-        heights.into_iter().map(move |height| (height - under_m) as f32)
+        let heights = relative_height_patch(ground, [row.x_m, row.y_m], row.yaw_deg.to_radians(), shape);
+        heights.into_iter().map(|height| height as f32)
     };
     let heights: Vec<f32> = rows.iter().flat_map(of).collect();
     let known = heights.iter().map(|height| height.is_finite()).collect();

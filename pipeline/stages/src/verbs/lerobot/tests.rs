@@ -86,7 +86,7 @@ fn val_rates_are_whole() {
 
 #[test]
 fn val_a_patch_is_a_whole_number_of_cells() {
-    assert_eq!(patch(PATCH_M, PATCH_CELL_M).unwrap().points(), 32);
+    assert_eq!(patch(PATCH_M, PATCH_CELL_M).unwrap().rows(), 32);
     let error = patch(1.0, 0.3).unwrap_err();
     assert!(matches!(&error, Error::Usage(message) if message.contains("whole number of cells, 1 to 512")), "{error}");
 }
