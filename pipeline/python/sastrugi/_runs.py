@@ -147,7 +147,7 @@ def navigate(
     Raises SastrugiError (65) if there is no route.
 
     >>> from sastrugi import Fit
-    >>> hills = Fit({"model": "gaussian", "parameters": {"sigma_m": 0.5, "range_m": 12.0}}).texture(80.0, 1.0, seed=2)
+    >>> hills = Fit({"model": "gaussian", "parameters": {"sigma_m": 0.5, "range_m": 12.0}}).texture(96.0, 1.0, seed=2)
     >>> route = navigate(hills, (10.0, 10.0), (70.0, 60.0))
     >>> route.points.shape[1], route.metrics["length_m"] > 76.0
     (3, True)

@@ -115,7 +115,7 @@ def coregister(a: Any, b: Any) -> Coregistration:
     to each other, and so have heightfields that were read from such files.
 
     >>> from sastrugi import Fit
-    >>> hills = Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(80.0, 1.0, seed=2)
+    >>> hills = Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(96.0, 1.0, seed=2)
     >>> moved = Heightfield(hills.values + 5.0, hills.cell, origin=(0.25, 0.0))
     >>> found = coregister(hills, moved)
     >>> abs(found.shift[0] + 0.25) < 0.05 and abs(found.raised + 5.0) < 0.05

@@ -15,7 +15,7 @@ def snow():
 
 def test_intervals_hold_the_truth():
     site = snow().texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)
-    found = sastrugi.fit(site, outer_scale=1.0, bootstrap=19)
+    found = sastrugi.fit(site, outer_scale=1.0, bootstrap=39)
     assert found.interval_level == 0.95 and "bootstrap" in found.interval_kind
     low, high = found.intervals["sigma_m"]
     assert low < found.parameters["sigma_m"] < high

@@ -28,7 +28,7 @@ def test_files_keep_place_and_system(tmp_path):
     assert (back.cell, back.origin, back.crs.epsg) == (dem.cell, dem.origin, 26911)
     assert np.array_equal(back.values, dem.values, equal_nan=True)
     notes = dem.save(tmp_path / "b.npy")
-    assert any("coordinate reference system" in note for note in notes)
+    assert any("CRS" in note for note in notes)
     assert np.array_equal(np.load(tmp_path / "b.npy"), dem.values, equal_nan=True)
 
 

@@ -31,7 +31,7 @@ def test_tables_in_other_libraries(release):
     assert polars.DataFrame(missions)["time_s"].to_list() == theirs["time_s"].to_pylist()
     duckdb = pytest.importorskip("duckdb")
     # A variable of this scope is a table for duckdb.
-    assert duckdb.sql("select count(*), sum(time_s) from missions").fetchone() == (len(missions), pytest.approx(missions["time_s"].sum()))
+    assert duckdb.sql("select count(*), sum(time_s) from missions").fetchall()[0] == (len(missions), pytest.approx(missions["time_s"].sum()))
 
 
 def test_tables_in_numpy(release):

@@ -97,7 +97,7 @@ def test_other_threads_run_meanwhile():
     counter.start()
     try:
         start, before = time.monotonic(), ticks
-        sastrugi.terrain("weierstrass_mandelbrot", seed=1, size_px=[1000, 1000])
+        sastrugi.terrain("weierstrass_mandelbrot", seed=1, size_px=[4000, 4000])
         took, counted = time.monotonic() - start, ticks - before
     finally:
         done.set()

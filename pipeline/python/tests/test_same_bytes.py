@@ -52,7 +52,7 @@ def test_elaborated_dems(given, sastrugi_program, tmp_path):
 
 @pytest.mark.parametrize("site", ["otira.tif", "snow.tif"])
 def test_fits(site, sastrugi_program, tmp_path):
-    dem, scale, replicates = (DEMS / site, 0.5, 0) if site == "otira.tif" else (snow(tmp_path / site), 1.0, 9)
+    dem, scale, replicates = (DEMS / site, 0.5, 0) if site == "otira.tif" else (snow(tmp_path / site), 1.0, 39)
     sastrugi_program("fit", dem, "--outer-scale", scale, "--bootstrap", replicates, "--seed", 4, "-o", "program.json")
     found = sastrugi.fit(dem, outer_scale=scale, bootstrap=replicates, seed=4)
     found.save(tmp_path / "module.json")
@@ -77,7 +77,7 @@ def test_textures(sastrugi_program, tmp_path):
 
 
 def test_roughness_and_coregistration(sastrugi_program, tmp_path):
-    a = sastrugi.Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(80.0, 1.0, seed=2)
+    a = sastrugi.Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(96.0, 1.0, seed=2)
     b = sastrugi.Heightfield(a.values + 1.0, a.cell, origin=(0.3, -0.2))
     a.save(tmp_path / "a.tif")
     b.save(tmp_path / "b.tif")
@@ -108,7 +108,7 @@ def test_missions(sastrugi_program, tmp_path):
 
 
 def test_routes(sastrugi_program, tmp_path):
-    hills = sastrugi.Fit({"model": "gaussian", "parameters": {"sigma_m": 0.5, "range_m": 12.0}}).texture(80.0, 1.0, seed=2)
+    hills = sastrugi.Fit({"model": "gaussian", "parameters": {"sigma_m": 0.5, "range_m": 12.0}}).texture(96.0, 1.0, seed=2)
     hills.save(tmp_path / "hills.tif")
     printed = json.loads(
         sastrugi_program("navigate", "hills.tif", "--start", "10,10", "--goal", "70,60", "-o", "program.geojson", "--json")
