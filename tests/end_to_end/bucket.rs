@@ -1,6 +1,6 @@
 //! A shared cache and releases in an object store, against a server program (`tests/engines/set_up s3`).
 
-use sastrugi_tests::{Called, area, called, differing, program, run_study, small_study, sums, write};
+use sastrugi_tests::{Called, area, called, differing, installed, program, run_study, small_study, sums, write};
 use std::fs;
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
@@ -20,13 +20,7 @@ struct Server {
 impl Server {
     /// Starts the server; `None` (after a message) if it is not installed.
     fn start() -> Option<Self> {
-        let command = "tests/engines/set_up s3";
-        let server = sastrugi_fixtures::workspace_root().join(".cache/engines/s3/bin/s3s-fs");
-        if !server.is_file() {
-            assert!(std::env::var_os("CI").is_none(), "no S3 server; run {command} with network access");
-            eprintln!("SKIPPED: no S3 server; {command} installs it");
-            return None;
-        }
+        let server = installed("engines/s3/bin/s3s-fs", "tests/engines/set_up s3")?;
         let root = area();
         fs::create_dir(root.path().join("terrains")).unwrap();
         // Free when it was asked for.

@@ -1,13 +1,15 @@
-//! The recipes of `fixtures/cluster`, run as they are: in each, the program is killed once in a shard, and the release is that of one machine.
+//! The recipes of `fixtures/cluster`, run as they are: in each, a shard is killed in mid-run, and the release is that of one machine.
+//! `tests/engines` starts clusters of hosts, of which one crashes.
 
 #![cfg(unix)]
 
-use sastrugi_tests::{Called, area, called, differing, program, python, run_study, small_study, sums, write};
+use sastrugi_tests::{Called, area, called, differing, installed, program, python, run_study, small_study, sums};
 use std::collections::BTreeMap;
 use std::fs;
-use std::os::unix::fs::PermissionsExt;
+use std::os::unix::fs::symlink;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Instant;
 
 /// What sets up the engines that are Python packages, and their environment.
 const SET_UP: &str = "tests/engines/set_up workflow";
@@ -17,27 +19,35 @@ fn recipe(name: &str) -> PathBuf {
     sastrugi_fixtures::workspace_root().join("fixtures/cluster").join(name)
 }
 
-/// A folder with a study, its release by one machine, and a program that is killed when it is called for the second shard the first time.
+fn engine(name: &str) -> PathBuf {
+    sastrugi_fixtures::workspace_root().join("tests/engines").join(name)
+}
+
+/// True if this system allows the namespaces that hosts are made of; else a message.
+fn hosts_are_allowed() -> bool {
+    let call = Command::new("unshare").args(["--user", "--map-root-user", "--net", "true"]).output();
+    let allowed = call.is_ok_and(|output| output.status.success());
+    if !allowed {
+        eprintln!("SKIPPED: this system does not allow user namespaces (unshare --user --map-root-user --net)");
+    }
+    allowed
+}
+
+/// A folder with a study, its release by one machine, and a program of which the first shard is killed.
 struct Site {
     folder: tempfile::TempDir,
     whole: BTreeMap<String, String>,
-    program: PathBuf,
+    killed: PathBuf,
 }
 
 impl Site {
     fn new() -> Self {
         let folder = area();
         let whole = run_study(folder.path(), &small_study(), &[]);
-        let once = folder.path().join("once");
-        let text = format!(
-            "#!/bin/bash\nif [[ \"$*\" == *\"--shard 2/\"* ]] && mkdir {once} 2>/dev/null; then\n  {sastrugi} \"$@\" &\n  \
-             sleep 0.03; kill -9 $!; wait $!\nelse\n  exec {sastrugi} \"$@\"\nfi\n",
-            once = once.display(),
-            sastrugi = program().display()
-        );
-        let program = write(folder.path(), "killed-once", &text);
-        fs::set_permissions(&program, fs::Permissions::from_mode(0o755)).unwrap();
-        Self { folder, whole, program }
+        let killed = folder.path().join("killed");
+        fs::copy(engine("killed"), &killed).unwrap();
+        symlink(program(), folder.path().join("sastrugi")).unwrap();
+        Self { folder, whole, killed }
     }
 
     fn path(&self) -> &Path {
@@ -47,7 +57,8 @@ impl Site {
     /// Calls a recipe with the parameters that all of them take.
     fn call(&self, command: &mut Command) -> Called {
         let at = |name: &str| self.path().join(name);
-        command.current_dir(self.path()).env("SASTRUGI", &self.program).env("SHARDS", "3").env("THREADS", "1");
+        command.current_dir(self.path()).env("SASTRUGI", &self.killed);
+        command.env("SHARDS", "3").env("THREADS", "1").env("PAUSE", "1");
         for (name, file) in [("STUDY", "study.toml"), ("CACHE", "cache"), ("PARTS", "parts"), ("RELEASE", "merged")] {
             command.env(name, at(file));
         }
@@ -60,6 +71,23 @@ impl Site {
         assert!(self.path().join("once").is_dir(), "nothing was killed");
         assert_eq!(differing(&self.whole, &sums(&self.path().join("merged"))), [""; 0]);
     }
+
+    /// Calls a recipe that makes the release, and prints a row of the table of engines in `docs/cluster.md`.
+    fn releases(&self, engine: &str, nodes: u32, killed: &str, command: &mut Command) -> Called {
+        let start = Instant::now();
+        let call = self.call(command);
+        let seconds = start.elapsed().as_secs_f64();
+        self.is_released(&call);
+        println!("| {engine} | {nodes} | {killed} | yes | {seconds:.0} s |");
+        call
+    }
+
+    /// Calls `tests/engines/<name>`, on whose hosts one crashes.
+    fn releases_on_hosts(&self, name: &str, engine_name: &str) -> Called {
+        let call = self.releases(engine_name, 2, "a program, a node", &mut Command::new(engine(name)));
+        assert!(call.stdout.contains("crashed node"), "no host crashed: {}", call.stdout);
+        call
+    }
 }
 
 /// The steps, called as an engine calls them: one that is killed asks for another try.
@@ -68,42 +96,56 @@ fn val_steps() {
     let site = Site::new();
     let step = |arguments: &[&str]| site.call(Command::new(recipe("step")).args(arguments));
     assert_eq!(step(&["ancestors"]).code, 0);
-    assert_eq!(["1", "2", "3"].map(|index| step(&["shard", index]).code), [0, 75, 0]);
+    assert_eq!(["1", "2", "3"].map(|index| step(&["shard", index]).code), [75, 0, 0]);
     let call = step(&["merge"]);
-    assert!(call.code == 65 && call.stderr.contains("shard 2 of 3 is missing"), "{} {}", call.code, call.stderr);
-    assert_eq!(step(&["shard", "2"]).code, 0);
+    assert!(call.code == 65 && call.stderr.contains("shard 1 of 3 is missing"), "{} {}", call.code, call.stderr);
+    assert_eq!(step(&["shard", "1"]).code, 0);
     site.is_released(&step(&["merge"]));
     assert_eq!((step(&["all"]).code, step(&[]).code), (2, 2));
+}
+
+/// Two nodes: the killed program is put back into the queue by the job, the jobs of the crashed node by Slurm.
+#[test]
+#[ignore = "slow: needs Slurm"]
+fn val_slurm() {
+    if installed("engines/slurm/usr/bin/sbatch", "tests/engines/set_up slurm").is_none() || !hosts_are_allowed() {
+        return;
+    }
+    let call = Site::new().releases_on_hosts("slurm", "Slurm");
+    assert_eq!(call.stdout.matches("Restarts=1 ").count(), 2, "{}", call.stdout);
 }
 
 #[test]
 #[ignore = "slow: needs Snakemake"]
 fn val_snakemake() {
     let Some(python) = python(ENVIRONMENT, SET_UP) else { return };
-    let site = Site::new();
     let mut command = Command::new(python);
     command.args(["-m", "snakemake", "--cores", "2", "--retries", "3", "--snakefile"]);
-    site.is_released(&site.call(command.arg(recipe("snakemake/Snakefile"))));
+    Site::new().releases("Snakemake", 1, "a program", command.arg(recipe("snakemake/Snakefile")));
 }
 
 #[test]
 #[ignore = "slow: needs Ray"]
-fn val_ray() {
+fn val_ray_on_this_machine() {
     let Some(python) = python(ENVIRONMENT, SET_UP) else { return };
-    let site = Site::new();
     let mut command = Command::new(python);
     command.env_remove("RAY_ADDRESS").env("RAY_USAGE_STATS_ENABLED", "0").arg(recipe("ray/driver.py"));
-    site.is_released(&site.call(&mut command));
+    Site::new().releases("Ray", 1, "a program", &mut command);
+}
+
+/// Two nodes: the killed program and the tasks of the crashed node are tried again.
+#[test]
+#[ignore = "slow: needs Ray"]
+fn val_ray_on_two_nodes() {
+    if python(ENVIRONMENT, SET_UP).is_some() && hosts_are_allowed() {
+        Site::new().releases_on_hosts("ray", "Ray");
+    }
 }
 
 #[test]
 #[ignore = "slow: needs GNU parallel"]
 fn val_gnu_parallel() {
-    let version = Command::new("parallel").arg("--version").output();
-    if !version.is_ok_and(|output| String::from_utf8_lossy(&output.stdout).starts_with("GNU parallel")) {
-        eprintln!("SKIPPED: GNU parallel is not installed");
-        return;
-    }
-    let site = Site::new();
-    site.is_released(&site.call(&mut Command::new(recipe("parallel/run"))));
+    let Some(parallel) = installed("engines/slurm/usr/bin/parallel", "tests/engines/set_up slurm") else { return };
+    let path = std::env::join_paths([parallel.parent().unwrap(), Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
+    Site::new().releases("GNU parallel", 1, "a program", Command::new(recipe("parallel/run")).env("PATH", path));
 }

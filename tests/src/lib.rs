@@ -277,16 +277,24 @@ pub fn write(folder: &Path, name: &str, text: &str) -> PathBuf {
     path
 }
 
-/// Python of the environment `.cache/<environment>`, which `command` sets up; `None` (after a message) if it is missing.
+/// A program in `.cache`, which `command` installs; `None` (after a message) if it is missing.
 ///
 /// # Panics
 /// When it is missing and CI is set: a check that does not run must not pass there.
-pub fn python(environment: &str, command: &str) -> Option<PathBuf> {
-    let python = sastrugi_fixtures::workspace_root().join(".cache").join(environment).join("bin/python");
-    if python.exists() {
-        return Some(python);
+pub fn installed(path: &str, command: &str) -> Option<PathBuf> {
+    let program = sastrugi_fixtures::workspace_root().join(".cache").join(path);
+    if program.exists() {
+        return Some(program);
     }
-    assert!(std::env::var_os("CI").is_none(), "{environment}: not installed; run {command} with network access");
-    eprintln!("SKIPPED: {environment} is not installed; {command} installs it");
+    assert!(std::env::var_os("CI").is_none(), "{path}: not installed; run {command} with network access");
+    eprintln!("SKIPPED: {path} is not installed; {command} installs it");
     None
+}
+
+/// Python of the environment `.cache/<environment>`, which `command` sets up; `None` (after a message) if it is missing.
+///
+/// # Panics
+/// As [`installed`].
+pub fn python(environment: &str, command: &str) -> Option<PathBuf> {
+    installed(&format!("{environment}/bin/python"), command)
 }
