@@ -7,7 +7,7 @@ use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::sync::atomic::{AtomicBool, Ordering};
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const SHARDS: u64 = 3;
 
@@ -86,6 +86,53 @@ fn val_shards_with_a_shared_cache_compute_each_item_once() {
     let again = json(path, &["run", "study.toml", "-o", "again", "--cache", "cache"]);
     assert_eq!((computed(&again), again["cache"]["fetched"].as_u64()), (0, Some(ITEMS)));
     assert_eq!(differing(&whole, &sums(&path.join("again"))), [""; 0]);
+}
+
+/// Items that each shard of the quick start computes, and the time it takes, without and with a shared cache. Prints the rows of a table in
+/// `docs/cluster.md`.
+#[test]
+#[ignore = "slow: runs the quick start in shards, twice"]
+fn val_a_shared_cache_saves_the_common_ancestors() {
+    let folder = area();
+    let path = folder.path();
+    let study = sastrugi_fixtures::workspace_root().join("fixtures/studies/quickstart.toml");
+    let study = study.to_str().unwrap();
+    let timed = |arguments: &[&str]| {
+        let start = Instant::now();
+        let summary = json(path, arguments);
+        (computed(&summary), start.elapsed().as_secs_f64())
+    };
+    let shards = |name: &str, more: &[&str]| -> Vec<(u64, f64)> {
+        let shard = |index| {
+            let (part, output) = (format!("{index}/{SHARDS}"), format!("{name}-{index}"));
+            timed(&[&["run", study, "--shard", &part, "-o", &output], more].concat())
+        };
+        (1..=SHARDS).map(shard).collect()
+    };
+    let sealed = |name: &str| {
+        let parts: Vec<String> = (1..=SHARDS).map(|index| format!("{name}-{index}")).collect();
+        let parts: Vec<&str> = parts.iter().map(String::as_str).collect();
+        let call = sastrugi_in(path, &[&["merge", "-o", name, "--quiet"], &parts[..]].concat());
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        sums(&path.join(name))
+    };
+
+    let alone = shards("alone", &[]);
+    let ancestors = timed(&["run", study, "--ancestors", "3", "--cache", "cache", "--work", "ancestors"]);
+    let shared = shards("shared", &["--cache", "cache"]);
+    println!("| ancestors | | | {} | {:.0} s |", ancestors.0, ancestors.1);
+    for (index, (before, after)) in alone.iter().zip(&shared).enumerate() {
+        println!("| shard {} | {} | {:.0} s | {} | {:.0} s |", index + 1, before.0, before.1, after.0, after.1);
+    }
+    let sum =
+        |shards: &[(u64, f64)]| shards.iter().fold((0_u64, 0.0_f64), |sum, shard| (sum.0 + shard.0, sum.1 + shard.1));
+    let (before, after) = (sum(&alone), sum(&[&shared[..], &[ancestors]].concat()));
+    println!("| all | {} | {:.0} s | {} | {:.0} s |", before.0, before.1, after.0, after.1);
+
+    let items = json(path, &["plan", study, "--shards", "3"])["study"]["items"].as_u64().unwrap();
+    assert_eq!(after.0, items, "each item is computed once");
+    assert!(before.0 > items, "{}: the shards have no common ancestors", before.0);
+    assert_eq!(differing(&sealed("alone"), &sealed("shared")), [""; 0]);
 }
 
 /// Starts a call in the background.

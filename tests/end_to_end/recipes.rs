@@ -15,6 +15,9 @@ use std::time::Instant;
 const SET_UP: &str = "tests/engines/set_up workflow";
 const ENVIRONMENT: &str = "engines/workflow";
 
+/// What unpacks Slurm and GNU parallel.
+const SET_UP_SLURM: &str = "tests/engines/set_up slurm";
+
 fn recipe(name: &str) -> PathBuf {
     sastrugi_fixtures::workspace_root().join("fixtures/cluster").join(name)
 }
@@ -82,9 +85,9 @@ impl Site {
         call
     }
 
-    /// Calls `tests/engines/<name>`, on whose hosts one crashes.
-    fn releases_on_hosts(&self, name: &str, engine_name: &str) -> Called {
-        let call = self.releases(engine_name, 2, "a program, a node", &mut Command::new(engine(name)));
+    /// Calls a script of `tests/engines`, which starts two nodes, one of which crashes.
+    fn releases_on_hosts(&self, engine: &str, command: &mut Command) -> Called {
+        let call = self.releases(engine, 2, "a program, a node", command);
         assert!(call.stdout.contains("crashed node"), "no host crashed: {}", call.stdout);
         call
     }
@@ -104,15 +107,34 @@ fn val_steps() {
     assert_eq!((step(&["all"]).code, step(&[]).code), (2, 2));
 }
 
-/// Two nodes: the killed program is put back into the queue by the job, the jobs of the crashed node by Slurm.
+/// True if Slurm can be started here; else a message.
+fn slurm_is_installed() -> bool {
+    installed("engines/slurm/usr/bin/sbatch", SET_UP_SLURM).is_some() && hosts_are_allowed()
+}
+
+/// How often Slurm has started a job again, over all jobs.
+fn restarts(call: &Called) -> usize {
+    call.stdout.matches("Restarts=1 ").count()
+}
+
+/// The job puts the killed program back into the queue; Slurm does so with the job of the crashed node.
 #[test]
 #[ignore = "slow: needs Slurm"]
 fn val_slurm() {
-    if installed("engines/slurm/usr/bin/sbatch", "tests/engines/set_up slurm").is_none() || !hosts_are_allowed() {
-        return;
+    if slurm_is_installed() {
+        let call = Site::new().releases_on_hosts("Slurm", Command::new(engine("slurm")).arg("submit"));
+        assert_eq!(restarts(&call), 2, "{}", call.stdout);
     }
-    let call = Site::new().releases_on_hosts("slurm", "Slurm");
-    assert_eq!(call.stdout.matches("Restarts=1 ").count(), 2, "{}", call.stdout);
+}
+
+/// The profile for Slurm: Snakemake submits the killed program again; Slurm puts the job of the crashed node back into the queue.
+#[test]
+#[ignore = "slow: needs Slurm and Snakemake"]
+fn val_snakemake_on_slurm() {
+    if python(ENVIRONMENT, SET_UP).is_some() && slurm_is_installed() {
+        let call = Site::new().releases_on_hosts("Snakemake on Slurm", Command::new(engine("slurm")).arg("snakemake"));
+        assert_eq!(restarts(&call), 1, "{}", call.stdout);
+    }
 }
 
 #[test]
@@ -133,19 +155,19 @@ fn val_ray_on_this_machine() {
     Site::new().releases("Ray", 1, "a program", &mut command);
 }
 
-/// Two nodes: the killed program and the tasks of the crashed node are tried again.
+/// Ray runs the tasks of the killed program and of the crashed node again.
 #[test]
 #[ignore = "slow: needs Ray"]
 fn val_ray_on_two_nodes() {
     if python(ENVIRONMENT, SET_UP).is_some() && hosts_are_allowed() {
-        Site::new().releases_on_hosts("ray", "Ray");
+        Site::new().releases_on_hosts("Ray", &mut Command::new(engine("ray")));
     }
 }
 
 #[test]
 #[ignore = "slow: needs GNU parallel"]
 fn val_gnu_parallel() {
-    let Some(parallel) = installed("engines/slurm/usr/bin/parallel", "tests/engines/set_up slurm") else { return };
+    let Some(parallel) = installed("engines/slurm/usr/bin/parallel", SET_UP_SLURM) else { return };
     let path = std::env::join_paths([parallel.parent().unwrap(), Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
     Site::new().releases("GNU parallel", 1, "a program", Command::new(recipe("parallel/run")).env("PATH", path));
 }
