@@ -75,7 +75,7 @@ pub struct Companions {
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The folder holds neither a study file nor tables.
-    #[error("{path} is not a release: it has neither study.toml nor tables/")]
+    #[error("{path} is not a release: {}", why_not_a_release(path))]
     NotARelease {
         /// The folder.
         path: PathBuf,
@@ -152,6 +152,15 @@ impl ReportError {
             }
             other => other,
         }
+    }
+}
+
+/// Why a path is not a release.
+fn why_not_a_release(path: &Path) -> &'static str {
+    match path.metadata() {
+        Err(_) => "no such folder",
+        Ok(found) if !found.is_dir() => "it is a file, not a folder",
+        Ok(_) => "it has neither study.toml nor tables/",
     }
 }
 

@@ -97,11 +97,13 @@ impl ReleaseError {
     }
 
     fn not_a_release(path: &Path, reason: impl Into<String>) -> Self {
-        let reason = match path.join(SHARD).is_file() {
-            true => {
+        let reason = match path.metadata() {
+            Err(_) => "no such folder".to_owned(),
+            Ok(found) if !found.is_dir() => "it is a file, not a folder".to_owned(),
+            Ok(_) if path.join(SHARD).is_file() => {
                 "it is one shard of a release; merge the shards first: `sastrugi merge SHARD... -o RELEASE`".to_owned()
             }
-            false => reason.into(),
+            Ok(_) => reason.into(),
         };
         Self::NotARelease { path: path.to_owned(), reason }
     }

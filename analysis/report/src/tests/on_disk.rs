@@ -240,7 +240,15 @@ fn val_the_study_is_read() {
 fn val_unusable_releases_are_refused() {
     let folder = tempfile::tempdir().unwrap();
     let error = |release: &Path| render(release, &folder.path().join("out"), &|_| ()).unwrap_err();
-    assert!(matches!(error(&folder.path().join("nowhere")), ReportError::NotARelease { .. }));
+    let said = |path: &Path| match error(path) {
+        refused @ ReportError::NotARelease { .. } => refused.to_string(),
+        other => panic!("{other}"),
+    };
+    assert!(said(&folder.path().join("nowhere")).ends_with("is not a release: no such folder"));
+    assert!(said(folder.path()).ends_with("it has neither study.toml nor tables/"));
+    let file = folder.path().join("file");
+    fs::write(&file, "text").unwrap();
+    assert!(said(&file).ends_with("it is a file, not a folder"));
     let builder = assembled(&folder.path().join("release"));
     let staging = builder.staging().to_owned();
     let damage = |path: &str, bytes: &[u8]| {

@@ -159,9 +159,16 @@ fn val_other_folders_are_left_untouched() {
     fs::remove_file(dest.join(MANIFEST)).unwrap();
     assert!(matches!(ReleaseBuilder::beside(&dest, head()), Err(ReleaseError::Occupied { .. })));
     assert!(dest.join(SUMS).exists());
-    let error = verify(&folder.path().join("nowhere")).unwrap_err();
-    assert!(error.unusable_input());
-    assert!(matches!(verify(folder.path()), Err(ReleaseError::NotARelease { .. })));
+    let refused = |path: &Path| {
+        let error = verify(path).unwrap_err();
+        assert!(error.unusable_input() && matches!(error, ReleaseError::NotARelease { .. }), "{error}");
+        error.to_string()
+    };
+    assert!(refused(&folder.path().join("nowhere")).ends_with("not a sastrugi release: no such folder"));
+    assert!(refused(folder.path()).contains("it has neither"), "{}", refused(folder.path()));
+    let file = folder.path().join("file");
+    fs::write(&file, "text").unwrap();
+    assert!(refused(&file).ends_with("it is a file, not a folder"));
 }
 
 #[test]
