@@ -6,7 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
-use sastrugi_tests::{Called, area, called, program};
+use sastrugi_tests::{Called, area, called, copy_build, program};
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -100,12 +100,13 @@ fn val_notebooks_run() {
 
 /// The wheel, built by maturin and installed in an empty environment: module, program, tests and notebooks.
 #[test]
-#[ignore = "slow: builds the workspace with the features of the wheel"]
+#[ignore = "slow: builds the wheel"]
 fn val_the_wheel_runs_in_an_empty_environment() {
     let Some(python) = python() else { return };
     let folder = area();
     let environment = folder.path().join("environment");
-    let target = root().join("target/wheel");
+    let target = folder.path().join("target");
+    copy_build(&target);
     let mut build = Command::new(&python);
     build.args(["-m", "maturin", "build", "--release", "--offline", "--out"]).arg(folder.path().join("wheels"));
     build.arg("--interpreter").arg(&python).env("CARGO_TARGET_DIR", &target).current_dir(sources());

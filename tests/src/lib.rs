@@ -24,6 +24,20 @@ pub fn program() -> PathBuf {
     program
 }
 
+/// Copies what cargo has compiled into another target folder, so that a build of the same packages there starts from it.
+///
+/// # Panics
+/// When it cannot be copied.
+pub fn copy_build(target: &Path) {
+    let to = target.join("release");
+    std::fs::create_dir_all(&to).expect("a folder");
+    let libraries = "find deps -name '*.rlib' -o -name '*.rmeta' -o -name '*.so'; find .fingerprint build -type f";
+    let line = format!("{{ {libraries}; }} | xargs -d '\\n' cp -p --parents -t '{}'", to.display());
+    let from = program().with_file_name("");
+    let call = called(Command::new("bash").args(["-euo", "pipefail", "-c", &line]).current_dir(from));
+    assert_eq!(call.code, 0, "{}", call.stderr);
+}
+
 /// Result of a call of the program.
 pub struct Called {
     /// Exit code.

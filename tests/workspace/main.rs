@@ -117,6 +117,31 @@ fn val_the_rules_can_be_broken() {
 }
 
 /// `fuzz/` is a workspace of its own; it exercises the versions that the program ships.
+/// Every package that `cargo run` builds, with its features, is one that the tests build too: a checkout that has done one does not
+/// compile it again for the other.
+#[test]
+fn val_run_and_test_share_one_build() {
+    let packages = |selection: &[&str]| -> BTreeSet<String> {
+        let output = Command::new(env!("CARGO"))
+            .args(["tree", "--offline", "--prefix", "none", "--format", "{p} [{f}]", "--edges"])
+            .args(selection)
+            .current_dir(sastrugi_fixtures::workspace_root())
+            .output()
+            .unwrap();
+        assert!(output.status.success(), "{}", String::from_utf8_lossy(&output.stderr));
+        let text = String::from_utf8(output.stdout).unwrap();
+        text.lines().map(|line| line.trim_end_matches(" (*)").to_owned()).filter(|line| !line.is_empty()).collect()
+    };
+    let of_run = packages(&["normal,build", "--package", "sastrugi-cli"]);
+    assert!(of_run.len() > 100, "{}", of_run.len());
+    let of_tests = packages(&["normal,build,dev", "--workspace"]);
+    let again: Vec<&String> = of_run.difference(&of_tests).collect();
+    assert!(
+        again.is_empty(),
+        "name them in pipeline/cli/Cargo.toml, with the features that the tests ask for: {again:#?}"
+    );
+}
+
 #[test]
 fn val_fuzz_targets_use_the_locked_versions() {
     let versions = |file: &str| -> BTreeSet<(String, String)> {

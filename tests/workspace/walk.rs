@@ -66,11 +66,7 @@ pub fn checkout(name: &str) -> PathBuf {
 /// A checkout with the compiled libraries, so that only what the walk touches is built again.
 fn scratch() -> PathBuf {
     let copy = checkout("walk");
-    fs::create_dir_all(copy.join("target/release")).unwrap();
-    let target = Path::new(env!("CARGO_TARGET_TMPDIR")).with_file_name("release");
-    let libraries = "find deps -name '*.rlib' -o -name '*.rmeta' -o -name '*.so'; find .fingerprint build -type f";
-    let to = copy.join("target/release");
-    run(&target, &format!("{{ {libraries}; }} | xargs -d '\\n' cp -p --parents -t '{}'", to.display()));
+    sastrugi_tests::copy_build(&copy.join("target"));
     copy
 }
 
