@@ -345,12 +345,17 @@ fn val_every_file_by_others_has_its_licence() {
 fn val_terms_inside_linked_crates_are_known() {
     let rules = rules();
     let graph = graph();
+    let mut unknown = Vec::new();
     for package in linked(&graph) {
         for file in terms(&package.folder).iter().filter(|file| file.contains('/')) {
             let path = format!("{}/{file}", package.name);
             let is_inside = rules.inside.iter().any(|i| i.package == package.name && i.file == *file);
             let is_known = is_inside || rules.not_linked.iter().any(|start| path.starts_with(start));
-            assert!(is_known, "{path}: is what it covers linked? Say it in {RULES}, as `inside` or `not_linked`");
+            unknown.extend((!is_known).then_some(path));
         }
     }
+    assert!(
+        unknown.is_empty(),
+        "is what these cover linked? Say it in {RULES}, as `inside` or `not_linked`: {unknown:?}"
+    );
 }
