@@ -2,6 +2,7 @@
 
 use sastrugi_tests::{Called, area, called, differing, installed, program, run_study, small_study, sums, write};
 use std::fs;
+use std::io::{Read, Write};
 use std::net::{Ipv4Addr, TcpListener, TcpStream};
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
@@ -187,4 +188,25 @@ fn val_addresses_are_checked_first() {
         assert!(call.code == 2 && call.stderr.contains(words), "{arguments:?}: {} {}", call.code, call.stderr);
     }
     assert_eq!(fs::read_dir(path).unwrap().count(), 1);
+}
+
+/// A machine whose service of roles refuses: the message names what to set, not that service.
+#[test]
+fn val_missing_credentials_are_named() {
+    let service = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap();
+    let endpoint = format!("http://{}", service.local_addr().unwrap());
+    std::thread::spawn(move || {
+        for mut client in service.incoming().map_while(Result::ok) {
+            let _ = client.read(&mut [0; 4096]);
+            let _ = client.write_all(b"HTTP/1.1 403 Forbidden\r\nContent-Length: 0\r\nConnection: close\r\n\r\n");
+        }
+    });
+    let mut command = Command::new(program());
+    command.args(["verify", "s3://terrains/demo"]).env("AWS_METADATA_ENDPOINT", endpoint);
+    for name in ["AWS_ACCESS_KEY_ID", "AWS_SECRET_ACCESS_KEY", "AWS_WEB_IDENTITY_TOKEN_FILE"] {
+        command.env_remove(name);
+    }
+    let call = called(&mut command);
+    assert_eq!(call.code, 2, "{}", call.stderr);
+    assert!(call.stderr.contains("no credentials; set AWS_ACCESS_KEY_ID"), "{}", call.stderr);
 }

@@ -118,7 +118,9 @@ impl From<ObjectError> for Error {
     /// An address or an environment that is wrong is bad usage.
     fn from(error: ObjectError) -> Self {
         match error {
-            ObjectError::Address(_) | ObjectError::Environment { .. } => Self::Usage(error.to_string()),
+            ObjectError::Address(_) | ObjectError::Environment { .. } | ObjectError::Credentials { .. } => {
+                Self::Usage(error.to_string())
+            }
             ObjectError::Request { .. } if error.may_pass() => Self::Retry(error.to_string()),
             ObjectError::Request { .. } => Self::Failed(error.to_string()),
             ObjectError::File { path, source } => Self::at(&path, source),

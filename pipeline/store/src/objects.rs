@@ -47,6 +47,14 @@ pub enum ObjectError {
         /// The cause.
         source: object_store::Error,
     },
+    /// The environment holds no credentials, and the machine has no role that gives any.
+    #[error(
+        "{address}: no credentials; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or use a machine whose role may use the bucket"
+    )]
+    Credentials {
+        /// The address.
+        address: String,
+    },
     /// A request failed.
     #[error("{address}: {source}")]
     Request {
@@ -78,6 +86,11 @@ impl ObjectError {
     fn file(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::File { path: path.to_owned(), source }
     }
+}
+
+/// True for a failed request to the service that tells a machine its role, which is asked only without credentials in the environment.
+fn asks_for_a_role(error: &str) -> bool {
+    error.contains("/latest/api/token") || error.contains("/latest/meta-data/")
 }
 
 /// An object below the prefix of a bucket.
@@ -137,8 +150,12 @@ impl Bucket {
         let store = AmazonS3Builder::from_env().with_bucket_name(bucket).with_retry(retries).build();
         let store = store.map_err(|source| ObjectError::Environment { address: address.to_owned(), source })?;
         let bucket = Self::new(Arc::new(store), address)?;
-        bucket.look()?;
-        Ok(bucket)
+        match bucket.look() {
+            Err(error) if asks_for_a_role(&error.to_string()) => {
+                Err(ObjectError::Credentials { address: address.to_owned() })
+            }
+            looked => looked.map(|()| bucket),
+        }
     }
 
     /// A bucket in the memory of this process, for tests of what uses one.

@@ -203,7 +203,9 @@ fn marked(root: &Path) -> Result<bool, Error> {
     let found: BTreeSet<OsString> = match fs::read_dir(root) {
         Ok(entries) => entries.flatten().map(|entry| entry.file_name()).collect(),
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
-        Err(e) if e.kind() == ErrorKind::NotADirectory => return Err(refused()),
+        Err(e) if e.kind() == ErrorKind::NotADirectory => {
+            return Err(Error::Usage(format!("{}: it is a file, not a folder", root.display())));
+        }
         Err(e) => return Err(Error::at(root, e)),
     };
     if found.contains(OsStr::new(MARK)) {
