@@ -67,6 +67,7 @@ pub use counter::{Counter, Poisson};
 pub use grid::{Geometry, Grid};
 pub use ground::{Ground, GroundClass, GroundGrid, GroundPoint, NoGround};
 pub use patch::{PatchShape, height_patch, relative_height_patch};
+pub use simd::uses_wide_vectors;
 pub use streams::{Stream, Streams};
 pub use surface::Surface;
 pub use triangulation::{Triangulation, triangulate};

@@ -6,6 +6,11 @@
 
 use pulp::{Scalar256b, Simd, WithSimd};
 
+/// Whether transforms and phases use wide vectors on this CPU; their bits are the same either way.
+pub fn uses_wide_vectors() -> bool {
+    !matches!(Vectors::best(), Vectors::Baseline)
+}
+
 /// Vectors of four numbers.
 #[derive(Clone, Copy, Debug)]
 pub enum Vectors {
