@@ -116,7 +116,6 @@ fn val_the_rules_can_be_broken() {
     }
 }
 
-/// `fuzz/` is a workspace of its own; it exercises the versions that the program ships.
 /// Every package that `cargo run` builds, with its features, is one that the tests build too: a checkout that has done one does not
 /// compile it again for the other.
 #[test]
@@ -142,6 +141,7 @@ fn val_run_and_test_share_one_build() {
     );
 }
 
+/// `fuzz/` is a workspace of its own; it exercises the versions that the program ships.
 #[test]
 fn val_fuzz_targets_use_the_locked_versions() {
     let versions = |file: &str| -> BTreeSet<(String, String)> {
@@ -157,4 +157,23 @@ fn val_fuzz_targets_use_the_locked_versions() {
     assert!(fuzz.len() > 100, "{}", fuzz.len());
     let other: Vec<_> = fuzz.iter().filter(|pair| names.contains(&pair.0) && !ours.contains(*pair)).collect();
     assert!(other.is_empty(), "copy Cargo.lock to fuzz/ and run `cargo update --workspace` there: {other:?}");
+}
+
+/// The build script of `stages` leaves modules of this name out of the revisions in cache keys.
+#[test]
+fn val_modules_named_tests_are_compiled_for_tests_only() {
+    let root = sastrugi_fixtures::workspace_root();
+    let listed = Command::new("git").args(["ls-files", "*.rs"]).current_dir(&root).output().unwrap();
+    let listed = String::from_utf8(listed.stdout).unwrap();
+    let mut count = 0;
+    for file in listed.lines() {
+        // A file that was deleted and not committed is still listed.
+        let text = std::fs::read_to_string(root.join(file)).unwrap_or_default();
+        let lines: Vec<&str> = text.lines().map(str::trim).collect();
+        for pair in lines.windows(2).filter(|pair| ["mod tests;", "pub mod tests;", "mod tests {"].contains(&pair[1])) {
+            assert_eq!(pair[0], "#[cfg(test)]", "{file}");
+            count += 1;
+        }
+    }
+    assert!(count > 100, "{count}");
 }
