@@ -52,8 +52,8 @@ pub enum Verb {
         sastrugi run study.toml --ancestors 3 --cache cache\n  \
         sastrugi run study.toml -o part1 --shard 1/3 --cache cache\n  \
         sastrugi run study.toml -o s3://terrains/snow\n\n\
-        For s3:// the variables AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT_URL apply. The\n\
-        release is assembled in the work area and uploaded, its manifest last."
+        For s3:// set AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT_URL. The release\n\
+        is assembled in the work area and uploaded, its manifest last."
     )]
     Run(Run),
     /// Show what a run would compute, its cost, and why each stale item is stale.
@@ -75,7 +75,8 @@ pub enum Verb {
     Verify(Verify),
     /// Generate one terrain.
     #[command(after_help = "Examples:\n  sastrugi terrain multifractal --seed 7 -o rough.tif\n  \
-        sastrugi terrain weierstrass_mandelbrot --set fractal_dimension=2.4 --set size_px='[512, 512]' -o wm.png")]
+        sastrugi terrain weierstrass_mandelbrot --set fractal_dimension=2.4 \\\n    \
+        --set size_px='[512, 512]' -o wm.png")]
     Terrain(Terrain),
     /// Fit a covariance model to a measured DEM.
     #[command(after_help = "Exit code 3: some of the DEMs could not be fitted; 1: none could.\n\n\
@@ -99,7 +100,8 @@ pub enum Verb {
     /// Synthesise a texture that matches a fit.
     #[command(
         after_help = "Examples:\n  sastrugi texture fit.json --size 20x20 --cell 0.1 --seed 1 -o texture.tif\n  \
-        sastrugi texture fit.json --size 10x10 --cell 0.05 --onto terrain.tif --covariance surface -o textured.tif\n  \
+        sastrugi texture fit.json --size 10x10 --cell 0.05 --onto terrain.tif \\\n    \
+        --covariance surface -o textured.tif\n  \
         sastrugi texture fit.json --fill snow.tif -o without-holes.tif"
     )]
     Texture(Texture),
@@ -126,9 +128,11 @@ pub enum Verb {
         after_help = "An output ending in .geojson or .svg contains only the route; any other name is the folder of a\n\
         release. GeoJSON is written in the DEM's own coordinates.\n\n\
         Examples:\n  sastrugi navigate site.tif --start 12,30 --goal 240,180 -o route.svg\n  \
-        sastrugi navigate site.tif --start 12,30 --goal 240,180 --vehicle husky_a200 --set cost=energy -o route.geojson\n  \
+        sastrugi navigate site.tif --start 12,30 --goal 240,180 --vehicle husky_a200 \\\n    \
+        --set cost=energy -o route.geojson\n  \
         sastrugi navigate site.tif --start 12,30 --goal 240,180 --obstacles buildings.geojson -o routes\n  \
-        sastrugi navigate site.tif --start 12,30 --goal 240,180 --formation wedge --team members=6 --team spacing_m=5 -o team"
+        sastrugi navigate site.tif --start 12,30 --goal 240,180 --formation wedge \\\n    \
+        --team members=6 --team spacing_m=5 -o team"
     )]
     Navigate(Navigate),
     /// Drive the rovers of a study and rank their parameters by effect.
@@ -200,7 +204,8 @@ pub enum Verb {
         Examples:\n  sastrugi render site.tif --sun 120,20 -o site-morning.tif\n  \
         sastrugi render planetary --set-surface size_m='[20, 20]' --seed 3 --sun 90,15 -o mars.png\n  \
         sastrugi render site.tif --camera parallel:200,40,0.5 --set noise.relative=0.01 -o oblique.tif\n  \
-        sastrugi render planetary --set-surface size_m='[20, 20]' --seed 3 --camera pinhole:4,2,0.3,4,12,0 --size 960x540 -o rover.png")]
+        sastrugi render planetary --set-surface size_m='[20, 20]' --seed 3 \\\n    \
+        --camera pinhole:4,2,0.3,4,12,0 --size 960x540 -o rover.png")]
     Render(Render),
     /// Recover heights and albedo from three or more registered images of one surface under different sun directions.
     #[command(
@@ -211,7 +216,8 @@ pub enum Verb {
         standard deviations (.uncertainty.tif for heights, .slope-sigma.tif, .albedo-sigma.tif),\n\
         DEM.condition.tif, DEM.lit.tif (number of images in which a cell is lit) and DEM.leaning.tif.\n\n\
         Examples:\n  sastrugi photoclinometry images.toml -o dem.tif\n  \
-        sastrugi photoclinometry images.toml --set cell_m=2 --set free_exposure=true --set stereo='{}' -o dem.tif"
+        sastrugi photoclinometry images.toml --set cell_m=2 --set free_exposure=true \\\n    \
+        --set stereo='{}' -o dem.tif"
     )]
     Photoclinometry(Photoclinometry),
     /// Describe a file or a release.
@@ -237,7 +243,8 @@ pub enum Verb {
         missions and rovers. With SASTRUGI_TOKEN set, requests must send that token.\n\n\
         Examples:\n  sastrugi serve fixtures/worlds/planet.toml\n  \
         sastrugi serve study.toml release --library tiles --library-bytes 10G --listen 127.0.0.1:9000\n  \
-        curl 'http://127.0.0.1:8080/v1/collections/planet/patch?center=0,0&size=512,512&resolution_m=0.02' -o patch.tif"
+        curl -o patch.tif \\\n    \
+        'http://127.0.0.1:8080/v1/collections/planet/patch?center=0,0&size=512,512&resolution_m=0.02'"
     )]
     Serve(Serve),
 }

@@ -36,6 +36,9 @@ fn check_examples(command: &Command, verb: Option<&str>) {
     let is_of_verb = |call: &&Vec<String>| verb.is_none_or(|verb| call[1] == verb);
     let name = command.get_name();
     assert_ne!(examples.iter().filter(is_of_verb).count(), 0, "the help of {name} has no example of it: {help}");
+    // A longer line is wrapped, and a wrapped command cannot be copied.
+    let long: Vec<&str> = help.lines().filter(|line| line.chars().count() > 100).collect();
+    assert!(long.is_empty(), "lines in the help of {name} that are wrapped: {long:?}");
     let root = Path::new(env!("CARGO_MANIFEST_DIR")).join("../..");
     for call in &examples {
         if let Err(refused) = Arguments::try_parse_from(call) {
