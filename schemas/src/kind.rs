@@ -137,8 +137,56 @@ pub fn schema_of<T: JsonSchema>() -> Value {
 pub fn read_parameters<T: DeserializeOwned>(value: &Value) -> Result<T, ParameterError> {
     serde_path_to_error::deserialize(value).map_err(|e| {
         let key = dotted(e.path());
-        ParameterError::new(key, e.into_inner().to_string())
+        ParameterError::new(key, in_plain_words(e.into_inner().to_string()))
     })
+}
+
+/// Serde's sentence on a value of the wrong type in words for people who write studies, without names of Rust types; any other sentence as it is.
+fn in_plain_words(message: String) -> String {
+    let wrong = message.strip_prefix("invalid type: ").or_else(|| message.strip_prefix("invalid value: "));
+    if let Some((found, expected)) = wrong.and_then(|rest| rest.rsplit_once(", expected ")) {
+        return format!("must be {}, got {}", type_in_words(expected), value_in_words(found));
+    }
+    let length = message.strip_prefix("invalid length ").and_then(|rest| rest.split_once(", expected "));
+    match length.map(|(found, expected)| (found, expected.strip_prefix("an array of length "), expected)) {
+        Some((found, Some(values), _)) => format!("must be a list of {values} values, got {found}"),
+        Some((found, None, "fewer elements in array")) => format!("must be a shorter list, got {found} values"),
+        _ => message,
+    }
+}
+
+/// A type that serde expected.
+fn type_in_words(expected: &str) -> &str {
+    match expected {
+        "f32" | "f64" => "a number",
+        "i8" | "i16" | "i32" | "i64" | "isize" => "a whole number",
+        "u64" | "usize" => "a whole number, 0 or above",
+        "u32" => "a whole number from 0 to 4294967295",
+        "u16" => "a whole number from 0 to 65535",
+        "u8" => "a whole number from 0 to 255",
+        "a string" => "text in quotes",
+        "a boolean" => "true or false",
+        "a sequence" => "a list",
+        "a map" => "a table",
+        other if other.starts_with("struct ") => "a table",
+        other if other.starts_with("an array of length ") => "a list",
+        other => other,
+    }
+}
+
+/// A value that serde found.
+fn value_in_words(found: &str) -> &str {
+    let number = |kind: &str| found.strip_prefix(kind).map(|quoted| quoted.trim_matches('`'));
+    match found {
+        "sequence" => "a list",
+        "map" => "a table",
+        _ => found
+            .strip_prefix("string ")
+            .or_else(|| number("integer "))
+            .or_else(|| number("floating point "))
+            .or_else(|| number("boolean "))
+            .unwrap_or(found),
+    }
 }
 
 /// As [`read_parameters`], but reports every value of the wrong type, not only the first.
@@ -227,6 +275,29 @@ mod tests {
         assert_eq!(key(json!({"layers": [[1.0, 2.0], [1.0, "x"]]})), "layers.1.1");
         assert_eq!(key(json!({"layers": 5})), "layers");
         assert_eq!(key(json!({})), "");
+    }
+
+    /// A value of the wrong type is refused without the names of Rust's types.
+    #[test]
+    fn val_wrong_types_are_named_in_plain_words() {
+        let message = |value: Value| read_parameters::<Item>(&value).unwrap_err().to_string();
+        let item = |key: &str, value: Value| {
+            let mut item = json!({"id": "a"});
+            item[key] = value;
+            item
+        };
+        assert_eq!(message(item("id", json!(5))), "`id` must be text in quotes, got 5");
+        assert_eq!(message(item("count", json!(-1))), "`count` must be a whole number from 0 to 4294967295, got -1");
+        assert_eq!(message(item("count", json!(1.5))), "`count` must be a whole number from 0 to 4294967295, got 1.5");
+        assert_eq!(message(item("window", json!(true))), "`window` must be a list, got true");
+        assert_eq!(message(item("window", json!(["x"]))), "`window.0` must be a number, got \"x\"");
+        let layers = json!({"layers": [[1.0]]});
+        let short = read_parameters::<Layers>(&layers).unwrap_err().to_string();
+        assert_eq!(short, "`layers.0` must be a list of 2 values, got 1");
+        let long = read_parameters::<Layers>(&json!({"layers": [[1.0, 2.0, 3.0]]})).unwrap_err().to_string();
+        assert_eq!(long, "`layers.0` must be a shorter list, got 3 values");
+        // `is_missing` relies on serde's own sentence.
+        assert!(read_parameters::<Item>(&json!({})).unwrap_err().is_missing("id"));
     }
 
     #[derive(Debug, Deserialize)]

@@ -117,7 +117,7 @@ impl Creator {
 
 /// Shares of the splits of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "expected the shares of two or three splits, such as [0.8, 0.2] or [0.7, 0.15, 0.15]")]
+#[serde(untagged, expecting = "must be the shares of two or three splits, such as [0.8, 0.2] or [0.7, 0.15, 0.15]")]
 pub enum Shares {
     /// `train`, `validation`, `test`.
     Three([f64; 3]),
@@ -349,7 +349,7 @@ pub struct FitItem {
 
 /// None, one or several files.
 #[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "expected a file name or a list of file names")]
+#[serde(untagged, expecting = "must be a file name or a list of file names")]
 pub enum Files {
     /// One file.
     One(String),
@@ -427,7 +427,7 @@ fn one() -> f64 {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "`onto` must be the id of a terrain or DEM, or a table `{ background = \"<fit id>\" }`"
+    expecting = "must be the id of a terrain or DEM, or a table `{ background = \"<fit id>\" }`"
 )]
 pub enum Onto {
     /// Id of a terrain or DEM.
@@ -441,7 +441,7 @@ pub enum Onto {
 
 /// Local factor on a texture.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "`modulate` must be the id of a raster, or a table with lists `slope_deg` and `factor`")]
+#[serde(untagged, expecting = "must be the id of a raster, or a table with lists `slope_deg` and `factor`")]
 pub enum Modulate {
     /// Id of a raster of factors, 0 or above.
     Raster(String),
@@ -457,7 +457,7 @@ pub enum Modulate {
 
 /// The covariance that a texture matches.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "`fit` must be the id of a fit, or a table with `model` and its parameters")]
+#[serde(untagged, expecting = "must be the id of a fit, or a table with `model` and its parameters")]
 pub enum FitReference {
     /// Id of a fit.
     Id(String),
@@ -473,7 +473,7 @@ pub enum FitReference {
 
 /// Synthesis methods.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged, expecting = "`methods` must be \"all\" or a list of synthesis methods")]
+#[serde(untagged, expecting = "must be \"all\" or a list of synthesis methods")]
 pub enum Methods {
     /// `all`.
     Word(String),

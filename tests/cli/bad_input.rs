@@ -59,7 +59,7 @@ fn val_studies_are_refused_with_the_line() {
     study_refused("[[fit]]", "[[fitt]]", &["unknown section `fitt`"]);
     let joined =
         "[[terrain]]\nid = \"joined\"\nkind = \"compose\"\nprocesses = [\n{ kind = \"cascade\" },\n5,\n]\n\n[[fit]]";
-    study_refused("[[fit]]", joined, &["processes.1", "expected a process"]);
+    study_refused("[[fit]]", joined, &["processes.1", "must be a process"]);
     study_refused("date = \"2026-01-01\"", "date = \"yesterday\"", &["YYYY-MM-DD"]);
 }
 
