@@ -388,7 +388,11 @@ fn too_many(most: usize) -> String {
 pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterator<Item = &'s String>) -> StudyError {
     let known: Vec<&str> = known.map(String::as_str).collect();
     let nearest = crate::study::keys::nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
-    let list = if known.is_empty() { "there are none".to_owned() } else { format!("known: {}", known.join(", ")) };
+    let list = if known.is_empty() {
+        format!("the study defines no id that `{key}` can name; add its section")
+    } else {
+        format!("known: {}", known.join(", "))
+    };
     let error = entry.error(key, format!("`{key}` names \"{id}\", which no earlier section defines"));
     StudyError { missing_id: Some(id.to_owned()), ..error.with_help(Some(nearest.unwrap_or(list))) }
 }

@@ -84,9 +84,15 @@ impl Study {
         let names: Vec<&str> = known().collect();
         let unknown = self.root.keys().filter(|k| !known().any(|s| s == *k));
         let refuse = |unknown: &String| {
+            let span = self.text.span(std::slice::from_ref(unknown), true);
+            if !self.root.get(unknown).is_some_and(|value| value.is_object() || value.is_array()) {
+                let message =
+                    format!("the key `{unknown}` is outside every section; put it below its section, such as [study]");
+                return StudyError::at(span, message);
+            }
             let message = format!("{UNKNOWN_SECTION} `{unknown}`; known: {}", names.join(", "));
             let help = keys::nearest(unknown, known()).map(|n| format!("did you mean `{n}`?"));
-            StudyError::at(self.text.span(std::slice::from_ref(unknown), true), message).with_help(help)
+            StudyError::at(span, message).with_help(help)
         };
         unknown.map(refuse).collect()
     }
@@ -451,5 +457,6 @@ mod tests {
         at(&format!("{HEAD}[roughness]\nlow_max = 2.0\n"), "above low_max", "[roughness]");
         at(&format!("{HEAD}[[terain]]\nid = \"a\"\n"), "unknown section `terain`", "terain");
         at(&format!("{HEAD}[extra]\n"), "unknown section", "extra");
+        at(&format!("extra = 1\n{HEAD}"), "outside every section", "extra");
     }
 }
