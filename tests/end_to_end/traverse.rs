@@ -245,7 +245,7 @@ fn val_measured_dems_are_driven_or_refused() {
     let short = ["--set-missions", "length_m=2.0", "--set-missions", "border_m=0.5", "--set", "timeout_s=40"];
     for (dem, more, words) in [
         // 423 x 331 cells of 2 cm.
-        (&gaps, &[][..], "the terrain inside the border of 5 m measures -1.54 x -3.38 m"),
+        (&gaps, &[][..], "the terrain is 8.46 x 6.62 m, including a border of 5 m"),
         (&gaps, &short[..], "has low roughness"),
         (&catchment, &[][..], "cells of 1 m: they are larger than its wheelbase of 0.512 m"),
     ] {
@@ -283,7 +283,7 @@ fn val_traverse_states_why_it_refuses() {
         assert!(code == 65 && said.lines().last().unwrap().contains(words), "{code} {said}");
         assert!(!folder.path().join("drive").exists());
     };
-    refused(&ascii(0.1, |_, _| 0.0), &[], "the terrain inside the border of 5 m measures -0.40 x -0.40 m");
+    refused(&ascii(0.1, |_, _| 0.0), &[], "the terrain is 9.60 x 9.60 m, including a border of 5 m");
     refused(&ascii(0.1, |row, col| f64::from((row + col) % 2)), &short, "has low roughness");
     refused(&ascii(0.1, |_, _| -9999.0), &short, "none of the 96 x 96 cells holds data");
     refused(&ascii(1.0, |_, _| 0.0), &[], "larger than its wheelbase");

@@ -126,8 +126,10 @@ pub fn mission_id(index: usize) -> String {
 pub enum MissionError {
     /// The terrain cannot hold the mission at any heading.
     #[error(
-        "place missions of {length_m} m: the terrain inside the border of {border_m} m measures {inside_x_m:.2} x \
-         {inside_y_m:.2} m; use a larger terrain, a shorter `length_m` or a narrower `border_m`"
+        "place missions of {length_m} m: the terrain is {:.2} x {:.2} m, including a border of {border_m} m on every side where no mission \
+         starts or ends; use a larger terrain, a shorter `length_m` or a narrower `border_m`",
+        inside_x_m + 2.0 * border_m,
+        inside_y_m + 2.0 * border_m
     )]
     LongerThanTerrain {
         /// Mission length, m.
