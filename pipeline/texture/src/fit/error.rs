@@ -13,7 +13,8 @@ pub enum FitError {
     Unreadable(String),
     /// Fewer than two windows fit side by side.
     #[error(
-        "the DEM is {width_m} m x {height_m} m; it must be at least two windows, {needed_m} m, wide in both directions"
+        "the DEM is {width_m} m x {height_m} m, too small for an outer scale of {} m; choose at most a third of its extent",
+        0.5 * needed_m
     )]
     DemTooSmall {
         /// East-west extent, m.
