@@ -93,7 +93,9 @@ fn cell(text: Option<&str>) -> Result<Option<[f64; 2]>, Failure> {
     let Some(text) = text else { return Ok(None) };
     let cell = match numbers::<1>("--cell", text) {
         Ok([side]) => [side; 2],
-        Err(_) => numbers::<2>("--cell", text)?,
+        Err(_) => numbers::<2>("--cell", text).map_err(|_| {
+            Failure::usage(format!("`--cell {text}`: expected one number, or two separated by a comma, in m"))
+        })?,
     };
     if cell.iter().all(|c| *c > 0.0) {
         return Ok(Some(cell));
@@ -115,7 +117,10 @@ mod tests {
             assert_eq!(read(text), Err(format!("`--cell {text}`: cell size must be above 0")));
         }
         for text in ["", "a", "1,2,3", "nan"] {
-            assert_eq!(read(text), Err(format!("`--cell {text}`: expected 2 numbers")));
+            assert_eq!(
+                read(text),
+                Err(format!("`--cell {text}`: expected one number, or two separated by a comma, in m"))
+            );
         }
     }
 

@@ -95,7 +95,7 @@ pub fn numbers<const N: usize>(option: &str, text: &str) -> Result<[f64; N], Err
     let numbers = numbers.filter(|v| v.iter().all(|x: &f64| x.is_finite()));
     numbers
         .and_then(|v| <[f64; N]>::try_from(v).ok())
-        .ok_or_else(|| Error::Usage(format!("`{option} {text}`: expected {N} numbers")))
+        .ok_or_else(|| Error::Usage(format!("`{option} {text}`: expected {N} numbers separated by a comma or `x`")))
 }
 
 #[cfg(test)]
@@ -110,7 +110,7 @@ mod tests {
         for text in ["", "12", "1,2,3", "1,nan", "1,inf", "a,b", "1,,2"] {
             let error = numbers::<2>("--start", text).unwrap_err();
             assert!(
-                matches!(&error, Error::Usage(m) if *m == format!("`--start {text}`: expected 2 numbers")),
+                matches!(&error, Error::Usage(m) if *m == format!("`--start {text}`: expected 2 numbers separated by a comma or `x`")),
                 "{error}"
             );
         }
