@@ -89,7 +89,7 @@ pub enum LogError {
         length: f64,
     },
     /// Fewer than three usable poses.
-    #[error("{poses} usable poses on {topic}; metrics need at least 3")]
+    #[error("too few usable poses on {topic}: metrics need at least 3, got {poses}")]
     TooFew {
         /// Topic.
         topic: String,
