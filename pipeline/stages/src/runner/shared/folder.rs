@@ -46,7 +46,10 @@ impl Folder {
         match (marked(root)?, read_only) {
             (true, _) => {}
             (false, true) => {
-                return Err(Error::Input(format!("{}: there is no shared cache to read", root.display())));
+                return Err(Error::Input(format!(
+                    "{}: not a shared cache; the folder is missing or empty",
+                    root.display()
+                )));
             }
             (false, false) => mark(root)?,
         }

@@ -151,7 +151,9 @@ fn val_a_cache_has_its_own_folder() {
         assert!(refused(&foreign.path().join("thesis.tex"), read_only).ends_with("it is a file, not a folder"));
     }
     let missing = foreign.path().join("none");
-    assert!(refused(&missing, true).contains("there is no shared cache to read") && !missing.exists());
+    assert!(
+        refused(&missing, true).contains("not a shared cache; the folder is missing or empty") && !missing.exists()
+    );
     // A work area is not a shared cache, nor the reverse.
     let area = Area::new();
     drop(area.cache());
