@@ -572,7 +572,7 @@ fn val_settings_of_point_clouds_are_refused_elsewhere() {
     let folder = area();
     let path = folder.path();
     std::fs::copy(sastrugi_fixtures::jacksboro(), path.join("site.tif")).unwrap();
-    let words = ["site.tif", "is not a point cloud"];
+    let words = ["site.tif", "not a point cloud"];
     for more in [&["--statistic", "median"][..], &["--fill", "2"], &["--ground"]] {
         refused(path, &[&["fit", "site.tif", "-o", "fit.json"], more].concat(), USAGE, &words);
         refused(path, &[&["convert", "site.tif", "b.tif"], more].concat(), USAGE, &words);

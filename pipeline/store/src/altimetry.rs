@@ -43,7 +43,7 @@ pub fn read(path: &Path) -> Result<Vec<[f64; 4]>, DemError> {
 
 fn parse(bytes: &[u8]) -> Result<Vec<[f64; 4]>, Refusal> {
     let text = std::str::from_utf8(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
-        .map_err(|e| Refusal::new(format!("is not text: byte {} is not UTF-8", e.valid_up_to())))?;
+        .map_err(|e| Refusal::new(format!("not text: byte {} is not UTF-8", e.valid_up_to())))?;
     let has_values = |(_, line): &(usize, &str)| !line.is_empty() && !line.starts_with('#');
     let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim())).filter(has_values).peekable();
     let first = lines.peek().map(|(_, line)| fields(line)).unwrap_or_default();

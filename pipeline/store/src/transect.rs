@@ -106,7 +106,7 @@ struct Columns {
 impl Columns {
     fn parse(bytes: &[u8]) -> Result<Self, Refusal> {
         let text = std::str::from_utf8(bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes))
-            .map_err(|e| Refusal::new(format!("is not text: byte {} is not UTF-8", e.valid_up_to())))?;
+            .map_err(|e| Refusal::new(format!("not text: byte {} is not UTF-8", e.valid_up_to())))?;
         let mut found = Self { names: None, values: vec![], lines: vec![] };
         let has_values = |(_, line): &(usize, &str)| !line.is_empty() && !line.starts_with('#');
         let lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim())).filter(has_values);

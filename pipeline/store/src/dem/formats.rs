@@ -137,7 +137,7 @@ static CODECS: [Codec; 9] = [
         starts: points::looks_like,
         grid: Some(points::read_dem),
         // A point cloud by name only.
-        parse: Some(|_, _, _| Err(Refusal::new("is not a point cloud: LAS and LAZ files start with \"LASF\""))),
+        parse: Some(|_, _, _| Err(Refusal::new("not a point cloud: LAS and LAZ files start with \"LASF\""))),
         claimed: Some(|_, file, options| points::claimed(file, options.cell_m.map(|[x, y]| x.min(y)))),
         ..Codec::new(Format::Las, "las", &["las", "laz"])
     },

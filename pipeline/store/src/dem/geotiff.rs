@@ -93,7 +93,7 @@ fn unreferenced<R: Read + Seek>(reader: R) -> Option<Decoder<R>> {
 }
 
 fn refused(error: &dyn std::error::Error) -> Refusal {
-    Refusal::new(format!("is not a readable TIFF: {error}"))
+    Refusal::new(format!("not a readable TIFF: {error}"))
 }
 
 /// An open TIFF of heights, with nothing decoded yet.
@@ -175,7 +175,7 @@ impl<R: Read + Seek> Raster<R> {
 
     /// A TIFF without any georeferencing.
     fn plain(decoder: Option<Decoder<R>>, size: u64, options: &ReadOptions) -> Result<Self, Refusal> {
-        let mut decoder = decoder.ok_or_else(|| Refusal::new("is not a readable TIFF"))?;
+        let mut decoder = decoder.ok_or_else(|| Refusal::new("not a readable TIFF"))?;
         let mut number = |tag| decoder.find_tag_unsigned::<u64>(tag).map_err(|e| refused(&e));
         let bands = number(Tag::SamplesPerPixel)?.unwrap_or(1);
         let photometric = number(Tag::PhotometricInterpretation)?.and_then(|n| u16::try_from(n).ok());

@@ -94,7 +94,7 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
         return grid(path, file, options, settings);
     }
     if (GridSettings { cell_m: None, ..*settings }) != GridSettings::default() {
-        let reason = "is not a point cloud; statistic, filling and ground-only apply to .las and .laz";
+        let reason = "not a point cloud; statistic, filling and ground-only apply to .las and .laz";
         return Err(Refusal::new(reason).unfit(path));
     }
     let dem = match codec.and_then(|codec| codec.stream) {
@@ -121,7 +121,7 @@ fn parse(path: &Path, bytes: Vec<u8>, options: &ReadOptions) -> Result<Dem, Refu
     }
     match formats::of_raster(path, &bytes).and_then(|codec| codec.parse) {
         Some(parse) => parse(path, bytes, options),
-        None => Err(Refusal::new(format!("is not a supported raster; supported are {READ_FORMATS}"))),
+        None => Err(Refusal::new(format!("not a supported raster; supported are {READ_FORMATS}"))),
     }
 }
 

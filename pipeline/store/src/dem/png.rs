@@ -125,7 +125,7 @@ fn encode(grid: &Grid<u16>, scale: Option<HeightScale>) -> Result<Vec<u8>, Refus
 
 /// Reads a greyscale PNG: heights if a text chunk gives the scale, levels otherwise.
 pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal> {
-    let refused = |e: png::DecodingError| Refusal::new(format!("is not a readable PNG: {e}"));
+    let refused = |e: png::DecodingError| Refusal::new(format!("not a readable PNG: {e}"));
     let mut strict = png::DecodeOptions::default();
     // A damaged text chunk must not be skipped: it may hold the scale of the heights.
     strict.set_skip_ancillary_crc_failures(false);

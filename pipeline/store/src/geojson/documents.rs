@@ -72,7 +72,7 @@ fn document(mut polygons: Vec<Polygon>, holder: Holder, damage: Damage) -> Docum
     let (text, expected) = match damage {
         Damage::Nothing => (text, Ok(polygons)),
         // The opening brace is kept, by which a text is recognised as GeoJSON.
-        Damage::Cut(at) => (text[..1 + at.index(text.len() - 1)].to_owned(), Err("is not GeoJSON: ")),
+        Damage::Cut(at) => (text[..1 + at.index(text.len() - 1)].to_owned(), Err("not GeoJSON: ")),
         Damage::TwoCorners => (text, Err("a ring of a polygon has 2 corners; it needs at least 3")),
         Damage::TextForNumber => (text, Err("a ring of a polygon is not a list of [x, y] positions")),
         Damage::NumberForRings => (text, Err("not a list")),

@@ -16,7 +16,7 @@ pub type Polygon = Vec<Ring>;
 /// Reads every polygon of a GeoJSON text.
 pub fn parse(bytes: &[u8]) -> Result<Vec<Polygon>, String> {
     let bytes = bytes.strip_prefix(b"\xef\xbb\xbf").unwrap_or(bytes);
-    let root: Value = serde_json::from_slice(bytes).map_err(|e| format!("is not GeoJSON: {e}"))?;
+    let root: Value = serde_json::from_slice(bytes).map_err(|e| format!("not GeoJSON: {e}"))?;
     let mut polygons = vec![];
     object(&root, &mut polygons)?;
     if polygons.is_empty() {
@@ -26,7 +26,7 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<Polygon>, String> {
 }
 
 fn object(value: &Value, polygons: &mut Vec<Polygon>) -> Result<(), String> {
-    let kind = value.get("type").and_then(Value::as_str).ok_or("is not GeoJSON: an object has no \"type\"")?;
+    let kind = value.get("type").and_then(Value::as_str).ok_or("not GeoJSON: an object has no \"type\"")?;
     match kind {
         "FeatureCollection" => list(value, "features")?.iter().try_for_each(|feature| object(feature, polygons)),
         "Feature" => match value.get("geometry") {
@@ -46,10 +46,7 @@ fn object(value: &Value, polygons: &mut Vec<Polygon>) -> Result<(), String> {
 }
 
 fn list<'a>(value: &'a Value, key: &str) -> Result<&'a Vec<Value>, String> {
-    value
-        .get(key)
-        .and_then(Value::as_array)
-        .ok_or_else(|| format!("is not GeoJSON: \"{key}\" is missing or not a list"))
+    value.get(key).and_then(Value::as_array).ok_or_else(|| format!("not GeoJSON: \"{key}\" is missing or not a list"))
 }
 
 fn rings(values: &[Value]) -> Result<Polygon, String> {

@@ -95,7 +95,7 @@ fn val_unusable_obstacles_are_refused() {
         ("{\"type\": \"Polygon\", \"coordinates\": [[]]}", "a ring of a polygon has 0 corners"),
         ("{\"type\": \"Point\", \"coordinates\": [1, 2]}", "contains a Point; only Polygon and MultiPolygon"),
         ("{\"a\": 1}", "has no \"type\""),
-        ("{no", "is not GeoJSON"),
+        ("{no", "not GeoJSON"),
     ] {
         let refusal = obstacles_of(text).unwrap_err();
         assert!(refusal.contains(words) && refusal.contains("obstacles.geojson"), "{refusal}");

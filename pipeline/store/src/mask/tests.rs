@@ -131,7 +131,7 @@ fn val_unusable_masks_are_refused() {
     let far = polygon_text("[[50, 50], [60, 50], [60, 60], [50, 50]]");
     let all = polygon_text("[[-1, -1], [9, -1], [9, 9], [-1, 9], [-1, -1]]");
     let refused = [
-        ("{", "is not GeoJSON"),
+        ("{", "not GeoJSON"),
         ("{\"a\": 1}", "has no \"type\""),
         ("{\"type\": \"Topology\"}", "contains a Topology"),
         (

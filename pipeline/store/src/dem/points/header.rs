@@ -146,7 +146,7 @@ impl DeclaredSize {
         let mut bytes = Vec::with_capacity(HEADER_BYTES);
         file.by_ref().take(HEADER_BYTES as u64).read_to_end(&mut bytes).map_err(|e| unreadable(&e))?;
         if !bytes.starts_with(SIGNATURE) {
-            return Err(Refusal::new("is not a LAS or LAZ file: it does not start with \"LASF\""));
+            return Err(Refusal::new("not a LAS or LAZ file: it does not start with \"LASF\""));
         }
         let mut header = Header([0; HEADER_BYTES]);
         header.0[..bytes.len()].copy_from_slice(&bytes);
