@@ -462,20 +462,20 @@ pub struct Fit {
     /// why a DEM could not be fitted.
     #[arg(long, value_name = "FILE")]
     pub table: Option<PathBuf>,
-    /// Window of the moving average that separates background from texture, m.
+    /// Window of the moving average that separates background from texture, m (2).
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub outer_scale: Option<f64>,
-    /// `corrected` for the effects of detrending and trimming, or as published in the `paper`.
+    /// `corrected` for the effects of detrending and trimming, or as published in the `paper` (`corrected`).
     #[arg(long, value_name = "corrected|paper")]
     pub mode: Option<String>,
-    /// Share of residuals to trim, both tails together.
+    /// Share of residuals to trim, both tails together (0.05).
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub trim: Option<f64>,
-    /// Covariance model, several separated by commas, or `auto`; the one with the best AICc is chosen. `empirical`: the measured
-    /// covariance itself.
+    /// Covariance model (`exponential`), several separated by commas, or `auto`; the one with the best AICc is chosen. `empirical`:
+    /// the measured covariance itself.
     #[arg(long, value_name = "MODEL,...")]
     pub model: Option<String>,
-    /// Number of bootstrap replicates for the confidence intervals; 0 for no intervals.
+    /// Number of bootstrap replicates for the confidence intervals (99); 0 for no intervals.
     #[arg(long, value_name = "N")]
     pub bootstrap: Option<u32>,
     /// Standard deviation of the DEM's white noise, m.
@@ -767,7 +767,7 @@ pub enum Obstacles {
 /// `traverse`.
 #[derive(Debug, Args)]
 pub struct Traverse {
-    /// Metric DEM, with cells small enough for the vehicle's wheels.
+    /// DEM with cells no larger than a wheel and room for the missions: 35 m, 5 m from every edge.
     pub dem: PathBuf,
     /// Vehicle (see `kinds`), or your own vehicle file (.toml with a table `parameters`).
     #[arg(long, value_name = "V", default_value = "husky_a200")]
