@@ -63,10 +63,10 @@ pub enum Verb {
     /// Merge shards into a release, byte for byte the same as an unsharded run.
     #[command(after_help = "Example:\n  sastrugi merge part1 part2 part3 -o release")]
     Merge(Merge),
-    /// Show how full a shared cache is, and remove what was not used for long.
+    /// Show the size of a shared cache, and remove entries unused for a long time.
     #[command(
-        after_help = "Safe beside running shards: they compute what disappears. Without a limit nothing is removed.\n\
-        With one, drafts that killed runs left more than a day ago go too.\n\n\
+        after_help = "Safe while shards run: they recompute what was removed. Without a limit nothing is removed;\n\
+        with one, drafts that killed runs left more than a day ago are removed too.\n\n\
         Examples:\n  sastrugi cache /scratch/cache\n  sastrugi cache /scratch/cache --max-age 30 --max-bytes 500G"
     )]
     Cache(Cache),
@@ -350,7 +350,7 @@ pub struct Cache {
     /// Remove the longest unused entries until the rest is no larger, such as 500G.
     #[arg(long, value_name = "BYTES")]
     pub max_bytes: Option<String>,
-    /// Remove entries that were not used for this time, days.
+    /// Remove entries unused for more than this many days.
     #[arg(long, value_name = "DAYS", allow_negative_numbers = true)]
     pub max_age: Option<f64>,
 }
