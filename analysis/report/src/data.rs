@@ -386,7 +386,7 @@ mod tests {
         assert_eq!(plain(vec![&one, &two], |_| false), [&1, &2]);
     }
 
-    /// A variant belongs to the run whose id it extends after a hyphen, the longest of several; other ids are no runs.
+    /// A variant belongs to the run whose id it extends after a hyphen, the longest of several; other ids are not runs.
     #[test]
     fn val_variants_belong_to_their_run() {
         let missions = crate::tests::made_up::full(1, 24).missions;

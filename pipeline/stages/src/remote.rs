@@ -1,7 +1,7 @@
 //! Releases in an object store, `s3://bucket/prefix`.
 //!
 //! A release is assembled in the work area and then uploaded: its content first, then the checksums, the manifest last. Without a manifest
-//! there is no release, so an interrupted upload never looks like one; the next one goes on with it. Nothing that is there is overwritten:
+//! there is no release, so an interrupted upload never looks like one; the next upload resumes it. Nothing that exists is overwritten:
 //! objects with the same bytes are kept, others are refused.
 
 use crate::error::Error;
@@ -177,7 +177,7 @@ mod tests {
         assert_eq!((report.problems, report.files), (Vec::new(), 3));
     }
 
-    /// An upload that was interrupted has no manifest. The same release goes on with it; another one does not overwrite it.
+    /// An upload that was interrupted has no manifest. The same release resumes it; another release does not overwrite it.
     #[test]
     fn val_an_interrupted_upload_is_continued() {
         let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());

@@ -94,7 +94,7 @@ pub fn run(loaded: &Loaded, request: &RunRequest<'_>, progress: &dyn Progress) -
 /// The same with a shared cache: items that it has are copied, all others are published to it.
 ///
 /// # Errors
-/// As [`run`]. A cache that fails is no error; see [`RunSummary::cache`].
+/// As [`run`]. A cache that fails is not an error; see [`RunSummary::cache`].
 pub fn run_sharing(
     loaded: &Loaded,
     request: &RunRequest<'_>,

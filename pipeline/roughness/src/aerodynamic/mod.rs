@@ -41,7 +41,7 @@
 //!   Res. Earth Surf. 121, 748-766), including those below the mean level and sheltered ones.
 //! * sigma_d and the zero level are those of the surface, not of each profile, so that short pieces of profile between holes
 //!   are weighted by their length. Upcrossings and downcrossings are averaged: opposite winds get the same f.
-//! * Profiles run along the wind, so that a row describes what the wind meets. Field profiles are often laid across the wind:
+//! * Profiles run along the wind, so that a row describes what the wind meets. Field profiles are often taken across the wind:
 //!   their value is in the row 90 degrees on.
 //! * A continuous surface has no plan area of obstacles. lambda_p is set to lambda_f, as it is for cubes, and h to h*; drag
 //!   models of ice use one density for both (after van Tiggelen et al. 2021, The Cryosphere 15, 2601,

@@ -1,4 +1,4 @@
-//! Comparison with the paper's trials: does its one world lie in the prediction band for one world of ours?
+//! Comparison with the paper's trials: does its one world lie in the prediction band for one further simulated world?
 
 use super::sets::{Estimate, Set};
 use super::worlds::{PRINTED, Quantity};
@@ -62,9 +62,9 @@ pub fn blocks(data: &Data, sets: &[Set]) -> Vec<Block> {
     blocks.extend(verdict(&rows).map(Block::Text));
     blocks.extend(known.iter().filter_map(|(set, trial)| difference(set, trial)).map(Block::Warning));
     blocks.push(Block::Text(format!(
-        "The paper ({title}) drove its rovers on one world. Worlds differ, so its values are compared with those of one world of ours: the band holds the value of one \
+        "The paper ({title}) drove its rovers on one world. Worlds differ, so its values are compared with those of one simulated world: the band holds the value of one \
          more world with {} % probability (Student's prediction interval of the worlds' logarithms). The interval of our own value is that of the mean over worlds, \
-         which is narrower. The flight code was not available: agreement shows that such a rover behaves alike, not that it is the same one. Nothing was \
+         which is narrower. The flight code was not available: agreement shows that such a rover behaves similarly, not that it is the same rover. Nothing was \
          tuned to these values.",
         set_number::fixed(100.0 * LEVEL, 0)
     )));
@@ -87,7 +87,7 @@ fn verdict(rows: &[Row]) -> Option<String> {
     let inside = known.iter().filter(|i| **i).count();
     (!known.is_empty()).then(|| {
         format!(
-            "{} of {} published values lie{} in the band of one world of ours.",
+            "{} of {} published values lie{} in the band of one simulated world.",
             if inside == 0 { "None".into() } else { set_number::count(inside) },
             set_number::count(known.len()),
             if inside < 2 { "s" } else { "" }
