@@ -403,7 +403,7 @@ pub struct Terrain {
     /// Seed of the random streams.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// DEM to write; its extension selects the format.
+    /// Heightfield to write; its extension selects the format.
     #[arg(short, long, value_name = "DEM")]
     pub output: PathBuf,
     /// How the DEM is written.
@@ -609,7 +609,7 @@ pub struct Texture {
     /// Set any other parameter of the method (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
-    /// DEM to write.
+    /// Heightfield to write; its extension selects the format.
     #[arg(short, long, value_name = "DEM")]
     pub output: PathBuf,
     /// How the DEM is written.
