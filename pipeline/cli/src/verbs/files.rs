@@ -160,6 +160,7 @@ pub fn hillshade(args: &args::Hillshade, common: &Common) -> Verdict {
 pub fn info(args: &Info, common: &Common) -> Verdict {
     let extension = args.path.extension().and_then(|e| e.to_str()).unwrap_or_default().to_ascii_lowercase();
     let result = match extension.as_str() {
+        _ if !args.path.exists() => return Err(Failure::input(format!("{}: no such file", args.path.display()))),
         _ if args.path.join(mcap::BAG).is_file() => mcap::describe_bag(&args.path).map_err(Failure::input)?,
         _ if args.path.is_dir() => release(&args.path)?,
         "mcap" => mcap::describe_file(&args.path).map_err(Failure::input)?,
