@@ -142,6 +142,6 @@ fn check_holes(grid: &Grid) -> Result<(), Refusal> {
     if holes == 0 {
         return Ok(());
     }
-    let advice = "fill them (`sastrugi texture FIT.json --fill DEM`) or cut a window without them";
+    let advice = "fill them (`sastrugi texture FIT.json --fill DEM -o OUT.tif`) or cut a window without them";
     Err(Refusal::new(format!("{holes} cells hold no data, but a height map cannot have holes; {advice}")))
 }
