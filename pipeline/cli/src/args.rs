@@ -462,7 +462,7 @@ pub struct Fit {
     /// why a DEM could not be fitted.
     #[arg(long, value_name = "FILE")]
     pub table: Option<PathBuf>,
-    /// Window of the moving average that separates background from texture, m (2).
+    /// Window of the moving average that separates background from residual, m (2).
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub outer_scale: Option<f64>,
     /// `corrected` for the effects of detrending and trimming, or as published in the `paper` (`corrected`).
@@ -945,7 +945,7 @@ pub struct Compare {
     /// and shares).
     #[arg(long, value_name = "SHARE", allow_negative_numbers = true)]
     pub margin: Option<f64>,
-    /// Window of the moving average that separates background from texture, m.
+    /// Window of the moving average that separates background from residual, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub outer_scale: Option<f64>,
     /// Covariance model fitted to both; a model of one term.
