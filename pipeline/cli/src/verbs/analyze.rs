@@ -105,7 +105,7 @@ fn text(judged: &Judged) -> String {
         rows.push(plain("on class semi", 100.0 * row.share_semi, "%"));
         rows.push(plain("on class high", 100.0 * row.share_high, "%"));
     }
-    let how = if row.resampled { "interpolated at" } else { "sampled at" };
+    let how = if row.resampled { "interpolated at" } else { "at" };
     let mut text = format!(
         "{}: {} ({}), {} samples {how} {} Hz\n{}",
         row.log_id,
