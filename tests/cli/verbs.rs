@@ -16,6 +16,24 @@ fn ok_json(folder: &Path, arguments: &[&str]) -> Value {
     serde_json::from_str(&ok(folder, &all)).unwrap()
 }
 
+/// A release of another study is replaced only on request.
+#[test]
+fn val_a_release_of_another_study_is_kept() {
+    let folder = area();
+    write(folder.path(), "one.toml", &small_study());
+    write(folder.path(), "other.toml", &small_study().replacen("name = \"", "name = \"other-", 1));
+    let run = |arguments: &[&str]| sastrugi_in(folder.path(), &[arguments, &["-o", "release", "--quiet"]].concat());
+    assert_eq!(run(&["run", "one.toml"]).code, 0);
+    let before = sums(&folder.path().join("release"));
+    let refused = run(&["run", "other.toml"]);
+    assert_eq!(refused.code, 2, "{}", refused.stderr);
+    assert!(refused.stderr.contains("release is a release of the study `"), "{}", refused.stderr);
+    assert_eq!(sums(&folder.path().join("release")), before);
+    assert_eq!(run(&["run", "one.toml"]).code, 0);
+    assert_eq!(run(&["run", "other.toml", "--replace"]).code, 0);
+    assert_ne!(sums(&folder.path().join("release")), before);
+}
+
 #[test]
 fn val_kinds_and_schemas_are_complete() {
     let folder = area();

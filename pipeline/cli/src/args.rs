@@ -317,7 +317,7 @@ pub struct Run {
     /// Read the shared cache without writing to it.
     #[arg(long, requires = "cache", conflicts_with = "ancestors")]
     pub cache_read_only: bool,
-    /// Replace an existing release of this study even if it has fewer failed items than the new one.
+    /// Also replace a release of another study, or one with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Limit on the working memory of concurrent items, GiB; items that need more are refused. Default: 4, and larger items run alone.
@@ -364,7 +364,7 @@ pub struct Merge {
     /// Release: a folder, or s3://BUCKET/PREFIX.
     #[arg(short, long, value_name = "DIR|s3://...", default_value = "release")]
     pub output: PathBuf,
-    /// Replace an existing release of this study even if it has fewer failed items than the new one.
+    /// Also replace a release of another study, or one with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
 }
@@ -778,7 +778,7 @@ pub struct Traverse {
     /// Number of starts per mission: the drawn one and perturbed ones, to estimate the probability of success.
     #[arg(long, value_name = "N")]
     pub replicates: Option<u32>,
-    /// Replace an existing release of this study even if it has fewer failed items than the new one.
+    /// Also replace a release of another study, or one with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Seed of the random streams.
@@ -830,7 +830,7 @@ pub struct Navigate {
     /// Set a parameter of the team (see `kinds`), `name=value`.
     #[arg(long = "team", value_name = "K=V", requires = "formation")]
     pub team: Vec<String>,
-    /// Replace an existing release of this route even if it has fewer failed items than the new one.
+    /// Also replace a release of another study, or one with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Date of the release.
@@ -855,7 +855,7 @@ pub struct Rover {
     /// Release folder and work area.
     #[command(flatten)]
     pub place: Place,
-    /// Replace an existing release of these rovers even if it has fewer failed items than the new one.
+    /// Also replace a release of another study, or one with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Limit on the working memory of concurrent items, GiB; items that need more are refused. Default: 4, and larger items run alone.

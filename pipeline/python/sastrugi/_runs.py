@@ -36,7 +36,7 @@ def run(
 
     output: folder of the release.
     work: work area; by default the output's name with `.work`.
-    replace: also replace a release of the same study that has fewer failed items.
+    replace: also replace a release of another study, or one with fewer failed items.
     progress: called as `progress(done, total, what)` on this thread; what it raises ends the run.
 
     Items that failed are listed in `release.summary["failures"]`. Doubts about the study are issued as warnings. On Ctrl-C no further item starts;

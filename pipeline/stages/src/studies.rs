@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::jobs::{fit, original};
 use crate::loaded::{Loaded, load_text};
 use crate::registry;
-use crate::runner::assemble::{Contents, assemble};
+use crate::runner::assemble::{Contents, assemble, check_other_study};
 use crate::runner::cache::Cache;
 use crate::runner::division::{Division, common_ancestors, divide};
 use crate::runner::execute::{Execution, Failure, Limits, execute};
@@ -32,7 +32,7 @@ pub struct RunRequest<'a> {
     pub part: Option<Part>,
     /// The stage whose results are wanted; without any of them no release is written.
     pub purpose: Option<&'static str>,
-    /// Whether to replace a release of the same study that has fewer failed items.
+    /// Whether to replace a release of another study, or one of the same study that has fewer failed items.
     pub replace: bool,
     /// Limits.
     pub limits: Limits,
@@ -101,7 +101,7 @@ pub fn run_sharing(
     sharing: Option<Sharing>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, Error> {
-    check_destination(request)?;
+    check_destination(&loaded.study, request)?;
     let work = request.work.map_or_else(|| default_work(request.output), Path::to_owned);
     let cache = Cache::open(&work)?.sharing(sharing);
     let graph = &loaded.graph;
@@ -217,7 +217,7 @@ fn is_worth_a_release(stage: &str, purpose: Option<&str>) -> bool {
 }
 
 /// Refuses a foreign destination before any work is done.
-fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
+fn check_destination(study: &Study, request: &RunRequest<'_>) -> Result<(), Error> {
     let ours = if request.part.is_some() { release::SHARD } else { release::MANIFEST };
     match fs::read_dir(request.output).map(|mut entries| entries.next().is_some()) {
         Ok(true) if !request.output.join(ours).is_file() => {
@@ -230,6 +230,9 @@ fn check_destination(request: &RunRequest<'_>) -> Result<(), Error> {
         }
         _ => Ok(()),
     }?;
+    if request.part.is_none() {
+        check_other_study(study, request.output, request.replace)?;
+    }
     let inside = request.work.is_some_and(|work| resolved(work).starts_with(resolved(request.output)));
     if inside {
         return Err(Error::Usage(
@@ -426,12 +429,15 @@ mod tests {
         fs::write(path("release").join(release::MANIFEST), "").unwrap();
         fs::write(path("shard").join(release::SHARD), "").unwrap();
         let limits = Limits { workers: 1, memory_bytes: 1 << 20, beyond: true };
+        let text =
+            "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"a\"\nkind = \"mavs\"\n";
+        let study = Study::parse(text, Path::new(""), &registry::section_names()).unwrap();
         let check = |output: &str, work: Option<&str>, part: Option<&str>| {
             let (output, work) = (path(output), work.map(path));
             let part = part.map(|text| Part::parse(text).unwrap());
             let request =
                 RunRequest { output: &output, work: work.as_deref(), part, purpose: None, replace: false, limits };
-            check_destination(&request).err().map(|e| e.to_string()).unwrap_or_default()
+            check_destination(&study, &request).err().map(|e| e.to_string()).unwrap_or_default()
         };
         for name in ["empty", "new", "release"] {
             assert_eq!(check(name, None, None), "", "{name}");

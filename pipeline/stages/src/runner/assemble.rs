@@ -32,14 +32,14 @@ pub struct Contents<'a> {
     pub results: Vec<PathBuf>,
     /// Items without a result.
     pub failures: &'a [Failure],
-    /// Whether a release of the same study may be replaced even if it has fewer failed items than this one.
+    /// Whether a release of another study, or one of the same study with fewer failed items, may be replaced.
     pub replace: bool,
 }
 
 /// Assembles and seals a release.
 ///
 /// # Errors
-/// A destination that is not a sastrugi release or has fewer failed items of the same study, results that cannot be read, or an I/O error.
+/// A destination that is not a sastrugi release, is one of another study, or has fewer failed items of the same study, results that cannot be read, or an I/O error.
 pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
     let mut sources = Sources::of(contents.study)?;
     let _lock = DestinationLock::take(dest)?;
@@ -95,8 +95,9 @@ impl Drop for DestinationLock {
 }
 
 impl Contents<'_> {
-    /// Refuses to replace a release of the same study by one with more failed items.
+    /// Refuses to replace a release of another study, or one of the same study by one with more failed items.
     fn check_replaced(&self, dest: &Path) -> Result<(), Error> {
+        check_other_study(self.study, dest, self.replace)?;
         let Ok(there) = Release::open(dest) else { return Ok(()) };
         let (before, now) = (there.manifest().failed.len(), self.failures.len());
         let same = there.manifest().study_sha256 == sastrugi_store::digest::of_text(self.text);
@@ -104,6 +105,21 @@ impl Contents<'_> {
             true => Err(fewer_items(dest, before, now)),
             false => Ok(()),
         }
+    }
+}
+
+/// Refuses a destination with a release of another study, by name, unless it may be replaced.
+///
+/// # Errors
+/// Such a destination.
+pub fn check_other_study(study: &Study, dest: &Path, replace: bool) -> Result<(), Error> {
+    match Release::open(dest) {
+        Ok(there) if there.manifest().name != study.head.name && !replace => Err(Error::Usage(format!(
+            "{} is a release of the study `{}`; choose another folder with -o, or use --replace to replace it",
+            dest.display(),
+            there.manifest().name
+        ))),
+        _ => Ok(()),
     }
 }
 
