@@ -27,7 +27,7 @@ const SELF_AFFINE_RANGES: [f64; 2] = [16.0, 4.0];
 
 /// Size of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(untagged)]
+#[serde(untagged, expecting = "must be a number, or two numbers: east-west and north-south, m")]
 pub enum Cell {
     /// The same in both directions, m.
     Square(f64),
