@@ -163,7 +163,8 @@ fn used(tally: &Tally) -> String {
     let published = if *read_only { "only read".to_owned() } else { format!("{published} published to it") };
     let mut text = format!("\n  shared cache: {fetched} items copied from it, {published}");
     if !damaged.is_empty() {
-        text.push_str(&format!(", {} entries were damaged and replaced", damaged.len()));
+        let outcome = if *read_only { "computed" } else { "replaced" };
+        text.push_str(&format!(", damaged and {outcome}: {}", damaged.len()));
     }
     problems.iter().take(NOTES_MAX).for_each(|problem| text.push_str(&format!("\n  shared cache: {problem}")));
     text
