@@ -388,6 +388,9 @@ fn val_merge_refuses_what_does_not_fit() {
     shard("study.toml", "1/2", "a");
     shard("study.toml", "2/2", "b");
     shard("other.toml", "2/2", "c");
+    // A complete shard is replaced by no other.
+    let call = sastrugi_in(path, &["run", "study.toml", "--shard", "2/2", "-o", "a", "--quiet"]);
+    assert!(call.code == 2 && call.stderr.contains("a is shard 1 of 2; choose another folder"), "{}", call.stderr);
     let refused = |shards: &[&str], words: &str| {
         let mut all = vec!["merge"];
         all.extend(shards);

@@ -317,7 +317,7 @@ pub struct Run {
     /// Read the shared cache without writing to it.
     #[arg(long, requires = "cache", conflicts_with = "ancestors")]
     pub cache_read_only: bool,
-    /// Also replace a release of another study, or one with fewer failed items than the new one.
+    /// Also replace a release or shard of another study, another shard, or one with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Limit on the working memory of concurrent items, GiB; items that need more are refused. Default: 4, and larger items run alone.

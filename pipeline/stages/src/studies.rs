@@ -32,7 +32,7 @@ pub struct RunRequest<'a> {
     pub part: Option<Part>,
     /// The stage whose results are wanted; without any of them no release is written.
     pub purpose: Option<&'static str>,
-    /// Whether to replace a release of another study, or one of the same study that has fewer failed items.
+    /// Whether to replace a release or shard of another study, another shard, or the same with fewer failed items.
     pub replace: bool,
     /// Limits.
     pub limits: Limits,
@@ -230,8 +230,9 @@ fn check_destination(study: &Study, request: &RunRequest<'_>) -> Result<(), Erro
         }
         _ => Ok(()),
     }?;
-    if request.part.is_none() {
-        check_other_study(study, request.output, request.replace)?;
+    match request.part {
+        Some(part) => shard::check_destination(study, request.output, part, request.replace)?,
+        None => check_other_study(study, request.output, request.replace)?,
     }
     let inside = request.work.is_some_and(|work| resolved(work).starts_with(resolved(request.output)));
     if inside {
@@ -427,10 +428,12 @@ mod tests {
             fs::write(path(name), "precious").unwrap();
         }
         fs::write(path("release").join(release::MANIFEST), "").unwrap();
-        fs::write(path("shard").join(release::SHARD), "").unwrap();
+        let description = r#"{ "part": { "index": 1, "count": 2 }, "program": "sastrugi", "study_sha256": "", "items": [], "failures": [] }"#;
+        fs::write(path("shard").join(release::SHARD), description).unwrap();
         let limits = Limits { workers: 1, memory_bytes: 1 << 20, beyond: true };
         let text =
             "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"a\"\nkind = \"mavs\"\n";
+        fs::write(path("shard/study.toml"), text).unwrap();
         let study = Study::parse(text, Path::new(""), &registry::section_names()).unwrap();
         let check = |output: &str, work: Option<&str>, part: Option<&str>| {
             let (output, work) = (path(output), work.map(path));
@@ -443,6 +446,16 @@ mod tests {
             assert_eq!(check(name, None, None), "", "{name}");
         }
         assert_eq!(check("shard", None, Some("1/2")), "");
+        for other in ["2/2", "1/3"] {
+            assert!(
+                check("shard", None, Some(other)).contains("is shard 1 of 2; choose another folder with -o"),
+                "{other}"
+            );
+        }
+        fs::write(path("shard/study.toml"), text.replace("\"x\"", "\"y\"")).unwrap();
+        assert!(check("shard", None, Some("1/2")).contains("is a shard of the study `y`; choose another folder"));
+        fs::write(path("shard").join(release::SHARD), "{}").unwrap();
+        assert!(check("shard", None, Some("1/2")).contains("is neither empty nor a sastrugi shard"));
         assert!(check("release", None, Some("1/2")).contains("is not empty and not a sastrugi shard"));
         assert!(check("shard", None, None).contains("is not empty and not a sastrugi release"));
         assert!(check("foreign", None, None).contains("is not empty"));

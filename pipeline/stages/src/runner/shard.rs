@@ -11,6 +11,8 @@ use crate::error::Error;
 use crate::job::ItemRef;
 use crate::loaded::Loaded;
 use crate::splits::Splits;
+use crate::studies::head_of;
+use crate::study::Study;
 use sastrugi_store::release::{Staging, check_path};
 use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
@@ -99,7 +101,7 @@ pub fn all_items(graph: &Graph) -> Vec<(ItemRef, String)> {
 /// Writes the folder of a shard, completely or not at all.
 ///
 /// # Errors
-/// A folder that is neither empty nor a shard, or an I/O error.
+/// As [`check_destination`]; the same shard with fewer failed items, unless it may be replaced; an I/O error.
 pub fn write(
     target: &Path,
     loaded: &Loaded,
@@ -109,8 +111,9 @@ pub fn write(
     replace: bool,
 ) -> Result<(), Error> {
     let (graph, study) = (&loaded.graph, loaded.released.as_str());
-    let replaced = occupant(target)?;
     let _lock = DestinationLock::take(target)?;
+    let replaced = occupant(target)?;
+    check_occupant(replaced.as_ref(), &loaded.study, target, part, replace)?;
     let staging = Staging::beside(target)?;
     let own: Vec<usize> = (0..graph.len()).filter(|&p| part.owns(graph.key(p))).collect();
     for &position in &own {
@@ -161,6 +164,35 @@ impl Description {
         let same = self.study_sha256 == other.study_sha256 && self.part == other.part;
         same && self.failures.len() < other.failures.len()
     }
+}
+
+/// Refuses a destination that is neither empty nor a shard, or, unless it may be replaced, another shard or a shard of another study.
+///
+/// # Errors
+/// Such a destination.
+pub fn check_destination(study: &Study, target: &Path, part: Part, replace: bool) -> Result<(), Error> {
+    check_occupant(occupant(target)?.as_ref(), study, target, part, replace)
+}
+
+fn check_occupant(
+    there: Option<&Description>,
+    study: &Study,
+    target: &Path,
+    part: Part,
+    replace: bool,
+) -> Result<(), Error> {
+    let Some(there) = there.filter(|_| !replace) else { return Ok(()) };
+    let Part { index, count } = there.part;
+    let name = head_of(target).map(|head| head.name).unwrap_or_default();
+    let what = if there.part != part {
+        format!("shard {index} of {count}")
+    } else if name != study.head.name {
+        format!("a shard of the study `{name}`")
+    } else {
+        return Ok(());
+    };
+    let advice = "choose another folder with -o, or use --replace to replace it";
+    Err(Error::Usage(format!("{} is {what}; {advice}", target.display())))
 }
 
 /// The shard that already exists at the target.
