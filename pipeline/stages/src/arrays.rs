@@ -31,6 +31,7 @@
 
 use crate::error::Error;
 use crate::jobs::{fit as fits, texture as textures};
+use crate::memory;
 use crate::operations::coregistration::{IN_DEGREES, check_systems, verdict};
 use crate::operations::inputs::Loaded;
 use crate::verbs::fit::settings;
@@ -107,7 +108,7 @@ pub struct Generated {
 /// Generates a terrain. A name of an input in the parameters stands for a raster of `inputs`, or else for a file.
 ///
 /// # Errors
-/// Unknown kinds and parameters, parameters out of range, inputs that cannot be used.
+/// Unknown kinds and parameters, parameters out of range, inputs that cannot be used, too little memory.
 pub fn terrain(
     kind: &str,
     parameters: &Value,
@@ -128,11 +129,15 @@ pub fn terrain(
 /// Fits the covariance of heights.
 ///
 /// # Errors
-/// Unknown parameters; heights in degrees, or that cannot be fitted.
+/// Unknown parameters; heights in degrees, or that cannot be fitted; too little memory.
 pub fn fit(heights: &Raster, parameters: &Value, seed: u64) -> Result<FitFile, Error> {
     let settings = settings(parameters)?;
     let streams = Streams::for_seed(seed, fits::STAGE);
-    Ok(sastrugi_texture::fit(heights.metric(DEGREES)?, &settings, &streams)?.fit)
+    let heights = heights.metric(DEGREES)?;
+    let [east, north] = heights.geometry.cell;
+    let (cells, threads) = (heights.values.len() as u64, rayon::current_num_threads() as u64);
+    memory::check("the fit", settings.memory_bytes(cells, Some(east.min(north)), threads))?;
+    Ok(sastrugi_texture::fit(heights, &settings, &streams)?.fit)
 }
 
 /// A synthesised texture.
@@ -148,13 +153,14 @@ pub struct Textured {
 /// Synthesises a texture with the covariance of a fit.
 ///
 /// # Errors
-/// Unknown methods and parameters, a fit that cannot be used.
+/// Unknown methods and parameters, a fit that cannot be used, too little memory.
 pub fn texture(fit: &FitFile, method: &str, parameters: &Value, seed: u64) -> Result<Textured, Error> {
     if let Some(known) = textures::kinds().iter().find(|k| k.kind == method) {
         parameters::check(parameters, known)?;
     }
     let synthesis = sastrugi_texture::prepare(method, parameters, fit)?;
     let notes = sastrugi_texture::fit_notes(fit).into_iter().chain(synthesis.notes()).collect();
+    memory::check("the texture", synthesis.cost().memory_bytes)?;
     let streams = Streams::for_seed(seed, textures::STAGE);
     let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
     let heights = Raster { grid: outcome.grid, crs: Crs::default() };

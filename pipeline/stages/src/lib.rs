@@ -69,6 +69,7 @@ pub mod job;
 pub mod jobs;
 pub mod loaded;
 mod machine;
+mod memory;
 pub mod operations;
 pub mod packing;
 pub mod registry;

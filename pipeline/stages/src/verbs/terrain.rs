@@ -4,6 +4,7 @@ use super::parameters;
 use crate::arrays::Raster;
 use crate::error::Error;
 use crate::jobs::terrain::STAGE;
+use crate::memory;
 use crate::operations::inputs::{self, Loaded};
 use crate::operations::terrains::{generate, values_of, write_png16};
 use sastrugi_numeric::Streams;
@@ -31,7 +32,7 @@ pub struct Request<'a> {
 /// Returns a description of the result.
 ///
 /// # Errors
-/// Unknown kinds and parameters, parameters out of range, files that cannot be written.
+/// Unknown kinds and parameters, parameters out of range, too little memory, files that cannot be written.
 pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     let prepared = prepare(request.spec, request.set, request.seed)?;
     super::check_output(request.output)?;
@@ -101,6 +102,7 @@ impl Prepared {
 
     /// The same; inputs that are not `given` are files.
     pub(crate) fn make_from(&self, given: &Given<'_>) -> Result<(Terrain, Crs), Error> {
+        memory::check("the terrain", self.generator.memory_bytes())?;
         let (inputs, crs) = read_inputs(self.generator.as_ref(), given)?;
         Ok((generate(self.generator.as_ref(), &self.streams, &inputs)?, crs))
     }

@@ -3,6 +3,7 @@
 use super::parameters;
 use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds};
+use crate::memory;
 use crate::operations::textures::{fill_note, has_its_texture, lay_onto, scaled};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::Streams;
@@ -63,7 +64,7 @@ fn is_fitted_dem(path: &Path, fit: &FitFile) -> bool {
 /// background of a fit.
 ///
 /// # Errors
-/// Unknown methods and parameters, an unusable fit file or base, a file that cannot be written.
+/// Unknown methods and parameters, an unusable fit file or base, too little memory, a file that cannot be written.
 pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     if let Some(known) = kinds().iter().find(|k| k.kind == request.method) {
         parameters::check(&request.parameters, known)?;
@@ -89,6 +90,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     }
     let synthesis = sastrugi_texture::prepare(request.method, &parameters, &fit)?;
     super::check_output(request.output)?;
+    memory::check("the texture", synthesis.cost().memory_bytes)?;
     let streams = Streams::for_seed(request.seed, STAGE);
     let mut notes = sastrugi_texture::fit_notes(&fit);
     notes.extend(synthesis.notes());

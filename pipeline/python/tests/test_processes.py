@@ -1,0 +1,35 @@
+"""What happens at the limits of a process: too little memory, and forks."""
+
+import subprocess
+import sys
+
+PRELUDE = """
+import resource, sastrugi
+def refusal(call):
+    try:
+        call()
+    except sastrugi.SastrugiError as error:
+        return f"{error.code} {error}"
+"""
+
+
+def said(code):
+    """What a Python process of its own prints; fails if it does not end in order within a minute."""
+    done = subprocess.run([sys.executable, "-c", PRELUDE + code], capture_output=True, text=True, timeout=60)
+    assert done.returncode == 0, f"{done.returncode}: {done.stderr}"
+    return done.stdout
+
+
+def test_too_little_memory_is_an_exception():
+    """The process lives on and can make something smaller."""
+    found = said("""
+resource.setrlimit(resource.RLIMIT_AS, (3 << 30, 3 << 30))
+snow = sastrugi.Fit({"model": "exponential", "parameters": {"sigma_m": 0.03, "range_m": 0.28}})
+print(refusal(lambda: sastrugi.terrain("multifractal", size_px=[16000, 16000])))
+print(refusal(lambda: snow.texture(1600.0, 0.1)))
+print(sastrugi.terrain("multifractal", size_px=[90, 70]).shape)
+""")
+    terrain, texture, shape = found.splitlines()
+    assert terrain.startswith("75 the terrain needs about ") and "GiB are available" in terrain
+    assert texture.startswith("75 the texture needs about ")
+    assert shape == "(70, 90)"
