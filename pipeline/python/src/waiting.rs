@@ -3,14 +3,15 @@
 //! Kernels cannot be stopped in the middle. On Ctrl-C the caller gets its `KeyboardInterrupt` after a moment at most; a run starts no further
 //! item, and what was begun ends in the background without effect (files appear only when they are complete).
 
-use crate::errors::refused;
+use crate::errors::{refused, usage};
 use pyo3::prelude::*;
 use sastrugi_stages::Error;
 use sastrugi_stages::job::ItemRef;
 use sastrugi_stages::runner::progress::{End, Progress};
-use std::sync::Arc;
+use std::process;
 use std::sync::atomic::{AtomicBool, AtomicUsize, Ordering};
 use std::sync::mpsc::{Receiver, RecvTimeoutError, Sender, channel};
+use std::sync::{Arc, OnceLock};
 use std::thread::{Builder, JoinHandle};
 use std::time::{Duration, Instant};
 
@@ -63,6 +64,20 @@ impl Progress for Watched {
     }
 }
 
+/// The process that has begun to compute: the threads that work is divided among belong to it.
+static COMPUTING: OnceLock<u32> = OnceLock::new();
+
+/// Refuses work in a process that was forked from one that had begun to compute: it would wait for threads that a fork does not copy.
+fn check_process() -> PyResult<()> {
+    let own = process::id();
+    if *COMPUTING.get_or_init(|| own) == own {
+        return Ok(());
+    }
+    Err(usage(
+        "this process was forked from one that had used sastrugi, and a fork does not copy the threads that compute; use the start method `spawn`",
+    ))
+}
+
 /// Does work that does not tell how far it is.
 pub fn waited<T: Send + 'static>(
     py: Python<'_>,
@@ -77,6 +92,7 @@ pub fn watched<T: Send + 'static>(
     progress: Option<&Bound<'_, PyAny>>,
     work: impl FnOnce(&Watched) -> Result<T, Error> + Send + 'static,
 ) -> PyResult<T> {
+    check_process()?;
     let (steps, told) = channel();
     let cancelled = Arc::new(AtomicBool::new(false));
     let listener =

@@ -33,3 +33,23 @@ print(sastrugi.terrain("multifractal", size_px=[90, 70]).shape)
     assert terrain.startswith("75 the terrain needs about ") and "GiB are available" in terrain
     assert texture.startswith("75 the texture needs about ")
     assert shape == "(70, 90)"
+
+
+FORKED = """
+import os
+def make():
+    return sastrugi.terrain("multifractal", size_px=[90, 70])
+def forked():
+    child = os.fork()
+    if child == 0:
+        print(refusal(make), flush=True)
+        os._exit(0)
+    os.waitpid(child, 0)
+"""
+
+
+def test_forks_of_a_process_that_has_computed_are_refused():
+    """They would wait for threads that a fork does not copy. A fork of one that has not computed yet has threads of its own."""
+    before, after = said(FORKED + "forked()\nmake()\nforked()\n").splitlines()
+    assert before == "None"
+    assert after.startswith("2 this process was forked from one that had used sastrugi") and "`spawn`" in after
