@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._errors import SastrugiError
-from ._values import USAGE, numbers, optional, pair
+from ._values import USAGE, heights, numbers, optional, pair
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -24,7 +24,7 @@ class Heightfield:
     Row 0 is north: `values[row, column]` is the height at (`x[column]`, `y[row]`), where `x` increases eastwards with the column and `y`
     decreases southwards with the row. A value belongs to the centre of its cell. Holes are NaN.
 
-    values: array (rows, columns) of float64, m.
+    values: array (rows, columns) of float64, m; cells that a mask (`numpy.ma`) hides become NaN.
     cell: size of a cell east-west and north-south, m.
     origin: south-west corner of the south-west cell (x, y), m.
     crs: coordinate system that a file stated, passed on to files; None for a local plane.
@@ -41,9 +41,9 @@ class Heightfield:
     1.5
     """
 
-    __slots__ = ("values", "cell", "origin", "crs", "maps", "notes")
+    __slots__ = ("_values", "cell", "origin", "crs", "maps", "notes")
 
-    values: npt.NDArray[np.float64]
+    _values: npt.NDArray[np.float64]
     cell: tuple[float, float]
     origin: tuple[float, float]
     crs: _native.Crs | None
@@ -60,9 +60,7 @@ class Heightfield:
         maps: Mapping[str, npt.NDArray[np.float64]] | None = None,
         notes: Sequence[str] = (),
     ) -> None:
-        self.values = np.asarray(values, dtype=np.float64)
-        if self.values.ndim != 2:
-            raise SastrugiError(f"heights must be an array (rows, columns), got {self.values.ndim} dimensions", USAGE)
+        self._values = heights(values)
         self.cell = pair("cell", cell)
         self.origin = pair("origin", origin)
         self.crs = crs
@@ -103,6 +101,15 @@ class Heightfield:
                [ 3.,  4.]])
         """
         return tuple(_native.write(self, os.fspath(path), compress, cog))
+
+    @property
+    def values(self) -> npt.NDArray[np.float64]:
+        """The heights, m. Other arrays of two dimensions may be assigned."""
+        return self._values
+
+    @values.setter
+    def values(self, values: npt.NDArray[np.float64]) -> None:
+        self._values = heights(values)
 
     @property
     def shape(self) -> tuple[int, int]:

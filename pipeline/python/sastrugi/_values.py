@@ -10,6 +10,7 @@ from types import ModuleType
 from typing import Any
 
 import numpy as np
+import numpy.typing as npt
 
 from ._errors import SastrugiError
 
@@ -34,6 +35,31 @@ def _plain(value: Any) -> Any:
     if isinstance(value, os.PathLike):
         return os.fspath(value)
     raise TypeError(f"{value!r} has the type {type(value).__name__}")
+
+
+def heights(values: Any) -> npt.NDArray[np.float64]:
+    """Heights as an array (rows, columns) of float64; what a mask hides is NaN."""
+    try:
+        given = values if isinstance(values, np.ndarray) else np.asarray(values)
+        # Text would be read, and of complex numbers the imaginary part dropped.
+        real = given.dtype.kind in "biufO"
+        found = given.astype(np.float64, copy=False) if real else None
+    except (TypeError, ValueError):
+        found = None
+    if found is None:
+        raise SastrugiError(f"heights must be an array of real numbers, got {_shown(values)}", USAGE)
+    if found.ndim != 2:
+        raise SastrugiError(f"heights must be an array (rows, columns), got {found.ndim} dimensions", USAGE)
+    # Masked arrays have it.
+    filled = getattr(found, "filled", None)
+    return np.asarray(found if filled is None else filled(np.nan))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, np.ndarray):
+        return f"an array of {value.dtype}"
+    text = repr(value)
+    return text if len(text) <= 60 else f"{text[:60]} ..."
 
 
 def numbers(name: str, value: Sequence[float] | None, count: int) -> tuple[float, ...] | None:

@@ -40,6 +40,31 @@ def test_arrays_of_any_layout(tmp_path):
         assert np.array_equal(np.load(tmp_path / f"{name}.npy"), array), name
 
 
+def test_masks_are_holes(tmp_path):
+    """Of a masked array, as rasters are read elsewhere, the hidden cells are holes, whatever lies under the mask."""
+    array = np.ma.masked_equal(np.array([[1, -9999], [3, 4]], dtype=np.int32), -9999)
+    dem = Heightfield(array, cell=1.0)
+    assert type(dem.values) is np.ndarray and np.array_equal(dem.values, [[1, np.nan], [3, 4]], equal_nan=True)
+    dem.values = np.ma.masked_greater(np.array([[1.0, 2.0], [3.0, 4.0]]), 2.0)
+    dem.save(tmp_path / "a.npy")
+    assert np.array_equal(np.load(tmp_path / "a.npy"), [[1, 2], [np.nan, np.nan]], equal_nan=True)
+    # An array of the right type is not copied.
+    values = np.zeros((2, 3))
+    assert Heightfield(values, cell=1.0).values is values
+
+
+def test_heights_are_real_numbers():
+    for wrong, said in [
+        (np.ones((2, 2)) * 1j, "an array of complex128"),
+        (np.array([["1", "2"]]), "an array of <U1"),
+        ([[1.0], [1.0, 2.0]], "[[1.0], [1.0, 2.0]]"),
+        (np.array([["a", None]], dtype=object), "an array of object"),
+    ]:
+        with pytest.raises(sastrugi.SastrugiError) as refused:
+            Heightfield(wrong, cell=1.0)
+        assert (str(refused.value), refused.value.code) == (f"heights must be an array of real numbers, got {said}", 2)
+
+
 def test_xarray_and_matplotlib():
     pytest.importorskip("xarray")
     matplotlib = pytest.importorskip("matplotlib")
