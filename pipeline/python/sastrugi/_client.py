@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import http.client
 import json
 import time
 import urllib.error
@@ -15,7 +16,7 @@ import numpy as np
 
 from ._errors import SastrugiError
 from ._heightfield import Heightfield
-from ._values import INPUT, RETRY, USAGE, pair
+from ._values import INPUT, RETRY, USAGE, number, numbers, pair, whole
 
 TRIES = 10
 WAIT_MAX_S = 30.0
@@ -34,13 +35,17 @@ class TerrainClient:
     """
 
     def __init__(self, address: str, *, token: str | None = None, timeout: float = 600.0) -> None:
+        if not _is_address(address):
+            raise SastrugiError(f"{address!r} is not the address of a server; expected http://HOST:PORT", USAGE)
         self.address = address.rstrip("/")
         self._token = token
         self._timeout = timeout
 
     def collections(self) -> list[dict[str, Any]]:
         """What it serves: id, title, bounds_m, cell_m, spacing_m, fields ..."""
-        collections: list[dict[str, Any]] = self._json("/v1/collections", {})["collections"]
+        collections = self._json("/v1/collections", {}).get("collections")
+        if not isinstance(collections, list):
+            raise self._foreign("a list of collections")
         return collections
 
     def patch(
@@ -70,13 +75,13 @@ class TerrainClient:
             if place is not None:
                 query[name] = ",".join(repr(v) for v in pair(name, place))
         if size is not None:
-            query["size"] = ",".join(str(int(count)) for count in pair("size", size))
+            query["size"] = ",".join(f"{count:.17g}" for count in pair("size", size))
         if resolution is not None:
-            query["resolution_m"] = repr(float(resolution))
+            query["resolution_m"] = repr(number("resolution", resolution))
         if phenomena is not None:
-            query["phenomena"] = ",".join(str(int(number)) for number in phenomena)
+            query["phenomena"] = ",".join(str(whole("phenomena", process)) for process in phenomena)
         if feature_min is not None:
-            query["feature_min_m"] = repr(float(feature_min))
+            query["feature_min_m"] = repr(number("feature_min", feature_min))
         headers, body = self._get(f"/v1/collections/{urllib.parse.quote(collection)}/patch", query)
         try:
             rows, columns = int(headers["grid-rows"]), int(headers["grid-columns"])
@@ -84,24 +89,32 @@ class TerrainClient:
             west, south = (float(text) for text in headers["grid-origin-m"].split(","))
             values = np.frombuffer(body, dtype="<f4").reshape(rows, columns)
         except (TypeError, AttributeError, ValueError):
-            raise SastrugiError(f"{self.address}: the response is not a patch; is this a terrain server?", INPUT) from None
+            raise self._foreign("a patch") from None
         return Heightfield(values, cell, (west - 0.5 * cell, south - 0.5 * cell))
 
     def point(self, collection: str, x: float, y: float, **query: Any) -> dict[str, Any]:
         """The ground at a point."""
-        query = {"x": repr(float(x)), "y": repr(float(y)), **query}
+        query = {"x": repr(number("x", x)), "y": repr(number("y", y)), **query}
         return self._json(f"/v1/collections/{urllib.parse.quote(collection)}/point", query)
 
     def profile(self, collection: str, line: Sequence[Sequence[float]], samples: int, **query: Any) -> dict[str, Any]:
         """Heights along a line of points (x, y)."""
-        points = ";".join(f"{float(x)!r},{float(y)!r}" for x, y in line)
-        query = {"line": points, "samples": str(int(samples)), **query}
+        points = ";".join(",".join(map(repr, numbers("line", point, 2) or ())) for point in line)
+        query = {"line": points, "samples": str(whole("samples", samples)), **query}
         return self._json(f"/v1/collections/{urllib.parse.quote(collection)}/profile", query)
 
     def _json(self, path: str, query: dict[str, Any]) -> dict[str, Any]:
         _, body = self._get(path, query)
-        content: dict[str, Any] = json.loads(body)
+        try:
+            content = json.loads(body)
+        except ValueError:
+            content = None
+        if not isinstance(content, dict):
+            raise self._foreign("a JSON object")
         return content
+
+    def _foreign(self, expected: str) -> SastrugiError:
+        return SastrugiError(f"{self.address}: the response is not {expected}; is this a terrain server?", INPUT)
 
     def _get(self, path: str, query: dict[str, Any]) -> tuple[Message, bytes]:
         address = self.address + path + ("?" + urllib.parse.urlencode(query, safe=",;") if query else "")
@@ -116,10 +129,19 @@ class TerrainClient:
                         time.sleep(_wait_s(error.headers.get("Retry-After")))
                         continue
                     raise SastrugiError(f"{error.code}: {_detail(error.read())}", _code(error.code)) from None
-            except (urllib.error.URLError, OSError) as error:
+            except (urllib.error.URLError, http.client.HTTPException, OSError) as error:
                 reason = getattr(error, "reason", error)
                 raise SastrugiError(f"{self.address}: no answer: {reason}", RETRY) from None
         raise AssertionError("the last attempt returns or raises")
+
+
+def _is_address(text: str) -> bool:
+    try:
+        parts = urllib.parse.urlsplit(text)
+        # A port that is not a number is an error.
+        return parts.scheme in ("http", "https") and bool(parts.hostname) and parts.port != 0
+    except (ValueError, AttributeError):
+        return False
 
 
 def _wait_s(stated: str | None) -> float:

@@ -13,10 +13,20 @@ import numpy as np
 from . import _native
 from ._errors import SastrugiError
 from ._heightfield import Heightfield, heights_of
-from ._values import USAGE, numbers, optional, pair, to_json
+from ._values import USAGE, numbers, optional, pair, seed_of, to_json
 
 if TYPE_CHECKING:
     import matplotlib.axes
+
+
+def _object(text: str) -> dict[str, Any]:
+    try:
+        content = json.loads(text)
+    except ValueError:
+        content = None
+    if not isinstance(content, dict):
+        raise SastrugiError("not a fit: expected a dict, or the text of a fit file; `Fit.load` reads a file", USAGE)
+    return content
 
 
 class Fit:
@@ -37,7 +47,7 @@ class Fit:
 
     def __init__(self, content: Mapping[str, Any] | str) -> None:
         self._text = content if isinstance(content, str) else to_json(content) + "\n"
-        self._content: dict[str, Any] = json.loads(self._text)
+        self._content: dict[str, Any] = _object(self._text)
         self._quoted: dict[str, Any] = json.loads(_native.quoted(self._text))
 
     @classmethod
@@ -131,7 +141,7 @@ class Fit:
         True
         """
         parameters = {"size_m": pair("size", size), "cell_m": cell, **parameters}
-        parts, info = _native.texture(self._text, method, to_json(parameters), seed)
+        parts, info = _native.texture(self._text, method, to_json(parameters), seed_of(seed))
         return Heightfield(*parts, notes=json.loads(info)["notes"])
 
     def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
@@ -183,6 +193,7 @@ def fit(
     ('exponential', True)
     """
     text = to_json({"outer_scale_m": outer_scale, **parameters})
+    seed = seed_of(seed)
     if isinstance(dem, (str, os.PathLike)):
         sides = None if cell is None else pair("cell", cell)
         part = numbers("window", window, 4)

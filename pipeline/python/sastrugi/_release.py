@@ -16,7 +16,7 @@ import numpy.typing as npt
 from . import _native
 from ._errors import SastrugiError
 from ._heightfield import Heightfield
-from ._values import INPUT, USAGE, pair
+from ._values import INPUT, USAGE, number, pair
 
 MANIFEST = "manifest.json"
 # Terrains and tracks that stay in memory for patches.
@@ -191,13 +191,20 @@ class Release:
     @cached_property
     def manifest(self) -> dict[str, Any]:
         """What each file was made from, and its checksum."""
-        content: dict[str, Any] = json.loads((self.path / MANIFEST).read_text(encoding="utf-8"))
+        path = self.path / MANIFEST
+        try:
+            content: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        except (OSError, ValueError) as error:
+            raise SastrugiError(f"{path}: not a manifest: {error}", INPUT) from None
         return content
 
     @property
     def tables(self) -> list[str]:
         """Names of the tables that it has."""
-        return sorted(folder.name for folder in (self.path / "tables").iterdir() if folder.is_dir())
+        tables = self.path / "tables"
+        if not tables.is_dir():
+            raise SastrugiError(f"{tables}: no such folder; the release is incomplete", INPUT)
+        return sorted(folder.name for folder in tables.iterdir() if folder.is_dir())
 
     def table(self, name: str) -> Table:
         """A table; without rows if the release has none of it.
@@ -252,7 +259,7 @@ class Release:
 
         Raises SastrugiError (2) for a time before or after the mission, or a size that is not a whole number of cells.
         """
-        found = self._mission(mission)
+        found, time = self._mission(mission), number("time", time)
         track = self._track(found.id)
         if not track.time[0] <= time <= track.time[-1]:
             span = f"{track.time[0]:g} to {track.time[-1]:g} s"

@@ -18,7 +18,7 @@ import numpy.typing as npt
 from . import _native
 from ._heightfield import Heightfield
 from ._release import Release
-from ._values import numbers, to_json
+from ._values import numbers, seed_of, to_json
 
 Progress = Callable[[int, int, str], object]
 """`progress(done, total, what)`: items that are done and in total, and what just happened."""
@@ -93,7 +93,7 @@ def traverse(
     """
     more = {} if replicates is None else {"replicates": replicates}
     request = to_json({
-        "seed": seed,
+        "seed": seed_of(seed),
         "vehicle": os.fspath(vehicle),
         "missions": {"count": missions, **(rules or {})},
         "parameters": {**more, **parameters},
@@ -155,7 +155,7 @@ def navigate(
     request = to_json({
         "start": numbers("start", start, 2),
         "goal": numbers("goal", goal, 2),
-        "vehicle": vehicle,
+        "vehicle": _path(vehicle),
         "obstacles": [os.fspath(path) for path in obstacles],
         "route": {"method": method, **parameters},
         "team": None if formation is None else {"formation": formation, **(team or {})},

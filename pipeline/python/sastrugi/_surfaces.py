@@ -10,7 +10,7 @@ from typing import Any
 
 from . import _native
 from ._heightfield import Heightfield, heights_of
-from ._values import numbers, to_json
+from ._values import numbers, seed_of, to_json
 
 
 def terrain(kind: str, seed: int = 0, *, inputs: Mapping[str, Any] | None = None, **parameters: Any) -> Heightfield:
@@ -31,7 +31,7 @@ def terrain(kind: str, seed: int = 0, *, inputs: Mapping[str, Any] | None = None
     sastrugi._errors.SastrugiError: `multifractal` has no parameter `size_pxx`; did you mean `size_px`?
     """
     given = {name: heights_of(dem) for name, dem in (inputs or {}).items()}
-    parts, maps, info = _native.terrain(kind, to_json(parameters), seed, given)
+    parts, maps, info = _native.terrain(kind, to_json(parameters), seed_of(seed), given)
     return Heightfield(*parts, maps=maps, notes=json.loads(info)["notes"])
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib
 import json
+import operator
 import os
 from collections.abc import Mapping, Sequence
 from types import ModuleType
@@ -66,18 +67,55 @@ def numbers(name: str, value: Sequence[float] | None, count: int) -> tuple[float
     """So many numbers; None stays None."""
     if value is None:
         return None
-    found = tuple(float(v) for v in value)
+    found = _floats(value)
     if len(found) != count:
-        raise SastrugiError(f"`{name}` must be {count} numbers, got {value!r}", USAGE)
-    return found
+        raise SastrugiError(f"`{name}` must be {count} numbers, got {_shown(value)}", USAGE)
+    return tuple(found)
 
 
 def pair(name: str, value: float | Sequence[float]) -> tuple[float, float]:
     """A number, which stands for both, or two numbers."""
-    found = np.asarray(value, dtype=np.float64).ravel().tolist()
+    found = _floats(value)
     if len(found) not in (1, 2):
-        raise SastrugiError(f"`{name}` must be one or two numbers, got {value!r}", USAGE)
+        raise SastrugiError(f"`{name}` must be one or two numbers, got {_shown(value)}", USAGE)
     return found[0], found[-1]
+
+
+def number(name: str, value: float) -> float:
+    """A number."""
+    found = _floats(value)
+    if len(found) != 1:
+        raise SastrugiError(f"`{name}` must be a number, got {_shown(value)}", USAGE)
+    return found[0]
+
+
+def whole(name: str, value: int, limit: int | None = None) -> int:
+    """A whole number, 0 or above, up to a limit."""
+    try:
+        found = operator.index(value)
+    except TypeError:
+        found = -1
+    if found < 0 or (limit is not None and found > limit):
+        range_ = ", 0 or above" if limit is None else f" from 0 to {limit}"
+        raise SastrugiError(f"`{name}` must be a whole number{range_}, got {_shown(value)}", USAGE)
+    return found
+
+
+def seed_of(seed: int) -> int:
+    """A seed of the random streams."""
+    return whole("seed", seed, 2**64 - 1)
+
+
+def _floats(value: Any) -> list[float]:
+    """The numbers of a value; none if it holds anything else."""
+    try:
+        found = np.asarray(value)
+    except ValueError:
+        return []
+    if found.dtype.kind not in "iuf":
+        return []
+    floats: list[float] = found.astype(np.float64).ravel().tolist()
+    return floats
 
 
 def optional(module: str, package: str, purpose: str) -> ModuleType:

@@ -67,6 +67,12 @@ def test_errors_carry_the_servers_sentence(client):
     with pytest.raises(sastrugi.SastrugiError, match="^400: ") as refused:
         client.patch("world", origin=(0.0, 0.0), size=(0, 4))
     assert refused.value.code == 2
+    for wrong in ["nonsense", "", "http://", "http://a:b", "ftp://a"]:
+        with pytest.raises(sastrugi.SastrugiError, match="is not the address of a server; expected http://HOST:PORT") as refused:
+            sastrugi.TerrainClient(wrong)
+        assert refused.value.code == 2
+    with pytest.raises(sastrugi.SastrugiError, match="`resolution` must be a number, got 'fine'"):
+        client.patch("world", origin=(0.0, 0.0), size=(4, 4), resolution="fine")
     nobody = sastrugi.TerrainClient("http://127.0.0.1:9")
     with pytest.raises(sastrugi.SastrugiError, match="http://127.0.0.1:9: no answer") as refused:
         nobody.collections()

@@ -46,6 +46,14 @@ def test_files(tmp_path):
     assert refused.value.code == 65
 
 
+def test_what_is_not_a_fit():
+    """The text of a file is taken, its name is not."""
+    for content in ["", "fit.json", "[1]", 3, None]:
+        with pytest.raises(sastrugi.SastrugiError, match="^not a fit: expected a dict, or the text of a fit file") as refused:
+            Fit(content)
+        assert refused.value.code == 2
+
+
 def test_plot():
     pytest.importorskip("matplotlib").use("Agg")
     site = snow().texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)

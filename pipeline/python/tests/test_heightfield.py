@@ -84,6 +84,12 @@ def test_refusals():
         (lambda: Heightfield.read("a.tif", window=(1.0, 2.0)), "`window` must be 4 numbers, got (1.0, 2.0)"),
         (lambda: Heightfield([[1.0, 2.0]], cell=-1.0).save("a.tif"), "`cell` is [-1.0, -1.0]; cell sizes must be finite and above 0"),
         (lambda: Heightfield([[1.0, 2.0]], cell=1.0).save("a.tif", compress="lzma"), '`compress` is "lzma"'),
+        (lambda: Heightfield([[1.0]], cell="a"), "`cell` must be one or two numbers, got 'a'"),
+        (lambda: Heightfield([[1.0]], cell=[[1.0], [2.0, 3.0]]), "`cell` must be one or two numbers, got [[1.0], [2.0, 3.0]]"),
+        (lambda: sastrugi.roughness(Heightfield([[1.0]], cell=1.0), band="12"), "`band` must be 2 numbers, got '12'"),
+        (lambda: sastrugi.terrain("multifractal", seed=-1), "`seed` must be a whole number from 0 to 18446744073709551615, got -1"),
+        (lambda: sastrugi.terrain("multifractal", seed=2**64), "`seed` must be a whole number from 0 to"),
+        (lambda: sastrugi.traverse("a.tif", seed=1.5), "`seed` must be a whole number from 0 to 18446744073709551615, got 1.5"),
         (lambda: sastrugi.fit(np.zeros((9, 9)), outer_scale=1.0), "an array of heights has no cell size; give `cell`, in m"),
     ]:
         with pytest.raises(sastrugi.SastrugiError) as refused:

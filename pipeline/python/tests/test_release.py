@@ -132,3 +132,12 @@ def test_what_is_no_release(tmp_path):
     assert refused.value.code == 65
     # The example of the manual names files that exist.
     assert (ROOT / "pipeline" / "python" / "examples" / "height_patches.py").is_file()
+
+
+def test_damaged_releases(tmp_path):
+    (tmp_path / "manifest.json").write_text("{")
+    damaged = sastrugi.Release(tmp_path)
+    for look, said in [(lambda: damaged.manifest, "manifest.json: not a manifest"), (lambda: damaged.tables, "tables: no such folder")]:
+        with pytest.raises(sastrugi.SastrugiError, match=said) as refused:
+            look()
+        assert refused.value.code == 65
