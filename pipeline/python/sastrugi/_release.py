@@ -19,6 +19,7 @@ from ._heightfield import Heightfield
 from ._values import INPUT, USAGE, number, pair
 
 MANIFEST = "manifest.json"
+SPLITS = ("train", "validation", "test")
 # Terrains and tracks that stay in memory for patches.
 GROUNDS_KEPT = 16
 TRACKS_KEPT = 256
@@ -222,8 +223,18 @@ class Release:
         return Heightfield.read(self.path / self._terrains[self._known("terrain", id, self._terrains)])
 
     def missions(self, split: str | None = None) -> list[Mission]:
-        """All missions, or those of a split: train, validation or test."""
-        return [mission for mission in self._missions.values() if split is None or mission.row["split"] == split]
+        """All missions, or those of a split: train, validation or test.
+
+        Raises SastrugiError (2) for another name, and for a release of a study without `[study] split`.
+        """
+        every = list(self._missions.values())
+        if split is None:
+            return every
+        if split not in SPLITS:
+            raise SastrugiError(f"there is no split {split!r}; known: {', '.join(SPLITS)}", USAGE)
+        if every and not any(mission.row["split"] for mission in every):
+            raise SastrugiError(f"{self.path}: its missions are not split; set `[study] split`, or leave out `split`", USAGE)
+        return [mission for mission in every if mission.row["split"] == split]
 
     def samples(self, mission: Mission | str) -> Table:
         """The recorded instants of a mission, in order: the rows of the table `samples`."""

@@ -63,6 +63,9 @@ def test_missions_by_split(release):
     assert sorted(m.id for part in splits.values() for m in part) == [m.id for m in every]
     assert all(len(part) == 2 and len({m.terrain_id for m in part}) == 1 for part in splits.values())
     assert every[0]["outcome"] == every[0].row["outcome"]
+    with pytest.raises(sastrugi.SastrugiError, match="there is no split 'trian'; known: train, validation, test") as refused:
+        release.missions(split="trian")
+    assert refused.value.code == 2
     with pytest.raises(sastrugi.SastrugiError, match="there is no mission 'rough-0001/none'; it has rough-0001/") as refused:
         release.samples("rough-0001/none")
     assert refused.value.code == 2
@@ -141,3 +144,13 @@ def test_damaged_releases(tmp_path):
         with pytest.raises(sastrugi.SastrugiError, match=said) as refused:
             look()
         assert refused.value.code == 65
+
+
+def test_a_release_without_splits_says_so(study, tmp_path):
+    whole = tmp_path / "study.toml"
+    whole.write_text(study.read_text().replace("split = [0.34, 0.33, 0.33]\n", ""))
+    release = sastrugi.run(whole, tmp_path / "release")
+    assert len(release.missions()) == 6
+    with pytest.raises(sastrugi.SastrugiError, match="its missions are not split; set `.study. split`, or leave out `split`") as refused:
+        release.missions(split="train")
+    assert refused.value.code == 2
