@@ -13,7 +13,7 @@ import numpy as np
 from . import _native
 from ._errors import SastrugiError
 from ._heightfield import Heightfield, heights_of
-from ._values import USAGE, numbers, optional, pair, seed_of, to_json
+from ._values import USAGE, numbers, optional, pair, refuse_stated, seed_of, to_json
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -140,6 +140,7 @@ class Fit:
         >>> abs(float(np.sqrt(np.mean(np.square(tile)))) - 0.03) < 1e-9
         True
         """
+        refuse_stated(parameters, size_m="size", size_px="size", cell_m="cell")
         parameters = {"size_m": pair("size", size), "cell_m": cell, **parameters}
         parts, info = _native.texture(self._text, method, to_json(parameters), seed_of(seed))
         return Heightfield(*parts, notes=json.loads(info)["notes"])
@@ -192,6 +193,7 @@ def fit(
     >>> found.model, abs(found.parameters["sigma_m"] / 0.05 - 1) < 0.2
     ('exponential', True)
     """
+    refuse_stated(parameters, outer_scale_m="outer_scale")
     text = to_json({"outer_scale_m": outer_scale, **parameters})
     seed = seed_of(seed)
     if isinstance(dem, (str, os.PathLike)):

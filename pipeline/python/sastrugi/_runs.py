@@ -16,9 +16,10 @@ import numpy as np
 import numpy.typing as npt
 
 from . import _native
+from ._errors import SastrugiError
 from ._heightfield import Heightfield
 from ._release import Release
-from ._values import numbers, seed_of, to_json
+from ._values import USAGE, numbers, refuse_stated, seed_of, to_json
 
 Progress = Callable[[int, int, str], object]
 """`progress(done, total, what)`: items that are done and in total, and what just happened."""
@@ -91,6 +92,7 @@ def traverse(
     roughness: keys of `[roughness]`, which decides where missions may start and end.
     parameters: keys of `[[traverse]]`.
     """
+    refuse_stated(rules or {}, count="missions")
     more = {} if replicates is None else {"replicates": replicates}
     request = to_json({
         "seed": seed_of(seed),
@@ -152,6 +154,9 @@ def navigate(
     >>> route.points.shape[1], route.metrics["length_m"] > 76.0
     (3, True)
     """
+    if team is not None and formation is None:
+        raise SastrugiError("`team` needs a `formation`", USAGE)
+    refuse_stated(team or {}, formation="formation")
     request = to_json({
         "start": numbers("start", start, 2),
         "goal": numbers("goal", goal, 2),
@@ -175,19 +180,41 @@ def analyze(
     paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]],
     dem: str | os.PathLike[str] | None = None,
     output: str | os.PathLike[str] | None = None,
-    **settings: Any,
+    *,
+    topic: str | None = None,
+    body_frame: str | None = None,
+    fixed_frame: str | None = None,
+    rate_hz: float | None = None,
+    band_hz: Sequence[float] | None = None,
+    differentiator: str | None = None,
+    offset_m: Sequence[float] | None = None,
+    group: str | None = None,
 ) -> list[dict[str, Any]]:
     """Metrics of traversals from MCAP logs of any origin, as `sastrugi analyze --json` prints them: one row for each log, with `notes`.
 
     paths: one or several MCAP files, or folders of ROS 2 bags.
     dem: ground under the logs, for clearance and classes.
     output: Parquet file to write the rows to.
-    settings: topic, body_frame, fixed_frame, rate_hz, band_hz, differentiator, offset_m, group.
+    topic: of the poses; otherwise chosen by message type.
+    body_frame, fixed_frame: of poses that come as transforms; base_link, and the root of the transforms, by default.
+    rate_hz, band_hz, differentiator: how accelerations are computed: rate of the samples and band, Hz; second_difference or gradient.
+    offset_m: (x, y, z), added to the poses to place them on the DEM.
+    group: label of the rows.
 
     Raises SastrugiError (65) for the first log that cannot be used.
     """
     logs = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
-    found = _native.analyze([os.fspath(log) for log in logs], _path(dem), to_json(settings), _path(output))
+    settings = to_json({
+        "topic": topic,
+        "body_frame": body_frame,
+        "fixed_frame": fixed_frame,
+        "rate_hz": rate_hz,
+        "band_hz": numbers("band_hz", band_hz, 2),
+        "differentiator": differentiator,
+        "offset_m": numbers("offset_m", offset_m, 3),
+        "group": group,
+    })
+    found = _native.analyze([os.fspath(log) for log in logs], _path(dem), settings, _path(output))
     return [{**one["log"], "notes": one["notes"]} for one in json.loads(found)]
 
 

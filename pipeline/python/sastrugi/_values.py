@@ -118,6 +118,13 @@ def _floats(value: Any) -> list[float]:
     return floats
 
 
+def refuse_stated(parameters: Mapping[str, Any], **stated: str) -> None:
+    """Refuses parameters that an argument of another name states: `refuse_stated(parameters, outer_scale_m="outer_scale")`."""
+    for name, argument in stated.items():
+        if name in parameters:
+            raise SastrugiError(f"`{argument}` already states `{name}`; leave out `{name}`", USAGE)
+
+
 def optional(module: str, package: str, purpose: str) -> ModuleType:
     """A package that only some functions need."""
     try:

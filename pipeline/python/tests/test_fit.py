@@ -54,6 +54,26 @@ def test_what_is_not_a_fit():
         assert refused.value.code == 2
 
 
+def test_one_statement_of_each_parameter():
+    """What an argument states is not stated again under the name that it has in a study."""
+    for call, said in [
+        (lambda: snow().texture(4.0, 0.1, size_m=[8.0, 8.0]), "`size` already states `size_m`; leave out `size_m`"),
+        (lambda: snow().texture(4.0, 0.1, cell_m=0.2), "`cell` already states `cell_m`; leave out `cell_m`"),
+        (lambda: sastrugi.fit("a.tif", outer_scale=1.0, outer_scale_m=2.0), "`outer_scale` already states `outer_scale_m`"),
+        (lambda: sastrugi.traverse("a.tif", missions=2, rules={"count": 3}), "`missions` already states `count`"),
+        (lambda: sastrugi.navigate("a.tif", (0, 0), (1, 1), team={"size": 3}), "`team` needs a `formation`"),
+    ]:
+        with pytest.raises(sastrugi.SastrugiError) as refused:
+            call()
+        assert str(refused.value).startswith(said) and refused.value.code == 2
+    with pytest.raises(TypeError, match="topc"):
+        sastrugi.analyze(["a.mcap"], topc="x")
+    hills = snow().texture(4.0, 0.1)
+    with pytest.raises(sastrugi.SastrugiError, match="no parameter names the input `hils`; they name hills") as refused:
+        sastrugi.terrain("compose", inputs={"hills": hills, "hils": hills}, size_px=[8, 8], cell_m=0.1, processes=[{"of": "hills"}])
+    assert refused.value.code == 2
+
+
 def test_plot():
     pytest.importorskip("matplotlib").use("Agg")
     site = snow().texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)

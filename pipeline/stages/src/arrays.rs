@@ -232,6 +232,12 @@ mod tests {
         let stored = base.grid.as_stored();
         assert_ne!(base.grid, stored);
         let parameters = json!({ "size_px": [8, 6], "cell_m": 0.5, "processes": [{ "of": "base" }] });
+        let unused = [("base".to_owned(), base.clone()), ("bas".to_owned(), base.clone())].into();
+        let refused = terrain("compose", &parameters, 1, &unused).err().unwrap();
+        assert!(
+            matches!(&refused, Error::Usage(m) if m == "no parameter names the input `bas`; they name base"),
+            "{refused}"
+        );
         let made = terrain("compose", &parameters, 1, &[("base".to_owned(), base)].into()).unwrap();
         assert_eq!(made.heights.grid.values, stored.values);
         let missing = terrain("compose", &parameters, 1, &BTreeMap::new()).err().unwrap();

@@ -103,6 +103,7 @@ impl Prepared {
     /// The same; inputs that are not `given` are files.
     pub(crate) fn make_from(&self, given: &Given<'_>) -> Result<(Terrain, Crs), Error> {
         memory::check("the terrain", self.generator.memory_bytes())?;
+        check_given(self.generator.as_ref(), given)?;
         let (inputs, crs) = read_inputs(self.generator.as_ref(), given)?;
         Ok((generate(self.generator.as_ref(), &self.streams, &inputs)?, crs))
     }
@@ -136,6 +137,15 @@ impl Prepared {
     pub(crate) fn notes(&self) -> Vec<String> {
         self.generator.notes()
     }
+}
+
+/// Refuses inputs that no parameter names.
+fn check_given(generator: &dyn Generator, given: &Given<'_>) -> Result<(), Error> {
+    let names: Vec<String> = generator.inputs().into_iter().map(|input| input.name).collect();
+    let Some(unused) = given.keys().find(|name| !names.iter().any(|known| known == *name)) else { return Ok(()) };
+    let named =
+        if names.is_empty() { "they name no input".to_owned() } else { format!("they name {}", names.join(", ")) };
+    Err(Error::Usage(format!("no parameter names the input `{unused}`; {named}")))
 }
 
 /// A generator's inputs, surfaces in metres, and the coordinate system of the first; those that are not given are read.
