@@ -13,7 +13,7 @@ import numpy as np
 from . import _native
 from ._errors import SastrugiError
 from ._heightfield import Heightfield, heights_of
-from ._values import USAGE, numbers, optional, pair, refuse_stated, seed_of, to_json
+from ._values import USAGE, numbers, optional, pair, refuse_stated, seed_of, to_json, warn
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -184,7 +184,7 @@ def fit(
     seed: of the replicates.
     parameters: as in a study (`sastrugi kinds covariance`): mode, trim, model, bootstrap, inner_scale_m, noise_sigma_m ...
 
-    The file that `save` writes is that of the program for the same file and parameters. Ctrl-C returns at once; the fit then ends in the
+    Notes on how a file was read, such as a cell size that was assumed, are issued as warnings. The file that `save` writes is that of the program for the same file and parameters. Ctrl-C returns at once; the fit then ends in the
     background without effect.
 
     >>> site = Fit({"model": "exponential", "parameters": {"sigma_m": 0.05, "range_m": 0.2}}).texture(
@@ -200,7 +200,8 @@ def fit(
         sides = None if cell is None else pair("cell", cell)
         part = numbers("window", window, 4)
         other = None if minus is None else os.fspath(minus)
-        fitted, _ = _native.fit_file(os.fspath(dem), text, seed, sides, part, other)
+        fitted, notes = _native.fit_file(os.fspath(dem), text, seed, sides, part, other)
+        warn(notes)
         return Fit(fitted)
     if window is not None or minus is not None:
         raise SastrugiError("`window` and `minus` apply to a file; cut an array, or use `coregister`", USAGE)

@@ -11,7 +11,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._errors import SastrugiError
-from ._values import USAGE, heights, numbers, optional, pair
+from ._values import USAGE, heights, numbers, optional, pair, warn
 
 if TYPE_CHECKING:
     import matplotlib.axes
@@ -166,13 +166,15 @@ class Heightfield:
 
 
 def heights_of(dem: Any, cell: float | Sequence[float] | None = None) -> Heightfield:
-    """A heightfield as it is, a file read, or an array with its cell."""
+    """A heightfield as it is, a file read, or an array with its cell. Notes on how a file was read are warnings of the caller's caller."""
     if isinstance(dem, Heightfield):
         if cell is not None:
             raise SastrugiError("a heightfield has its own `cell`; leave it out", USAGE)
         return dem
     if isinstance(dem, (str, os.PathLike)):
-        return Heightfield.read(dem, cell=cell)
+        read = Heightfield.read(dem, cell=cell)
+        warn(read.notes, callers=2)
+        return read
     if cell is None:
         raise SastrugiError("an array of heights has no cell size; give `cell`, in m", USAGE)
     return Heightfield(dem, cell)

@@ -5,7 +5,6 @@ from __future__ import annotations
 import json
 import os
 import tempfile
-import warnings
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
@@ -19,7 +18,7 @@ from . import _native
 from ._errors import SastrugiError
 from ._heightfield import Heightfield
 from ._release import Release
-from ._values import USAGE, numbers, refuse_stated, seed_of, to_json
+from ._values import USAGE, numbers, refuse_stated, seed_of, to_json, warn
 
 Progress = Callable[[int, int, str], object]
 """`progress(done, total, what)`: items that are done and in total, and what just happened."""
@@ -224,8 +223,7 @@ def _path(path: str | os.PathLike[str] | None) -> str | None:
 
 def _released(done: str) -> Release:
     summary = json.loads(done)
-    for doubt in summary.pop("doubts"):
-        warnings.warn(doubt, stacklevel=3)
+    warn(summary.pop("doubts"), callers=2)
     return Release(summary["output"], summary=summary)
 
 

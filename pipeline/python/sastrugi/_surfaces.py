@@ -10,7 +10,7 @@ from typing import Any
 
 from . import _native
 from ._heightfield import Heightfield, heights_of
-from ._values import numbers, seed_of, to_json
+from ._values import numbers, seed_of, to_json, warn
 
 
 def terrain(kind: str, seed: int = 0, *, inputs: Mapping[str, Any] | None = None, **parameters: Any) -> Heightfield:
@@ -68,7 +68,7 @@ def roughness(
     band: shortest and longest wavelength, m; instead of a vehicle.
     settings: those of `[roughness]` in a study: low_max, semi_max, border_m, band_window_m.
 
-    A value that does not exist is None.
+    A value that does not exist is None. Notes on how a file was read are issued as warnings.
 
     >>> rough = terrain("multifractal", seed=7, size_px=[90, 70])
     >>> measured = roughness(rough)
@@ -103,7 +103,8 @@ class Coregistration:
 def _as_it_is(dem: Any) -> Heightfield:
     """A heightfield, or a file in its own coordinates."""
     if isinstance(dem, (str, os.PathLike)):
-        parts, _ = _native.read(os.fspath(dem), None, None, False)
+        parts, notes = _native.read(os.fspath(dem), None, None, False)
+        warn(notes, callers=2)
         return Heightfield(*parts)
     return heights_of(dem)
 

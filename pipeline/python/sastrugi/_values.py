@@ -6,7 +6,8 @@ import importlib
 import json
 import operator
 import os
-from collections.abc import Mapping, Sequence
+import warnings
+from collections.abc import Iterable, Mapping, Sequence
 from types import ModuleType
 from typing import Any
 
@@ -123,6 +124,12 @@ def refuse_stated(parameters: Mapping[str, Any], **stated: str) -> None:
     for name, argument in stated.items():
         if name in parameters:
             raise SastrugiError(f"`{argument}` already states `{name}`; leave out `{name}`", USAGE)
+
+
+def warn(notes: Iterable[str], callers: int = 1) -> None:
+    """Issues notes as warnings of whoever called the function of the package, which lies so many calls above this one."""
+    for note in notes:
+        warnings.warn(note, stacklevel=callers + 2)
 
 
 def optional(module: str, package: str, purpose: str) -> ModuleType:

@@ -2,7 +2,9 @@
 
 import math
 import pickle
+import warnings
 
+import numpy as np
 import pytest
 
 import sastrugi
@@ -72,6 +74,22 @@ def test_one_statement_of_each_parameter():
     with pytest.raises(sastrugi.SastrugiError, match="no parameter names the input `hils`; they name hills") as refused:
         sastrugi.terrain("compose", inputs={"hills": hills, "hils": hills}, size_px=[8, 8], cell_m=0.1, processes=[{"of": "hills"}])
     assert refused.value.code == 2
+
+
+def test_notes_on_reading_are_warnings(tmp_path):
+    """A file that states no cell size is read with an assumed one, which decides the numbers."""
+    np.save(tmp_path / "site.npy", snow().texture(16.0, 0.1, seed=1).values)
+    for measure in [
+        lambda: sastrugi.roughness(tmp_path / "site.npy"),
+        lambda: sastrugi.fit(tmp_path / "site.npy", outer_scale=10.0, model="exponential", bootstrap=0),
+        lambda: sastrugi.coregister(tmp_path / "site.npy", tmp_path / "site.npy"),
+    ]:
+        with pytest.warns(UserWarning, match="no cell size") as issued:
+            measure()
+        assert {warning.filename for warning in issued} == {__file__}
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sastrugi.roughness(tmp_path / "site.npy", cell=0.1)
 
 
 def test_plot():
