@@ -18,6 +18,9 @@ _Progress = Callable[[int, int, str], object]
 class Crs:
     """A coordinate system, passed from file to file unchanged."""
 
+    def __init__(
+        self, geographic: bool, epsg: int | None, name: str, keys: Sequence[tuple[int, int | str | Sequence[float]]]
+    ) -> None: ...
     @property
     def epsg(self) -> int | None: ...
     @property

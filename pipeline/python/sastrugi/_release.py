@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -105,7 +105,8 @@ class Mission:
 
     terrain_id: str
     mission_id: str
-    row: dict[str, Any]
+    # Not hashed: a dict cannot be. Equal missions have equal keys.
+    row: dict[str, Any] = field(hash=False)
 
     @property
     def id(self) -> str:

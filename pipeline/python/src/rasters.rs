@@ -4,20 +4,59 @@ use crate::errors::{refused, usage};
 use crate::waiting::waited;
 use numpy::{IntoPyArray, PyArray2, PyArrayMethods, PyReadonlyArray2};
 use pyo3::prelude::*;
+use pyo3::types::PyType;
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_stages::Error;
 use sastrugi_stages::arrays::Raster;
 use sastrugi_stages::verbs::{self, Read, Reading};
-use sastrugi_store::dem::{self, Compression, DemError, Format, WriteOptions};
+use sastrugi_store::dem::{self, Compression, DemError, Format, GeoKey, WriteOptions};
 use std::path::PathBuf;
 
 /// A coordinate system, passed from file to file unchanged.
-#[pyclass(frozen, name = "Crs", module = "sastrugi")]
+#[pyclass(frozen, name = "Crs", module = "sastrugi._native")]
 #[derive(Clone)]
 pub struct Crs(dem::Crs);
 
+/// Value of a GeoTIFF key.
+#[derive(FromPyObject, IntoPyObject)]
+pub enum KeyValue {
+    /// Code.
+    Short(u16),
+    /// Text.
+    Ascii(String),
+    /// Numbers.
+    Double(Vec<f64>),
+}
+
+/// What a system consists of: whether it is in degrees, EPSG code, name and GeoTIFF keys.
+type CrsParts = (bool, Option<u16>, String, Vec<(u16, KeyValue)>);
+
 #[pymethods]
 impl Crs {
+    /// The system of these parts, which copies and pickles are made from.
+    #[new]
+    fn new(geographic: bool, epsg: Option<u16>, name: String, keys: Vec<(u16, KeyValue)>) -> Self {
+        let value = |value| match value {
+            KeyValue::Short(code) => GeoKey::Short(code),
+            KeyValue::Ascii(text) => GeoKey::Ascii(text),
+            KeyValue::Double(numbers) => GeoKey::Double(numbers),
+        };
+        let keys = keys.into_iter().map(|(key, of)| (key, value(of))).collect();
+        Self(dem::Crs { geographic, epsg, name, keys })
+    }
+
+    /// How `copy` and `pickle` make it again.
+    fn __reduce__<'py>(&self, py: Python<'py>) -> (Bound<'py, PyType>, CrsParts) {
+        let value = |value: &GeoKey| match value {
+            GeoKey::Short(code) => KeyValue::Short(*code),
+            GeoKey::Ascii(text) => KeyValue::Ascii(text.clone()),
+            GeoKey::Double(numbers) => KeyValue::Double(numbers.clone()),
+        };
+        let dem::Crs { geographic, epsg, name, keys } = &self.0;
+        let keys = keys.iter().map(|(key, of)| (*key, value(of))).collect();
+        (py.get_type::<Self>(), (*geographic, *epsg, name.clone(), keys))
+    }
+
     /// EPSG code, or None.
     #[getter]
     fn epsg(&self) -> Option<u16> {

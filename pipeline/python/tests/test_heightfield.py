@@ -1,5 +1,8 @@
 """Heightfields: rows from the north, holes, files, other libraries."""
 
+import copy
+import pickle
+
 import numpy as np
 import pytest
 from conftest import DEMS
@@ -30,6 +33,16 @@ def test_files_keep_place_and_system(tmp_path):
     notes = dem.save(tmp_path / "b.npy")
     assert any("CRS" in note for note in notes)
     assert np.array_equal(np.load(tmp_path / "b.npy"), dem.values, equal_nan=True)
+
+
+def test_copies_and_pickles(tmp_path):
+    """Worker processes get heightfields with their system; its GeoTIFF keys are those of the file."""
+    dem = Heightfield.read(DEMS / "pozo_blanca.tif")
+    dem.save(tmp_path / "a.tif")
+    for name, again in {"pickled": pickle.loads(pickle.dumps(dem)), "copied": copy.deepcopy(dem)}.items():
+        assert (again.cell, again.origin, again.crs.epsg, again.crs.name) == (dem.cell, dem.origin, 26911, dem.crs.name)
+        again.save(tmp_path / f"{name}.tif")
+        assert (tmp_path / f"{name}.tif").read_bytes() == (tmp_path / "a.tif").read_bytes()
 
 
 def test_arrays_of_any_layout(tmp_path):

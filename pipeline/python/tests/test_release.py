@@ -63,6 +63,7 @@ def test_missions_by_split(release):
     assert sorted(m.id for part in splits.values() for m in part) == [m.id for m in every]
     assert all(len(part) == 2 and len({m.terrain_id for m in part}) == 1 for part in splits.values())
     assert every[0]["outcome"] == every[0].row["outcome"]
+    assert len({*every, *release.missions()}) == len(every)
     with pytest.raises(sastrugi.SastrugiError, match="there is no split 'trian'; known: train, validation, test") as refused:
         release.missions(split="trian")
     assert refused.value.code == 2
