@@ -176,5 +176,6 @@ def heights_of(dem: Any, cell: float | Sequence[float] | None = None) -> Heightf
         warn(read.notes, callers=2)
         return read
     if cell is None:
-        raise SastrugiError("an array of heights has no cell size; give `cell`, in m", USAGE)
+        heights(dem)
+        raise SastrugiError("an array has no cell size; pass Heightfield(array, cell), with `cell` in m", USAGE)
     return Heightfield(dem, cell)

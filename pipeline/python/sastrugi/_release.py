@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property, lru_cache
 from pathlib import Path
@@ -41,7 +41,8 @@ class Table:
         polars.DataFrame(table)
         duckdb.sql("select outcome, count(*) from table group by outcome")
 
-    `table[column]` is a NumPy array: float64 with NaN for null, int64, or objects (text, lists, columns with nulls).
+    `table[column]` is a NumPy array: float64 with NaN for null, int64, or objects (text, lists, columns with nulls). `len(table)` is the number of
+    rows; as in pandas, iteration gives the names of the columns, and `in` looks for one.
     """
 
     __slots__ = ("_table",)
@@ -74,9 +75,16 @@ class Table:
             return values
         return _objects(values)
 
+    def __iter__(self) -> Iterator[str]:
+        """The names of the columns."""
+        return iter(column.name for column in self.columns)
+
+    def __contains__(self, column: object) -> bool:
+        return any(known.name == column for known in self.columns)
+
     def to_numpy(self) -> dict[str, npt.NDArray[Any]]:
         """All columns by name."""
-        return {column.name: self[column.name] for column in self.columns}
+        return {name: self[name] for name in self}
 
     def to_rows(self) -> list[dict[str, Any]]:
         """The rows as dicts of Python's values."""

@@ -16,7 +16,7 @@ import numpy.typing as npt
 
 from . import _native
 from ._errors import SastrugiError
-from ._heightfield import Heightfield
+from ._heightfield import Heightfield, heights_of
 from ._release import Release
 from ._values import USAGE, numbers, refuse_stated, seed_of, to_json, warn
 
@@ -127,7 +127,7 @@ def navigate(
     *,
     method: str = "grid",
     vehicle: str | None = None,
-    obstacles: Sequence[str | os.PathLike[str]] = (),
+    obstacles: str | os.PathLike[str] | Sequence[str | os.PathLike[str]] = (),
     formation: str | None = None,
     team: Mapping[str, Any] | None = None,
     date: str = "1970-01-01",
@@ -142,7 +142,7 @@ def navigate(
     output: None or a name that ends in .geojson returns a `Route`; another name is the folder of a `Release`.
     method: grid, roadmap, theta_star or anytime; its parameters as keywords.
     vehicle: whose slope limits apply; otherwise slopes up to 30 degrees.
-    obstacles: GeoJSON files of polygons, or rasters.
+    obstacles: one or several GeoJSON files of polygons, or rasters.
     formation, team: formation of a team that follows the route, and its parameters; they need a release.
 
     Raises SastrugiError (65) if there is no route.
@@ -160,7 +160,7 @@ def navigate(
         "start": numbers("start", start, 2),
         "goal": numbers("goal", goal, 2),
         "vehicle": _path(vehicle),
-        "obstacles": [os.fspath(path) for path in obstacles],
+        "obstacles": _paths(obstacles),
         "route": {"method": method, **parameters},
         "team": None if formation is None else {"formation": formation, **(team or {})},
         "date": date,
@@ -202,7 +202,6 @@ def analyze(
 
     Raises SastrugiError (65) for the first log that cannot be used.
     """
-    logs = [paths] if isinstance(paths, (str, os.PathLike)) else list(paths)
     settings = to_json({
         "topic": topic,
         "body_frame": body_frame,
@@ -213,12 +212,18 @@ def analyze(
         "offset_m": numbers("offset_m", offset_m, 3),
         "group": group,
     })
-    found = _native.analyze([os.fspath(log) for log in logs], _path(dem), settings, _path(output))
+    found = _native.analyze(_paths(paths), _path(dem), settings, _path(output))
     return [{**one["log"], "notes": one["notes"]} for one in json.loads(found)]
 
 
 def _path(path: str | os.PathLike[str] | None) -> str | None:
     return None if path is None else os.fspath(path)
+
+
+def _paths(paths: str | os.PathLike[str] | Sequence[str | os.PathLike[str]]) -> list[str]:
+    """One path, or several."""
+    every = [paths] if isinstance(paths, (str, os.PathLike)) else paths
+    return [os.fspath(path) for path in every]
 
 
 def _released(done: str) -> Release:
@@ -230,12 +235,13 @@ def _released(done: str) -> Release:
 @contextmanager
 def _as_file(dem: str | os.PathLike[str] | Heightfield) -> Iterator[str]:
     """The file of a DEM; a heightfield is written to a temporary one."""
-    if not isinstance(dem, Heightfield):
+    if isinstance(dem, (str, os.PathLike)):
         yield os.fspath(dem)
         return
+    heights = heights_of(dem)
     with tempfile.TemporaryDirectory() as folder:
         path = os.path.join(folder, "heightfield.tif")
-        dem.save(path)
+        heights.save(path)
         yield path
 
 

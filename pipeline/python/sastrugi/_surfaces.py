@@ -48,9 +48,9 @@ def elaborate(dem: Any, seed: int = 0, **parameters: Any) -> Heightfield:
     >>> fine.shape
     (48, 64)
     """
-    if isinstance(dem, Heightfield):
-        return terrain("elaborate", seed, inputs={"dem": dem}, dem="dem", **parameters)
-    return terrain("elaborate", seed, dem=dem, **parameters)
+    if isinstance(dem, (str, os.PathLike)):
+        return terrain("elaborate", seed, dem=dem, **parameters)
+    return terrain("elaborate", seed, inputs={"dem": heights_of(dem)}, dem="dem", **parameters)
 
 
 def roughness(

@@ -103,7 +103,11 @@ def test_refusals():
         (lambda: sastrugi.terrain("multifractal", seed=-1), "`seed` must be a whole number from 0 to 18446744073709551615, got -1"),
         (lambda: sastrugi.terrain("multifractal", seed=2**64), "`seed` must be a whole number from 0 to"),
         (lambda: sastrugi.traverse("a.tif", seed=1.5), "`seed` must be a whole number from 0 to 18446744073709551615, got 1.5"),
-        (lambda: sastrugi.fit(np.zeros((9, 9)), outer_scale=1.0), "an array of heights has no cell size; give `cell`, in m"),
+        (lambda: sastrugi.fit(np.zeros((9, 9)), outer_scale=1.0), "an array has no cell size; pass Heightfield(array, cell)"),
+        (lambda: sastrugi.coregister(np.zeros((9, 9)), np.zeros((9, 9))), "an array has no cell size; pass Heightfield(array, cell)"),
+        (lambda: sastrugi.elaborate(np.zeros((9, 9))), "an array has no cell size; pass Heightfield(array, cell)"),
+        (lambda: sastrugi.traverse(np.zeros((9, 9))), "an array has no cell size; pass Heightfield(array, cell)"),
+        (lambda: sastrugi.fit(b"x.tif", outer_scale=1.0), "heights must be an array of real numbers, got b'x.tif'"),
     ]:
         with pytest.raises(sastrugi.SastrugiError) as refused:
             make()

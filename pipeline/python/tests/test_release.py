@@ -54,6 +54,8 @@ def test_tables_in_numpy(release):
     with pytest.raises(sastrugi.SastrugiError, match="there is no table mission; known: terrains") as refused:
         release.table("mission")
     assert refused.value.code == 2
+    assert list(samples) == [column.name for column in samples.columns]
+    assert "x_m" in samples and "x" not in samples and 0 not in samples
     assert len(release.table("rovers")) == 0 and release.table("rovers")["rover_id"].size == 0
 
 

@@ -118,6 +118,11 @@ def test_routes(sastrugi_program, tmp_path):
     assert route.metrics == printed["route"]
     assert (sastrugi.navigate(hills, (10, 10), (70, 60)).points == route.points).all()
     assert abs(route.points[0, :2] - [10.0, 10.0]).max() < 1.0
+    wall = [[30.0, 20.0], [34.0, 20.0], [34.0, 50.0], [30.0, 50.0], [30.0, 20.0]]
+    (tmp_path / "wall.geojson").write_text(json.dumps({"type": "Polygon", "coordinates": [wall]}))
+    around = sastrugi.navigate(hills, (10, 10), (70, 60), obstacles=tmp_path / "wall.geojson")
+    assert around.metrics["length_m"] > route.metrics["length_m"]
+    assert sastrugi.navigate(hills, (10, 10), (70, 60), obstacles=[str(tmp_path / "wall.geojson")]).metrics == around.metrics
 
 
 def test_logs(release, sastrugi_program, tmp_path):
