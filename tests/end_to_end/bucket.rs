@@ -176,18 +176,41 @@ fn val_addresses_are_checked_first() {
     let folder = area();
     let path = folder.path();
     write(path, "study.toml", &small_study());
-    let cases: [(&[&str], &str); 4] = [
+    let cases: [(&[&str], &str); 10] = [
         (&["-o", "s3://"], "expected s3://bucket"),
         (&["-o", "s3:///a"], "expected s3://bucket"),
         (&["-o", "a", "--cache", "s3://b/../c"], "expected s3://bucket"),
         (&["-o", "s3://b/part-1", "--shard", "1/2"], "a shard is a folder"),
+        (&["-o", "gs://b/c"], "give a folder, or s3://bucket/prefix"),
+        (&["-o", "a", "--work", "s3://b/c"], "give a path on this machine"),
+        (&["-o", "a", "--cache", "gs://b/c"], "give a folder, or s3://bucket/prefix"),
+        (&["-o", "a", "--cache", "S3://b/c"], "give a folder, or s3://bucket/prefix"),
+        (&["-o", "a", "--cache", "s3:/bucket"], "give a folder, or s3://bucket/prefix"),
+        (&["-o", "a", "--cache", ""], "is empty"),
     ];
     for (arguments, words) in cases {
         let run = [&["run", "study.toml", "--quiet"], arguments].concat();
         let call = called(Command::new(program()).args(&run).current_dir(path));
         assert!(call.code == 2 && call.stderr.contains(words), "{arguments:?}: {} {}", call.code, call.stderr);
     }
-    assert_eq!(fs::read_dir(path).unwrap().count(), 1);
+    let heights = "1 2 3 4\n2 3 4 3\n1 3 2 1\n2 2 1 1\n";
+    write(path, "a.asc", &format!("ncols 4\nnrows 4\nxllcorner 0\nyllcorner 0\ncellsize 1\n{heights}"));
+    for arguments in [
+        &["traverse", "a.asc", "--vehicle", "husky_a200", "-o", "s3://b/c"][..],
+        &["convert", "release", "s3://b/c", "--for", "lerobot"],
+        &["convert", "a.asc", "gs://b/c.tif"],
+        &["terrain", "multifractal", "-o", "s3://b/c.tif"],
+        &["report", "release", "-o", "s3://b/c"],
+        &["merge", "part-1", "-o", "gs://b/c"],
+    ] {
+        let call = called(Command::new(program()).args(arguments).current_dir(path));
+        let says = call.stderr.contains("give a path on this machine") || call.stderr.contains("give a folder, or s3");
+        assert!(call.code == 2 && says, "{arguments:?}: {} {}", call.code, call.stderr);
+    }
+    // A picture is checked when it is written.
+    let call = called(Command::new(program()).args(["hillshade", "a.asc", "-o", "s3://b/c.png"]).current_dir(path));
+    assert!(call.code != 0 && call.stderr.contains("give a path on this machine"), "{} {}", call.code, call.stderr);
+    assert_eq!(fs::read_dir(path).unwrap().count(), 2);
 }
 
 /// A machine whose service of roles refuses: the message names what to set, not that service.

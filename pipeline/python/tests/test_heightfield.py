@@ -96,6 +96,8 @@ def test_refusals():
         (lambda: Heightfield([[1.0]], cell=(1.0, 2.0, 3.0)), "`cell` must be one or two numbers, got (1.0, 2.0, 3.0)"),
         (lambda: Heightfield.read("a.tif", window=(1.0, 2.0)), "`window` must be 4 numbers, got (1.0, 2.0)"),
         (lambda: Heightfield([[1.0, 2.0]], cell=-1.0).save("a.tif"), "`cell` is [-1.0, -1.0]; cell sizes must be finite and above 0"),
+        (lambda: Heightfield([[1.0, 2.0]], cell=1.0).save("s3://a/b.tif"), "s3://a/b.tif: an address cannot be written to here"),
+        (lambda: sastrugi.traverse(Heightfield([[1.0, 2.0]], cell=1.0), "gs://a/b"), "gs://a/b: an address cannot be written to here"),
         (lambda: Heightfield([[1.0, 2.0]], cell=1.0).save("a.tif", compress="lzma"), '`compress` is "lzma"'),
         (lambda: Heightfield([[1.0]], cell="a"), "`cell` must be one or two numbers, got 'a'"),
         (lambda: Heightfield([[1.0]], cell=[[1.0], [2.0, 3.0]]), "`cell` must be one or two numbers, got [[1.0], [2.0, 3.0]]"),

@@ -1,6 +1,7 @@
 //! Packs a release into one archive with reproducible bytes.
 
 use crate::error::Error;
+use crate::remote::check_local;
 use crate::runner::progress::Progress;
 use crate::studies::{head_of, resolved};
 use crate::verification::{Difference, differences};
@@ -53,6 +54,7 @@ pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Pac
 }
 
 fn check_output(folder: &Path, output: &Path) -> Result<(), Error> {
+    check_local(output)?;
     if resolved(output).starts_with(resolved(folder)) {
         let message =
             "the archive cannot be written into the release, which is sealed; choose a file outside it with -o";

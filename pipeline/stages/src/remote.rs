@@ -12,6 +12,7 @@ use crate::verification::Scratch;
 use rayon::prelude::*;
 use sastrugi_store::atomic::{AtomicFile, Draft};
 use sastrugi_store::digest;
+use sastrugi_store::file;
 use sastrugi_store::objects::{Bucket, Object};
 use sastrugi_store::release::{MANIFEST, Release, SUMS};
 use std::fs;
@@ -21,6 +22,36 @@ use std::sync::atomic::{AtomicU64, Ordering};
 /// The address of a release in an object store; `None` for a folder.
 pub fn address(release: &Path) -> Option<&str> {
     release.to_str().filter(|text| Bucket::is_address(text))
+}
+
+/// Refuses a place that is neither a path on this machine nor in a store that is supported.
+///
+/// # Errors
+/// Such a place.
+pub fn check_place(place: &Path) -> Result<(), Error> {
+    match address(place) {
+        Some(_) => Ok(()),
+        None if file::is_address(place) => Err(Error::Usage(format!(
+            "{}: stores of this kind are not supported; give a folder, or s3://bucket/prefix",
+            place.display()
+        ))),
+        None => check_local(place),
+    }
+}
+
+/// Refuses an output that is not a path on this machine.
+///
+/// # Errors
+/// An address or an empty path.
+pub fn check_local(output: &Path) -> Result<(), Error> {
+    if output.as_os_str().is_empty() {
+        return Err(Error::Usage("the path is empty; name a file or folder".to_owned()));
+    }
+    if file::is_address(output) {
+        let advice = "an address cannot be written to here; give a path on this machine (the program's `run` and `merge` write releases to s3://bucket/prefix)";
+        return Err(Error::Usage(format!("{}: {advice}", output.display())));
+    }
+    Ok(())
 }
 
 /// Makes a release: in its folder, or in the work area and then in an object store. `make` gets the folder and the work area.
@@ -33,6 +64,7 @@ pub fn releasing(
     progress: &dyn Progress,
     make: impl FnOnce(&Path, Option<&Path>) -> Result<RunSummary, Error>,
 ) -> Result<RunSummary, Error> {
+    check_place(output)?;
     let Some(address) = address(output) else { return make(output, work) };
     // Opened first: what is wrong with it should not come to light after the run.
     let bucket = Bucket::open(address)?;
@@ -45,9 +77,12 @@ pub fn releasing(
     Ok(RunSummary { output: output.to_owned(), ..summary })
 }
 
-/// Last name of an address.
+/// Name of the local release that an address stands for: its last name and a part of the address's hash, so that neither a folder of that
+/// name nor another address with it has the same work area.
 fn local_name(address: &str) -> PathBuf {
-    PathBuf::from(address.trim_end_matches('/').rsplit('/').next().unwrap_or("release"))
+    let address = address.trim_end_matches('/');
+    let name = address.rsplit('/').next().unwrap_or("release");
+    PathBuf::from(format!("{name}.s3-{}", &digest::of_text(address)[..8]))
 }
 
 /// Calls `check` with the folder of a release; one in an object store is downloaded to a temporary folder.
@@ -200,7 +235,27 @@ mod tests {
     fn val_addresses_of_releases() {
         assert_eq!(address(Path::new("s3://bucket/a")), Some("s3://bucket/a"));
         assert_eq!(address(Path::new("a/s3")), None);
-        assert_eq!(local_name("s3://bucket/a/b/"), Path::new("b"));
-        assert_eq!(local_name("s3://bucket"), Path::new("bucket"));
+        let name = |address: &str| local_name(address).to_string_lossy().into_owned();
+        assert!(name("s3://bucket/a/b/").starts_with("b.s3-") && name("s3://bucket").starts_with("bucket.s3-"));
+        assert_eq!(name("s3://bucket/a/b/"), name("s3://bucket/a/b"));
+        assert_ne!(name("s3://bucket/a/b"), name("s3://bucket/c/b"));
+    }
+
+    /// Nothing becomes a folder called `gs:`.
+    #[test]
+    fn val_places_that_are_not_supported() {
+        let said = |checked: Result<(), Error>| match checked {
+            Err(Error::Usage(why)) => why,
+            other => format!("{other:?}"),
+        };
+        for other in ["gs://b/c", "S3://b/c", "s3:/b", "file:///tmp/a"] {
+            assert!(said(check_place(Path::new(other))).contains("give a folder, or s3://bucket/prefix"), "{other}");
+            assert!(said(check_local(Path::new(other))).contains("give a path on this machine"), "{other}");
+        }
+        assert!(check_place(Path::new("s3://b/c")).is_ok() && check_local(Path::new("s3://b/c")).is_err());
+        for check in [check_place, check_local] {
+            assert!(check(Path::new("release")).is_ok());
+            assert!(said(check(Path::new(""))).contains("is empty"));
+        }
     }
 }

@@ -4,6 +4,7 @@ use crate::error::Error;
 use crate::jobs::{fit, original};
 use crate::loaded::{Loaded, load_text};
 use crate::registry;
+use crate::remote::check_local;
 use crate::runner::assemble::{Contents, assemble, check_other_study};
 use crate::runner::cache::Cache;
 use crate::runner::division::{Division, common_ancestors, divide};
@@ -155,6 +156,7 @@ pub fn run_ancestors(
         ));
     }
     let work = request.work.map_or_else(|| default_work(request.output), Path::to_owned);
+    check_local(&work)?;
     let cache = Cache::open(&work)?.sharing(Some(sharing));
     let needed = common_ancestors(&loaded.graph, count);
     check_memory(loaded, &cache, &needed, request.limits)?;
@@ -218,6 +220,8 @@ fn is_worth_a_release(stage: &str, purpose: Option<&str>) -> bool {
 
 /// Refuses a foreign destination before any work is done.
 fn check_destination(study: &Study, request: &RunRequest<'_>) -> Result<(), Error> {
+    check_local(request.output)?;
+    request.work.map_or(Ok(()), check_local)?;
     let ours = if request.part.is_some() { release::SHARD } else { release::MANIFEST };
     match fs::read_dir(request.output).map(|mut entries| entries.next().is_some()) {
         Ok(true) if !request.output.join(ours).is_file() => {
@@ -331,6 +335,7 @@ pub fn plan_shards(loaded: &Loaded, count: u32) -> Division {
 /// # Errors
 /// Shards that do not form one complete study, or a destination that is not a sastrugi folder.
 pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Progress) -> Result<RunSummary, Error> {
+    check_local(output)?;
     let joined = shard::join(shards)?;
     if joined.results.is_empty() && !joined.failures.is_empty() {
         return Err(all_failed(&joined.failures));
@@ -360,6 +365,8 @@ pub fn run_text(
     request: &RunRequest<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, Error> {
+    // Before the study, whose input may be refused.
+    check_local(request.output)?;
     let loaded = load_text(text, "this command", folder)?;
     run(&loaded, request, progress)
 }

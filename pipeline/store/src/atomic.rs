@@ -103,9 +103,12 @@ impl AtomicFile {
     /// Starts a file that will appear at `target`; missing folders are created.
     ///
     /// # Errors
-    /// The folder cannot be created or written to.
+    /// An address of another machine; the folder cannot be created or written to.
     pub fn create<'a>(target: impl Into<Target<'a>>) -> io::Result<Self> {
         let Target { path, in_draft } = target.into();
+        if crate::file::is_address(path) {
+            return Err(io::Error::new(io::ErrorKind::InvalidInput, "is an address; give a path on this machine"));
+        }
         let folder = folder_of(path);
         fs::create_dir_all(folder)?;
         let (file, temporary) = temporary_file(folder)?;

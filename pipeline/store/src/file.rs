@@ -5,6 +5,22 @@ use std::fs::{self, File, FileType};
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
+/// True for an address such as `s3://bucket/a` or `gs:/a`: a path that starts with a scheme. A single letter is none.
+///
+/// ```
+/// use sastrugi_store::file::is_address;
+/// use std::path::Path;
+///
+/// assert!(["s3://b/c", "S3://b/c", "gs:/b", "file:///tmp/a"].iter().all(|text| is_address(Path::new(text))));
+/// assert!(!["a/s3://b", "a.tif", "C:/a", "a:b", ":/a"].iter().any(|text| is_address(Path::new(text))));
+/// ```
+pub fn is_address(path: &Path) -> bool {
+    let text = path.to_string_lossy();
+    let Some((scheme, _)) = text.split_once(":/") else { return false };
+    let is_letter = |c: char| c.is_ascii_alphanumeric() || "+-.".contains(c);
+    scheme.len() > 1 && scheme.starts_with(|c: char| c.is_ascii_alphabetic()) && scheme.chars().all(is_letter)
+}
+
 /// Opens a regular file.
 ///
 /// # Errors

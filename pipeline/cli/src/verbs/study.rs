@@ -308,6 +308,7 @@ fn parse_recompute(text: &str) -> Result<Recompute, Failure> {
 /// `report`.
 pub fn report(args: &Report, common: &Common) -> Verdict {
     let output = args.output.clone().unwrap_or_else(|| default_report(&args.release));
+    remote::check_local(&output)?;
     let within = |release: &PathBuf| studies::resolved(&output).starts_with(studies::resolved(release));
     if [&args.release].into_iter().chain(&args.against).any(within) {
         let message =

@@ -9,6 +9,7 @@ mod tests;
 use crate::documents::{folded, hub_license, quoted, source_line};
 use crate::error::Error;
 use crate::operations::dem::input_error;
+use crate::remote::check_local;
 use crate::splits::{OTHER, PARTS};
 use crate::studies::resolved;
 use sastrugi_numeric::{Grid, PatchShape, relative_height_patch};
@@ -129,6 +130,7 @@ pub struct Converted {
 /// A folder that is not a release or has no missions; missions of several vehicles or rates; samples that are not evenly spaced; an output
 /// within the release, or that holds other files.
 pub fn convert(release: &Path, output: &Path, settings: &Settings) -> Result<Converted, Error> {
+    check_local(output)?;
     let opened = Release::open(release)?;
     if resolved(output).starts_with(resolved(release)) {
         let message = "the dataset cannot be written into the release, which is sealed; choose a folder outside it";

@@ -21,6 +21,7 @@ pub use objects::Objects;
 use super::cache::{RECORD, Record, is_key};
 use crate::error::Error;
 use crate::job::ItemRef;
+use crate::remote::check_place;
 use sastrugi_store::atomic::{AtomicFile, Draft};
 use sastrugi_store::digest::Hashed;
 use sastrugi_store::objects::Bucket;
@@ -30,7 +31,7 @@ use std::collections::BTreeSet;
 use std::fmt::Debug;
 use std::io::Write;
 use std::path::Path;
-use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, PoisonError};
 use std::time::SystemTime;
 
 /// Maximum number of problems that a run keeps.
@@ -89,10 +90,11 @@ pub struct Entry {
 /// Opens the shared cache at a place: a bucket, `s3://bucket/prefix`, or a folder, which is created if it does not exist.
 ///
 /// # Errors
-/// A folder with other files, or a place that cannot be used.
+/// A folder with other files, a bucket with a release there, or a place that cannot be used.
 pub fn open(place: &str, read_only: bool) -> Result<Box<dyn Shared>, Error> {
+    check_place(Path::new(place))?;
     if Bucket::is_address(place) {
-        return Ok(Box::new(Objects::new(Arc::new(Bucket::open(place)?), read_only)));
+        return Ok(Box::new(Objects::open(Bucket::open(place)?, read_only)?));
     }
     Ok(Box::new(Folder::open(Path::new(place), read_only)?))
 }

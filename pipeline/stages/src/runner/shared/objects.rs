@@ -8,6 +8,7 @@ use super::{Entry, Shared, is_entry};
 use crate::error::Error;
 use crate::runner::cache::{RECORD, Record};
 use sastrugi_store::objects::{Bucket, Object};
+use sastrugi_store::release::MANIFEST;
 use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
@@ -21,6 +22,18 @@ pub struct Objects {
 }
 
 impl Objects {
+    /// Opens the cache in a bucket.
+    ///
+    /// # Errors
+    /// A release has this address, or the bucket cannot be read.
+    pub fn open(bucket: Bucket, is_read_only: bool) -> Result<Self, Error> {
+        if bucket.contains(MANIFEST)? {
+            let advice = "is a release, which takes no other objects; choose another prefix for the cache";
+            return Err(Error::Usage(format!("{} {advice}", bucket.address())));
+        }
+        Ok(Self::new(Arc::new(bucket), is_read_only))
+    }
+
     /// The cache in a bucket.
     pub fn new(bucket: Arc<Bucket>, is_read_only: bool) -> Self {
         Self { bucket, is_read_only }
