@@ -1,6 +1,7 @@
 //! The shared cache, with jobs that only write a line of text.
 
 use super::{Area, FILE, all, diamond, graph, item, limits, node, run, text_of};
+use crate::error::Error;
 use crate::runner::cache::Cache;
 use crate::runner::execute::execute;
 use crate::runner::graph::Graph;
@@ -287,4 +288,16 @@ fn val_a_bucket_is_a_shared_cache() {
     let left = prune(&*place(false), Keep { bytes: Some(0), age: None }, SystemTime::now()).unwrap();
     assert_eq!((left.entries, left.removed, bucket.list("").unwrap().len()), (0, 4, 0));
     assert!(prune(&*place(true), Keep { bytes: Some(0), age: None }, SystemTime::now()).unwrap().removed == 0);
+}
+
+/// The address of a release is not a cache, also to read it.
+#[test]
+fn val_a_release_in_a_bucket_is_not_a_shared_cache() {
+    for is_read_only in [false, true] {
+        let bucket = Bucket::in_memory("s3://bucket/snow").unwrap();
+        bucket.create("manifest.json", b"{}").unwrap();
+        let refused = Objects::open(bucket, is_read_only).unwrap_err();
+        assert!(matches!(&refused, Error::Usage(why) if why.starts_with("s3://bucket/snow is a release")), "{refused}");
+    }
+    assert!(Objects::open(Bucket::in_memory("s3://bucket/snow").unwrap(), false).is_ok());
 }
