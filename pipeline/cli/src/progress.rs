@@ -1,6 +1,6 @@
 //! Progress of a run on stderr: a bar with ETA on a terminal, plain lines otherwise, only failures when quiet.
 
-use crate::output::warn;
+use crate::output::{counted, warn};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
 use sastrugi_stages::job::ItemRef;
 use sastrugi_stages::runner::progress::{End, Progress};
@@ -132,15 +132,13 @@ impl Progress for Reporter {
         if let Some(bar) = &self.bar {
             bar.set_length((seconds * TICKS_PER_SECOND) as u64);
         }
-        self.say(&format!("{total} items, {ready} already computed"));
+        self.say(&format!("{}, {ready} already computed", counted(total as u64, "item")));
     }
 
     fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {
-        match end {
-            // Their notes are printed at the end, by `watch`.
-            End::Done(_) => {}
-            End::Failed(why) => self.print(&format!("sastrugi: {item} failed: {why}")),
-            End::Skipped(parent) => self.print(&format!("sastrugi: {item} skipped because {parent} failed")),
+        // Notes, and the items that a failed one leaves without input, are printed at the end of the run.
+        if let End::Failed(why) = end {
+            self.print(&format!("sastrugi: {item} failed: {why}"));
         }
         self.advance(item, seconds);
     }

@@ -4,7 +4,7 @@ use super::serve;
 use crate::Verdict;
 use crate::args::{Cache, Common};
 use crate::failure::{Code, Failure};
-use crate::output::{bytes, print};
+use crate::output::{bytes, counted, print};
 use sastrugi_stages::runner::shared::{self, Keep, Pruned, prune};
 use std::time::{Duration, SystemTime};
 
@@ -31,12 +31,12 @@ fn age(days: f64) -> Result<Duration, Failure> {
 
 fn described(place: &str, pruned: &Pruned) -> String {
     let Pruned { entries, bytes: size, unused_days, drafts, removed, removed_bytes } = pruned;
-    let mut text = format!("{place}: {entries} entries, {}", bytes(*size as f64));
+    let mut text = format!("{place}: {}, {}", counted(*entries as u64, "entry"), bytes(*size as f64));
     if let Some(days) = unused_days {
         text.push_str(&format!(", the longest unused for {days:.1} days"));
     }
     if *drafts > 0 {
-        text.push_str(&format!("; {drafts} drafts"));
+        text.push_str(&format!("; {}", counted(*drafts as u64, "draft")));
     }
     if *removed > 0 {
         text.push_str(&format!("; removed {removed}, {}", bytes(*removed_bytes as f64)));
@@ -67,7 +67,7 @@ mod tests {
             removed: 2,
             removed_bytes: 5_000,
         };
-        let expected = "c: 3 entries, 2.0 MB, the longest unused for 1.5 days; 1 drafts; removed 2, 5.0 kB";
+        let expected = "c: 3 entries, 2.0 MB, the longest unused for 1.5 days; 1 draft; removed 2, 5.0 kB";
         assert_eq!(described("c", &full), expected);
         assert_eq!(described("c", &Pruned::default()), "c: 0 entries, 0 bytes");
     }

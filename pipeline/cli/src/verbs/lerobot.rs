@@ -4,7 +4,7 @@ use super::reading;
 use crate::Verdict;
 use crate::args::{Common, Compress, Convert};
 use crate::failure::{Code, Failure};
-use crate::output::print;
+use crate::output::{counted, print};
 use sastrugi_stages::verbs::Reading;
 use sastrugi_stages::verbs::lerobot::{self, PATCH_CELL_M, PATCH_M, Settings};
 use serde_json::{Value, json};
@@ -18,12 +18,12 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     let named = |(split, range): (&String, &Value)| format!("{split} {}", range.as_str().unwrap_or_default());
     let splits: Vec<String> = converted.splits.iter().map(named).collect();
     let mut text = format!(
-        "{}: {} episodes, {} frames at {} Hz, {} tasks; episodes of {}",
+        "{}: {}, {} frames at {} Hz, {}; episodes of {}",
         args.output.display(),
-        converted.episodes,
+        counted(converted.episodes, "episode"),
         converted.frames,
         converted.fps,
-        converted.tasks.len(),
+        counted(converted.tasks.len() as u64, "task"),
         splits.join(", ")
     );
     converted.notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));

@@ -3,7 +3,7 @@
 use crate::Verdict;
 use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verify};
 use crate::failure::{Code, Failure};
-use crate::output::{bytes, columns, print, seconds, warn};
+use crate::output::{bytes, columns, counted, print, seconds, warn};
 use crate::progress::Reporter;
 use sastrugi_report::{Companions, ReportError};
 use sastrugi_schemas::manifest::ItemNote;
@@ -28,6 +28,10 @@ const MEMORY_GIB: f64 = 4.0;
 const VERDICTS_MAX: usize = 5;
 /// Maximum number of other notes printed there.
 const NOTES_MAX: usize = 3;
+/// Maximum number of skipped items named there.
+const SKIPPED_MAX: usize = 5;
+/// The first page of the report, in a release.
+const PAGE: &str = "report/index.html";
 /// Maximum number of lines of a printed plan.
 const PLAN_LINES: usize = 40;
 
@@ -131,37 +135,62 @@ pub(super) fn watch(
     let summary = run(&reporter);
     reporter.close();
     let summary = summary?;
-    let took = seconds(start.elapsed().as_secs_f64());
-    let failed = summary.failures.len();
-    let mut text = format!(
-        "{}: {} items, {} computed, {failed} failed, {took}",
-        summary.output.display(),
-        summary.items,
-        summary.computed
-    );
-    if failed > 0 {
-        text.push_str("\nfailed items (parameters in manifest.json):");
-        summary.failures.iter().for_each(|f| text.push_str(&failure(f, &summary)));
-    }
-    if let Some(tally) = &summary.cache {
-        text.push_str(&used(tally));
-    }
-    text.push_str(&notes(&summary));
+    let text = told(&summary, &seconds(start.elapsed().as_secs_f64()));
     Ok((summary, text))
 }
 
-/// A failed item, after a merge with its shard.
-fn failure(failure: &Failed, summary: &RunSummary) -> String {
-    let shard = summary.failed_in.get(&failure.item.to_string());
-    let shard = shard.map_or_else(String::new, |shard| format!("shard {shard}, "));
-    format!("\n  {shard}{}: {}", failure.item, failure.message)
+/// What a run did, what failed, what is to be noted, and where to read more.
+fn told(summary: &RunSummary, took: &str) -> String {
+    let RunSummary { output, items, computed, failures, .. } = summary;
+    let mut text = format!(
+        "{}: {}, {computed} computed, {} failed, {took}",
+        output.display(),
+        counted(*items as u64, "item"),
+        failures.len()
+    );
+    if let Some(tally) = &summary.cache {
+        text.push_str(&used(tally));
+    }
+    text.push_str(&failed(summary));
+    let notes = notes(summary);
+    if !notes.is_empty() {
+        text.push_str(&format!("\nnotes:{notes}"));
+    }
+    let page = output.join(PAGE);
+    if page.is_file() {
+        text.push_str(&format!("\nreport: {}", page.display()));
+    }
+    text
+}
+
+/// The items that failed, after a merge with their shards, and below them those that needed their results.
+fn failed(summary: &RunSummary) -> String {
+    let (own, skipped): (Vec<&Failed>, Vec<&Failed>) =
+        summary.failures.iter().partition(|failure| failure.skipped_for.is_none());
+    if summary.failures.is_empty() {
+        return String::new();
+    }
+    let mut text = "\nfailed items (parameters in manifest.json):".to_owned();
+    for failure in own {
+        let shard = summary.failed_in.get(&failure.item.to_string());
+        let shard = shard.map_or_else(String::new, |shard| format!("shard {shard}, "));
+        text.push_str(&format!("\n  {shard}{}: {}", failure.item, failure.message));
+    }
+    if !skipped.is_empty() {
+        let named: Vec<String> = skipped.iter().take(SKIPPED_MAX).map(|f| f.item.to_string()).collect();
+        text.push_str(&format!("\n  skipped because of these: {}", named.join(", ")));
+        if skipped.len() > SKIPPED_MAX {
+            text.push_str(&format!(" and {} more", skipped.len() - SKIPPED_MAX));
+        }
+    }
+    text
 }
 
 /// What a run did with its shared cache.
 fn used(tally: &Tally) -> String {
     let Tally { fetched, published, damaged, read_only, problems } = tally;
     let published = if *read_only { "only read".to_owned() } else { format!("{published} published to it") };
-    let mut text = format!("\n  shared cache: {fetched} items copied from it, {published}");
+    let mut text = format!("\n  shared cache: {} copied from it, {published}", counted(*fetched as u64, "item"));
     if !damaged.is_empty() {
         let outcome = if *read_only { "computed" } else { "replaced" };
         text.push_str(&format!(", damaged and {outcome}: {}", damaged.len()));
@@ -199,8 +228,8 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     let total_seconds = plan.stale.iter().fold(0.0, |sum, s| sum + s.seconds);
     let total_bytes = plan.stale.iter().fold(0.0, |sum, s| sum + s.bytes);
     let mut text = format!(
-        "{} items, {} ready, {} to compute: about {} on one core, about {} of artifacts",
-        plan.items,
+        "{}, {} ready, {} to compute: about {} on one core, about {} of artifacts",
+        counted(plan.items as u64, "item"),
         plan.ready,
         plan.stale.len(),
         seconds(total_seconds),
@@ -258,13 +287,13 @@ pub fn verify(args: &Verify, common: &Common) -> Verdict {
     });
     reporter.close();
     let verification = found?;
-    let mut text = format!("{} files, {} checked", verification.files, bytes(verification.bytes as f64));
+    let mut text = format!("{}, {} checked", counted(verification.files, "file"), bytes(verification.bytes as f64));
     if !verification.recomputed.is_empty() {
-        text.push_str(&format!(", {} items recomputed", verification.recomputed.len()));
+        text.push_str(&format!(", {} recomputed", counted(verification.recomputed.len() as u64, "item")));
     }
     match verification.differences.len() {
         0 => text.push_str(": no differences"),
-        n => text.push_str(&format!(": {n} differences")),
+        n => text.push_str(&format!(": {}", counted(n as u64, "difference"))),
     }
     text.push_str(&listed(&verification.differences));
     if let Some(why) = &verification.not_comparable {
@@ -287,12 +316,13 @@ pub fn pack(args: &Pack, common: &Common) -> Verdict {
     let packing = packed?;
     let (output, json) = (packing.output.display(), serde_json::to_value(&packing).map_err(Failure::failed)?);
     let Some(sha256) = &packing.sha256 else {
-        let count = packing.differences.len();
-        let text = format!("{output} not written: the release has {count} differences{}", listed(&packing.differences));
+        let count = counted(packing.differences.len() as u64, "difference");
+        let text = format!("{output} not written: the release has {count}{}", listed(&packing.differences));
         print(common.json, &json, &text)?;
         return Ok(Code::Difference);
     };
-    let text = format!("{output}: {} files, {}\n{sha256}  {output}", packing.files, bytes(packing.bytes as f64));
+    let text =
+        format!("{output}: {}, {}\n{sha256}  {output}", counted(packing.files, "file"), bytes(packing.bytes as f64));
     print(common.json, &json, &text)?;
     Ok(Code::Done)
 }
@@ -333,4 +363,49 @@ fn default_report(release: &Path) -> PathBuf {
     let absolute = std::path::absolute(release).unwrap_or_else(|_| release.to_owned());
     let name = absolute.file_name().map_or_else(|| "release".into(), |n| n.to_string_lossy().into_owned());
     PathBuf::from(format!("{name}-report"))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_stages::job::ItemRef;
+
+    fn failure(item: &str, skipped_for: Option<&str>) -> Failed {
+        Failed {
+            item: ItemRef::new("fit", item),
+            message: "the surface is flat".to_owned(),
+            unusable_input: false,
+            skipped_for: skipped_for.map(|cause| ItemRef::new("fit", cause)),
+            parameters: json!({}),
+        }
+    }
+
+    /// Each failed item once, and notes under a heading of their own.
+    #[test]
+    fn val_the_end_of_a_run() {
+        let note = ItemNote { stage: "fit".to_owned(), item: "snow".to_owned(), note: "short range".to_owned() };
+        let mut summary = RunSummary {
+            output: PathBuf::from("no-such-release"),
+            items: 1,
+            computed: 1,
+            failures: Vec::new(),
+            notes: Vec::new(),
+            failed_in: Default::default(),
+            cache: None,
+        };
+        assert_eq!(told(&summary, "2 s"), "no-such-release: 1 item, 1 computed, 0 failed, 2 s");
+        let skipped = ["a", "b", "c", "d", "e", "f", "g"].map(|item| failure(item, Some("plane")));
+        summary.failures = [failure("plane", None)].into_iter().chain(skipped).collect();
+        summary.notes = vec![note];
+        summary.failed_in = [("fit/plane".to_owned(), 3)].into();
+        let lines = [
+            "no-such-release: 1 item, 1 computed, 8 failed, 2 s",
+            "failed items (parameters in manifest.json):",
+            "  shard 3, fit/plane: the surface is flat",
+            "  skipped because of these: fit/a, fit/b, fit/c, fit/d, fit/e and 2 more",
+            "notes:",
+            "  fit/snow: short range",
+        ];
+        assert_eq!(told(&summary, "2 s"), lines.join("\n"));
+    }
 }
