@@ -393,7 +393,7 @@ pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterat
     } else {
         format!("known: {}", known.join(", "))
     };
-    let error = entry.error(key, format!("`{key}` names \"{id}\", which no earlier section defines"));
+    let error = entry.error(key, format!("`{key}` names \"{id}\", which is not among the ids that it can refer to"));
     StudyError { missing_id: Some(id.to_owned()), ..error.with_help(Some(nearest.unwrap_or(list))) }
 }
 
