@@ -26,12 +26,12 @@ pub fn listen() -> io::Result<()> {
     Ok(())
 }
 
-/// Files are written atomically, so the process may exit at any time.
+/// Files appear only when they are complete, so the process may exit at any time. What it leaves under temporary names, the next run removes.
 fn interrupted() {
     match serve::interrupted() {
         Some(Interrupt::First) => return,
         Some(Interrupt::Again) => warn("\nsastrugi: stopped immediately; open requests were cut off"),
-        None => warn("\nsastrugi: interrupted; no partial files left; rerun to resume"),
+        None => warn("\nsastrugi: interrupted; no incomplete output was put in place; rerun to resume"),
     }
     std::process::exit(i32::from(Code::Retry as u8));
 }
