@@ -56,7 +56,7 @@ pub enum ObjectError {
         address: String,
     },
     /// A request failed.
-    #[error("{address}: {source}")]
+    #[error("{address}: {}", in_words(source))]
     Request {
         /// The object or the bucket.
         address: String,
@@ -85,6 +85,20 @@ impl ObjectError {
 
     fn file(path: &Path) -> impl FnOnce(io::Error) -> Self + '_ {
         move |source| Self::File { path: path.to_owned(), source }
+    }
+}
+
+/// What a store answered, without the document in which it says so.
+fn in_words(error: &object_store::Error) -> String {
+    use object_store::Error::{NotFound, PermissionDenied, Unauthenticated};
+    let text = error.to_string();
+    match error {
+        PermissionDenied { .. } | Unauthenticated { .. } => {
+            "access denied; check the AWS_... variables, and what they may do with the bucket".to_owned()
+        }
+        NotFound { .. } if text.contains("NoSuchBucket") => "no such bucket".to_owned(),
+        NotFound { .. } => "no such bucket or object".to_owned(),
+        _ => text.split("<?xml").next().unwrap_or_default().trim_end_matches([':', ' ']).to_owned(),
     }
 }
 
@@ -151,7 +165,7 @@ impl Bucket {
         let store = store.map_err(|source| ObjectError::Environment { address: address.to_owned(), source })?;
         let bucket = Self::new(Arc::new(store), address)?;
         match bucket.look() {
-            Err(error) if asks_for_a_role(&error.to_string()) => {
+            Err(ObjectError::Request { source, .. }) if asks_for_a_role(&source.to_string()) => {
                 Err(ObjectError::Credentials { address: address.to_owned() })
             }
             looked => looked.map(|()| bucket),
@@ -435,6 +449,22 @@ mod tests {
         for name in ["../b", "b/../../c", "b//c", "."] {
             assert!(matches!(bucket.contains(name), Err(ObjectError::Address(_))), "{name}");
         }
+    }
+
+    /// A store answers with an XML document, of which a user gets the sentence.
+    #[test]
+    fn val_answers_are_told_in_words() {
+        let xml = "<?xml version=\"1.0\"?><Error><Code>NoSuchBucket</Code></Error>";
+        let said =
+            |source: object_store::Error| ObjectError::Request { address: "s3://b".to_owned(), source }.to_string();
+        let missing = |body: &str| object_store::Error::NotFound { path: "x".to_owned(), source: body.into() };
+        assert_eq!(said(missing(xml)), "s3://b: no such bucket");
+        assert_eq!(said(missing("404")), "s3://b: no such bucket or object");
+        let denied = object_store::Error::PermissionDenied { path: "x".to_owned(), source: xml.into() };
+        assert!(said(denied).starts_with("s3://b: access denied; check the AWS_"));
+        let body = format!("Server returned non-2xx status code: 400 Bad Request: {xml}");
+        let other = object_store::Error::Generic { store: "S3", source: body.into() };
+        assert!(said(other).ends_with("status code: 400 Bad Request"));
     }
 
     /// Whether to try again follows from the cause.

@@ -57,7 +57,7 @@ impl Folder {
             match cache.draft() {
                 Ok(draft) => drop(fs::remove_dir(draft)),
                 Err(e) if is_refused(&e) => cache.is_read_only = true,
-                Err(e) => return Err(Error::at(root, e)),
+                Err(e) => return Err(unusable(root, e)),
             }
         }
         Ok(cache)
@@ -199,7 +199,7 @@ fn names(root: &Path, folder: &str) -> Result<Vec<String>, Error> {
 /// True for a shared cache; false for an empty or missing folder.
 fn marked(root: &Path) -> Result<bool, Error> {
     let refused = || {
-        let advice = "is neither empty nor a shared cache of sastrugi; choose another folder with --cache";
+        let advice = "is neither empty nor a shared cache of sastrugi; choose another folder";
         Error::Usage(format!("{} {advice}", root.display()))
     };
     // Listed once: another run may be creating the cache, and it writes the mark first.
@@ -207,21 +207,33 @@ fn marked(root: &Path) -> Result<bool, Error> {
         Ok(entries) => entries.flatten().map(|entry| entry.file_name()).collect(),
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
         Err(e) if e.kind() == ErrorKind::NotADirectory => {
-            return Err(Error::Usage(format!("{}: it is a file, not a folder", root.display())));
+            return Err(Error::Usage(format!("{}: a shared cache is a folder, and this is a file", root.display())));
         }
-        Err(e) => return Err(Error::at(root, e)),
+        Err(e) => return Err(unusable(root, e)),
     };
     if found.contains(OsStr::new(MARK)) {
         let path = root.join(MARK);
-        let text = fs::read(&path).map_err(|e| Error::at(&path, e))?;
+        let text = fs::read(&path).map_err(|e| unusable(root, e))?;
         return if text == MARK_TEXT.as_bytes() { Ok(true) } else { Err(refused()) };
     }
     if found.iter().all(|name| atomic::is_temporary(name)) { Ok(false) } else { Err(refused()) }
 }
 
 fn mark(root: &Path) -> Result<(), Error> {
-    let path = root.join(MARK);
-    atomic::write(&path, MARK_TEXT.as_bytes()).map_err(|e| Error::at(&path, e))
+    atomic::write(&root.join(MARK), MARK_TEXT.as_bytes()).map_err(|e| unusable(root, e))
+}
+
+/// A failure of the file system that says what the folder is for.
+fn unusable(root: &Path, error: io::Error) -> Error {
+    let kind = error.kind();
+    Error::at(root, io::Error::new(kind, format!("cannot be used as shared cache: {}", words(&error))))
+}
+
+fn words(error: &io::Error) -> String {
+    match error.kind() {
+        ErrorKind::PermissionDenied => "permission denied".to_owned(),
+        _ => error.to_string(),
+    }
 }
 
 /// True if the file system refuses to be written to.

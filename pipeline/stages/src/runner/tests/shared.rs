@@ -149,7 +149,10 @@ fn val_a_cache_has_its_own_folder() {
     let refused = |root: &Path, read_only: bool| Folder::open(root, read_only).unwrap_err().to_string();
     for read_only in [false, true] {
         assert!(refused(foreign.path(), read_only).contains("neither empty nor a shared cache"));
-        assert!(refused(&foreign.path().join("thesis.tex"), read_only).ends_with("it is a file, not a folder"));
+        assert!(
+            refused(&foreign.path().join("thesis.tex"), read_only)
+                .ends_with("a shared cache is a folder, and this is a file")
+        );
     }
     let missing = foreign.path().join("none");
     assert!(
