@@ -65,7 +65,10 @@ impl Error {
 
     /// The same for a file; one that is not a regular file is unusable input.
     pub fn at(path: &Path, error: std::io::Error) -> Self {
-        let words = format!("{}: {error}", path.display());
+        let words = match error.kind() {
+            std::io::ErrorKind::IsADirectory => format!("{}: is a folder; name a file", path.display()),
+            _ => format!("{}: {error}", path.display()),
+        };
         if error.kind() == std::io::ErrorKind::InvalidInput {
             return Self::Input(words);
         }
@@ -188,5 +191,7 @@ mod tests {
             };
             assert!(kind == expected && found.to_string().starts_with("a/b.tif: "), "{kind}: {found}");
         }
+        let folder = Error::at(path, IoError::from(ErrorKind::IsADirectory));
+        assert_eq!(folder.to_string(), "a/b.tif: is a folder; name a file");
     }
 }
