@@ -105,6 +105,10 @@ fn val_steps() {
     assert_eq!(step(&["shard", "1"]).code, 0);
     site.is_released(&step(&["merge"]));
     assert_eq!((step(&["all"]).code, step(&[]).code), (2, 2));
+    // A file in the place of the folder for shards does not pass.
+    let mut nowhere = Command::new("env");
+    nowhere.arg("PARTS=study.toml/parts").arg(recipe("step")).arg("merge");
+    assert_eq!(site.call(&mut nowhere).code, 1);
 }
 
 /// True if Slurm can be started here; else a message.

@@ -4,6 +4,7 @@ use clap::builder::{PossibleValuesParser, TypedValueParser};
 use clap::{Args, Parser, Subcommand, ValueEnum};
 use clap_complete::Shell;
 use sastrugi_schemas::study::Simulator;
+use sastrugi_stages::runner::shard::PARTS_MAX;
 use sastrugi_stages::starting::STARTING;
 use sastrugi_store::dem::points::Statistic;
 use std::path::{Path, PathBuf};
@@ -308,7 +309,7 @@ pub struct Run {
     #[arg(long, value_name = "I/N")]
     pub shard: Option<String>,
     /// Compute only what more than one of N shards needs, publish it to --cache, and write no release.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=100_000), requires = "cache", conflicts_with = "shard")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(PARTS_MAX)), requires = "cache", conflicts_with_all = ["shard", "output"])]
     pub ancestors: Option<u32>,
     /// Shared cache: a folder, or s3://BUCKET/PREFIX, that any number of runs may use at the same time, also over a network. Items in it are
     /// copied, others are published to it.
@@ -337,7 +338,7 @@ pub struct Plan {
     #[arg(long, value_name = "I/N")]
     pub shard: Option<String>,
     /// Show what each of N shards costs, what they have in common, and whether they are balanced, for an empty work area.
-    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=10_000), conflicts_with = "shard")]
+    #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(PARTS_MAX)), conflicts_with = "shard")]
     pub shards: Option<u32>,
 }
 

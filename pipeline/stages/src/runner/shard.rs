@@ -25,7 +25,7 @@ const STUDY: &str = "study.toml";
 /// Maximum number of items that one message names.
 const ITEMS_NAMED: usize = 5;
 /// Maximum number of parts of a run.
-const PARTS_MAX: u32 = 100_000;
+pub const PARTS_MAX: u32 = 10_000;
 
 /// Part `index` of `count`, counted from 1.
 ///
@@ -52,12 +52,14 @@ impl Part {
     /// Reads `I/N`.
     ///
     /// # Errors
-    /// Anything but 1 <= I <= N <= 100 000.
+    /// Anything but 1 <= I <= N <= 10 000.
     pub fn parse(text: &str) -> Result<Self, Error> {
         let numbers = text.split_once('/').and_then(|(i, n)| Some((i.parse().ok()?, n.parse().ok()?)));
         match numbers {
             Some((index, count)) if (Self { index, count }).is_valid() => Ok(Self { index, count }),
-            _ => Err(Error::Usage(format!("`--shard {text}`: expected I/N with 1 <= I <= N, such as 1/3"))),
+            _ => Err(Error::Usage(format!(
+                "`--shard {text}`: expected I/N with 1 <= I <= N <= {PARTS_MAX}, such as 1/3"
+            ))),
         }
     }
 
@@ -230,7 +232,12 @@ pub struct Joined {
 /// run again. Nothing that is complete is computed again.
 pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     let (shards, mut problems) = read_all(folders);
-    problems.extend(check_set(&shards));
+    let of_set = check_set(&shards);
+    if let Some((_, first)) = shards.first().filter(|_| !problems.is_empty() && of_set.is_empty()) {
+        let it = if problems.len() == 1 { "it" } else { "them" };
+        problems.push(format!("all {} shards are there without {it}; leave {it} out", first.part.count));
+    }
+    problems.extend(of_set);
     if !problems.is_empty() {
         return Err(Error::Input(problems.join("; ")));
     }
@@ -376,11 +383,11 @@ mod tests {
     #[test]
     fn val_parts() {
         assert_eq!(Part::parse("2/3").unwrap(), Part { index: 2, count: 3 });
-        assert_eq!(Part::parse("100000/100000").unwrap(), Part { index: 100_000, count: 100_000 });
-        for wrong in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2", "1/100001", "1/2/3", ""] {
+        assert_eq!(Part::parse("10000/10000").unwrap(), Part { index: 10_000, count: 10_000 });
+        for wrong in ["0/3", "4/3", "3", "a/b", "1/0", "-1/2", "1/10001", "1/2/3", ""] {
             let error = Part::parse(wrong).unwrap_err();
             assert!(matches!(error, Error::Usage(_)), "{wrong}");
-            let expected = format!("`--shard {wrong}`: expected I/N with 1 <= I <= N, such as 1/3");
+            let expected = format!("`--shard {wrong}`: expected I/N with 1 <= I <= N <= 10000, such as 1/3");
             assert_eq!(error.to_string(), expected);
         }
     }
@@ -471,7 +478,7 @@ mod tests {
     #[test]
     fn val_hostile_descriptions_are_refused() {
         assert_eq!(description(2, 3).check(), Ok(()));
-        for (index, count) in [(0, 3), (4, 3), (1, 100_001)] {
+        for (index, count) in [(0, 3), (4, 3), (1, 10_001)] {
             let error = description(index, count).check().unwrap_err();
             assert!(error.starts_with(&format!("part {index} of {count} is invalid")), "{error}");
         }
