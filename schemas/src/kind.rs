@@ -147,6 +147,10 @@ fn in_plain_words(message: String) -> String {
     if let Some((found, expected)) = wrong.and_then(|rest| rest.rsplit_once(", expected ")) {
         return format!("must be {}, got {}", type_in_words(expected), value_in_words(found));
     }
+    let word = message.strip_prefix("unknown variant `").and_then(|rest| rest.split_once("`, expected "));
+    if let Some((found, known)) = word {
+        return format!("has the unknown value `{found}`; known: {}", known.trim_start_matches("one of "));
+    }
     let length = message.strip_prefix("invalid length ").and_then(|rest| rest.split_once(", expected "));
     match length.map(|(found, expected)| (found, expected.strip_prefix("an array of length "), expected)) {
         Some((found, Some(values), _)) => format!("must be a list of {values} values, got {found}"),
@@ -291,6 +295,8 @@ mod tests {
         assert_eq!(message(item("count", json!(1.5))), "`count` must be a whole number from 0 to 4294967295, got 1.5");
         assert_eq!(message(item("window", json!(true))), "`window` must be a list, got true");
         assert_eq!(message(item("window", json!(["x"]))), "`window.0` must be a number, got \"x\"");
+        let word = read_parameters::<Word>(&json!({"word": "on"})).unwrap_err().to_string();
+        assert_eq!(word, "`word` has the unknown value `on`; known: `one`, `two`, `three`");
         let layers = json!({"layers": [[1.0]]});
         let short = read_parameters::<Layers>(&layers).unwrap_err().to_string();
         assert_eq!(short, "`layers.0` must be a list of 2 values, got 1");
@@ -298,6 +304,20 @@ mod tests {
         assert_eq!(long, "`layers.0` must be a shorter list, got 3 values");
         // `is_missing` relies on serde's own sentence.
         assert!(read_parameters::<Item>(&json!({})).unwrap_err().is_missing("id"));
+    }
+
+    #[derive(Debug, Deserialize)]
+    struct Word {
+        #[serde(rename = "word")]
+        _word: Number,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(rename_all = "snake_case")]
+    enum Number {
+        One,
+        Two,
+        Three,
     }
 
     #[derive(Debug, Deserialize)]

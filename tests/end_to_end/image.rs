@@ -157,7 +157,7 @@ fn val_wrong_images_are_refused() {
         ("surface = \"mars\"", "surface = \"venus\"", "names \"venus\""),
         ("pixel_m = 0.1", "pixel_m = -0.1", "`camera.pixel_m` is -0.1"),
         ("target_m = [3.2, 3.0, 0.0]", "target_m = [3.2, 0.5, 0.3]", "`camera.target_m` is the position"),
-        ("kind = \"parallel\"", "kind = \"fisheye\"", "unknown variant `fisheye`"),
+        ("kind = \"parallel\"", "kind = \"fisheye\"", "unknown value `fisheye`; known:"),
         ("id = \"orbit\"", "id = \"suns-120\"", "is taken"),
     ] {
         assert!(STUDY.contains(from), "{from}");

@@ -7,9 +7,10 @@ use sastrugi_stages::Error;
 
 import_exception!(sastrugi._errors, SastrugiError);
 
-/// The exception with the program's sentence and exit code.
+/// The exception with the program's sentence and exit code. Options of the program are arguments here.
 pub fn refused(error: Error) -> PyErr {
-    SastrugiError::new_err((error.to_string(), Code::of(&error) as u8))
+    let code = Code::of(&error) as u8;
+    SastrugiError::new_err((error.to_string().replace("`--", "`"), code))
 }
 
 /// Bad usage.

@@ -5,6 +5,7 @@ use crate::surfaces::{text, value};
 use crate::waiting::{waited, watched};
 use pyo3::prelude::*;
 use sastrugi_schemas::Record;
+use sastrugi_schemas::kind::read_parameters;
 use sastrugi_stages::Error;
 use sastrugi_stages::loaded::load;
 use sastrugi_stages::remote::check_local;
@@ -13,6 +14,7 @@ use sastrugi_stages::studies::{self, RunRequest, RunSummary};
 use sastrugi_stages::verbs::navigate::{self as navigation, is_route_file};
 use sastrugi_stages::verbs::traverse::Place;
 use sastrugi_stages::verbs::{LogSettings, analyze as logs, parameters as known, traverse as driving};
+use serde::de::DeserializeOwned;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -186,11 +188,11 @@ pub fn analyze(
 }
 
 fn analyzed(paths: &[PathBuf], dem: Option<&Path>, settings: &Value, output: Option<&Path>) -> Result<Value, Error> {
-    fn read<T: serde::de::DeserializeOwned>(settings: &Value, key: &str, otherwise: T) -> Result<T, Error> {
+    fn read<T: DeserializeOwned>(settings: &Value, key: &str, otherwise: T) -> Result<T, Error> {
         if settings[key].is_null() {
             return Ok(otherwise);
         }
-        serde_json::from_value(settings[key].clone()).map_err(|e| Error::Usage(format!("`{key}`: {e}")))
+        read_parameters(&settings[key]).map_err(|e| Error::from(e.within(key)))
     }
     let default = LogSettings::default();
     let log_settings = LogSettings {

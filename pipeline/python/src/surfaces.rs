@@ -8,7 +8,7 @@ use pyo3::prelude::*;
 use sastrugi_schemas::fit::{FitFile, Quoted, SILL_OVER_RANGE};
 use sastrugi_stages::Error;
 use sastrugi_stages::arrays::{self, Generated, Raster, Registered, Textured};
-use sastrugi_stages::operations::fits::to_json;
+use sastrugi_stages::operations::fits::{of_json, to_json};
 use sastrugi_stages::remote::check_local;
 use sastrugi_stages::verbs::fit::{Done, Request, fit as fit_dem};
 use sastrugi_stages::verbs::roughness::{Bumps, Detrender, RideRequest};
@@ -103,11 +103,7 @@ pub fn save_fit(path: PathBuf, fit: &str) -> PyResult<()> {
 }
 
 fn fit_of(text: &str) -> PyResult<FitFile> {
-    let fit: FitFile = serde_json::from_str(text).map_err(|e| usage(format!("not a fit: {e}")))?;
-    if fit.model.is_empty() || fit.parameters.is_empty() {
-        return Err(usage("not a fit: `model` and `parameters` are required"));
-    }
-    Ok(fit)
+    of_json(text.as_bytes()).map_err(|why| usage(format!("not a fit: {why}")))
 }
 
 /// What may be quoted from a fit: a JSON object with `level` and `kind` of the intervals, and for each name `value` and `interval`, or

@@ -59,6 +59,20 @@ def test_what_is_not_a_fit():
         assert refused.value.code == 2
 
 
+def test_wrong_values_are_named():
+    for call, said in [
+        (lambda: Fit({"model": "exponential", "parameters": {"sigma_m": "3 cm"}}), 'not a fit: `parameters.sigma_m` must be a number, got "3 cm"'),
+        (lambda: Fit({"model": 3, "parameters": {}}), "not a fit: `model` must be text in quotes, got 3"),
+        (lambda: snow().texture(4.0, "fine"), '`cell_m` must be a number, got "fine"'),
+        (lambda: sastrugi.analyze(["a.mcap"], rate_hz="fast"), '`rate_hz` must be a number, got "fast"'),
+        (lambda: sastrugi.analyze(["a.mcap"], differentiator="best"), "`differentiator` has the unknown value `best`; known: "),
+        (lambda: sastrugi.roughness(snow().texture(4.0, 0.1), band=(5.0, 1.0)), "`band 5:1`: "),
+    ]:
+        with pytest.raises(sastrugi.SastrugiError) as refused:
+            call()
+        assert str(refused.value).startswith(said) and refused.value.code == 2
+
+
 def test_one_statement_of_each_parameter():
     """What an argument states is not stated again under the name that it has in a study."""
     for call, said in [

@@ -4,6 +4,7 @@ use super::coregistration;
 use crate::job::JobError;
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::{Candidate, DirectionBin, FitFile, Intervals, NoiseReference, Source};
+use sastrugi_schemas::kind::read_parameters;
 use sastrugi_schemas::tables::{CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, LikelihoodProfileRow};
 use sastrugi_texture::noise::ReferenceNoise;
 use serde_json::json;
@@ -44,6 +45,28 @@ pub fn check_noise_reference(reference: bool, minus: bool) -> Result<(), Paramet
 /// When a number cannot be written as JSON (a bug).
 pub fn to_json(fit: &FitFile) -> Result<String, JobError> {
     serde_json::to_string_pretty(fit).map(|text| text + "\n").map_err(JobError::new)
+}
+
+/// Reads the text of a fit file. Only `model` and `parameters` are required.
+///
+/// # Errors
+/// What is wrong with it, in one sentence.
+///
+/// ```
+/// use sastrugi_stages::operations::fits::of_json;
+///
+/// let fit = of_json(br#"{ "model": "exponential", "parameters": { "sigma_m": 0.03, "range_m": 0.28 } }"#).unwrap();
+/// assert_eq!(fit.parameters["range_m"], 0.28);
+/// let wrong = of_json(br#"{ "model": "exponential", "parameters": { "sigma_m": "3 cm" } }"#);
+/// assert_eq!(wrong.unwrap_err(), "`parameters.sigma_m` must be a number, got \"3 cm\"");
+/// ```
+pub fn of_json(text: &[u8]) -> Result<FitFile, String> {
+    let value = serde_json::from_slice(text).map_err(|e| format!("it is not valid JSON: {e}"))?;
+    let fit: FitFile = read_parameters(&value).map_err(|e| e.to_string())?;
+    if fit.model.is_empty() || fit.parameters.is_empty() {
+        return Err("`model` and `parameters` are required".to_owned());
+    }
+    Ok(fit)
 }
 
 /// A fit as a row of the table `fits`.

@@ -4,6 +4,7 @@ use super::parameters;
 use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds};
 use crate::memory;
+use crate::operations::fits::of_json;
 use crate::operations::textures::{fill_note, has_its_texture, lay_onto, scaled};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::Streams;
@@ -167,12 +168,8 @@ fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Erro
 pub fn read_fit(path: &Path) -> Result<FitFile, Error> {
     let name = path.display();
     let bytes = sastrugi_store::file::read(path).map_err(|e| Error::unreadable(path, &e))?;
-    let fit: FitFile = serde_json::from_slice(&bytes).map_err(|e| match dem::Format::of_name(path) {
+    of_json(&bytes).map_err(|why| match dem::Format::of_name(path) {
         Some(_) => Error::Input(format!("{name} is a DEM, not a fit file; run `sastrugi fit` first")),
-        None => Error::Input(format!("{name}: not a fit file: {e}")),
-    })?;
-    if fit.model.is_empty() || fit.parameters.is_empty() {
-        return Err(Error::Input(format!("{name}: not a fit file: `model` and `parameters` are required")));
-    }
-    Ok(fit)
+        None => Error::Input(format!("{name}: not a fit file: {why}")),
+    })
 }
