@@ -147,6 +147,10 @@ fn in_plain_words(message: String) -> String {
     if let Some((found, expected)) = wrong.and_then(|rest| rest.rsplit_once(", expected ")) {
         return format!("must be {}, got {}", type_in_words(expected), value_in_words(found));
     }
+    let key = message.strip_prefix("unknown field `").and_then(|rest| rest.split_once("`, expected "));
+    if let Some((found, known)) = key {
+        return format!("has the unknown key `{found}`; known: {}", known.trim_start_matches("one of "));
+    }
     let word = message.strip_prefix("unknown variant `").and_then(|rest| rest.split_once("`, expected "));
     if let Some((found, known)) = word {
         return format!("has the unknown value `{found}`; known: {}", known.trim_start_matches("one of "));

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::study::keys;
 use crate::study::text::{StudyText, value_to_json};
-use sastrugi_mobility::registry::{CUSTOM, doubts};
+use sastrugi_mobility::registry::{CUSTOM, doubts, vehicle};
 use sastrugi_schemas::Kind;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -39,6 +39,9 @@ pub fn assign(params: &mut Value, pairs: &[String]) -> Result<(), Error> {
     }
     Ok(())
 }
+
+/// Key of a `[[traverse]]` that holds the values of a vehicle file.
+const CHANGES: &str = "vehicle_changes";
 
 /// Keys of a vehicle file: those that are read, and those that `kinds` prints in addition.
 const VEHICLE_KEYS: [&str; 8] = ["base", "parameters", "sources", "kind", "family", "summary", "source", "schema"];
@@ -78,17 +81,28 @@ pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
         Some(base) => base.as_str().ok_or_else(|| refused(&"`base` must be the name of a vehicle"))?,
     };
     match file.get("parameters") {
-        Some(parameters @ Value::Object(_)) => {
+        Some(Value::Object(changes)) => {
+            check_vehicle(base, changes).map_err(|e| refused(&e))?;
             place(params, "vehicle", Value::from(base))?;
-            place(params, "vehicle_changes", parameters.clone())
+            place(params, CHANGES, Value::Object(changes.clone()))
         }
         _ => Err(refused(&"missing table `parameters`")),
     }
 }
 
+/// Refuses the values of a vehicle file by the names that they have in it. An unknown base is left to the study.
+fn check_vehicle(base: &str, changes: &Map<String, Value>) -> Result<(), String> {
+    match vehicle(base, changes) {
+        Err(error) if error.key.starts_with(CHANGES) => {
+            Err(error.to_string().replacen(CHANGES, "parameters", 1).replacen("` missing field `", "` lacks `", 1))
+        }
+        _ => Ok(()),
+    }
+}
+
 /// Warnings about the vehicle of a run, one sentence each.
 pub fn vehicle_doubts(params: &Value) -> Vec<String> {
-    let changes = params["vehicle_changes"].as_object().cloned().unwrap_or_default();
+    let changes = params[CHANGES].as_object().cloned().unwrap_or_default();
     params["vehicle"].as_str().map(|kind| doubts(kind, &changes)).unwrap_or_default()
 }
 
@@ -210,15 +224,26 @@ mod tests {
         };
         let based = file("a.toml", "base = \"ugv_4x4\"\n[parameters.drive]\nspeed_limit_m_s = 0.8\n").unwrap();
         assert_eq!(based, json!({ "vehicle": "ugv_4x4", "vehicle_changes": { "drive": { "speed_limit_m_s": 0.8 } } }));
-        // Without a base, all values are the file's own; `kinds --json` prints a list of one.
+        // `kinds --json` prints a list of one.
         let printed = file("b.JSON", "[{ \"kind\": \"mine\", \"parameters\": {} }]").unwrap();
         assert_eq!(printed, json!({ "vehicle": "mine", "vehicle_changes": {} }));
-        assert_eq!(file("c.toml", "[parameters]\n").unwrap()["vehicle"], CUSTOM);
         for (name, text, words) in [
             ("d.toml", "base = 5\n[parameters]\n", "`base` must be the name of a vehicle"),
             ("e.toml", "base = \"ugv_4x4\"\n", "missing table `parameters`"),
             ("f.toml", "mass_kg = 5\n", "unknown key `mass_kg`"),
             ("g.json", "[{}, {}]", "contains 2 vehicles"),
+            // Without a base, all values are the file's own, and none may be missing.
+            ("c.toml", "[parameters]\n", "`parameters` lacks `"),
+            (
+                "h.toml",
+                "base = \"ugv_4x4\"\n[parameters.wheels]\nradius_m = -0.1\n",
+                "`parameters.wheels.radius_m` is -0.1",
+            ),
+            (
+                "i.toml",
+                "base = \"ugv_4x4\"\n[parameters.wheels]\nradius = 0.1\n",
+                "has the unknown key `radius`; known: ",
+            ),
         ] {
             let error = file(name, text).unwrap_err();
             assert!(error.contains(words) && error.contains(name), "{name}: {error}");
