@@ -7,7 +7,7 @@ use super::{options, reading};
 use crate::Verdict;
 use crate::args::{Common, Detrend, Fit, Obstacles, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
-use crate::output::{columns, print, significant};
+use crate::output::{columns, print, significant, warn};
 use sastrugi_schemas::fit::{FitFile, Quoted, SILL_OVER_RANGE, Source};
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::local::Local;
@@ -57,7 +57,12 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         output: &args.output,
         options: options(&args.writing, &args.output)?,
     };
-    print_summary(common, &verbs::texture::texture(&request)?)
+    let made = verbs::texture::texture(&request)?;
+    let warnings = made["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str);
+    if !common.quiet {
+        warnings.for_each(|warning| warn(&format!("sastrugi: warning: {warning}")));
+    }
+    print_summary(common, &made)
 }
 
 /// A number, else a raster.

@@ -123,6 +123,8 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         }
     };
     notes.extend(dem::write(request.output, &heights, &crs, &request.options).map_err(super::write_error)?);
+    let (warnings, notes): (Vec<String>, Vec<String>) =
+        notes.into_iter().partition(|note| note == fft_ma::MOSTLY_EXTRAPOLATED);
     Ok(json!({
         "file": request.output.display().to_string(),
         "method": request.method,
@@ -133,6 +135,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         "covariance_error_max_m2": outcome.covariance_error_max_m2,
         "clip_share": outcome.clip_share,
         "grid": super::describe_grid(&heights),
+        "warnings": warnings,
         "notes": notes,
     }))
 }

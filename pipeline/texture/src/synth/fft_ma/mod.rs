@@ -57,6 +57,9 @@ use spectrum::Spectrum;
 pub const CLIP_SHARE_MAX: f64 = 1e-6;
 /// Width of a tile, in ranges, below which it is noted.
 const TILE_RANGES_NOTE: f64 = 4.0;
+/// Note on a texture of a measured covariance whose long waves, and with them its relief, are those of a model.
+pub const MOSTLY_EXTRAPOLATED: &str = "most of the variance comes from the model, at wavelengths that the background removed, and was not measured: add a \
+     texture with covariance = \"residual\" to a measured background instead";
 /// Share of the variance extrapolated by the model above which it is noted.
 const CONTINUED_SHARE_NOTE: f64 = 0.5;
 /// Bytes per torus cell during the synthesis of a field: an upper bound of the 10 or 16 of the module header.
@@ -322,11 +325,7 @@ impl FftMa {
                 100.0 * made.continued_share
             ));
             if made.continued_share > CONTINUED_SHARE_NOTE {
-                notes.push(
-                    "most of the variance comes from the model, at wavelengths that the background removed, and was not measured: add a \
-                     texture with covariance = \"residual\" to a measured background instead"
-                        .to_owned(),
-                );
+                notes.push(MOSTLY_EXTRAPOLATED.to_owned());
             }
         }
         notes
