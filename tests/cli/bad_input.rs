@@ -260,6 +260,9 @@ fn val_missing_files_are_input_errors() {
     let folder = area();
     refused(folder.path(), &["run", "nothing.toml"], INPUT, &["nothing.toml", "no such file"]);
     refused(folder.path(), &["info", "nothing.tif"], INPUT, &["nothing.tif", "no such file"]);
+    std::fs::create_dir(folder.path().join("missions")).unwrap();
+    write(&folder.path().join("missions"), "part-0000.parquet", "");
+    refused(folder.path(), &["info", "missions"], INPUT, &["a folder of Parquet files; name one of them"]);
     refused(folder.path(), &["verify", "nothing"], INPUT, &["nothing"]);
     refused(folder.path(), &["merge", "nothing", "-o", "x"], INPUT, &["nothing"]);
     refused(folder.path(), &["fit", "nothing.tif", "-o", "fit.json"], INPUT, &["no such file"]);
@@ -292,6 +295,8 @@ fn val_bad_calls_are_usage_errors() {
     run(&["terrain", "multifractal", "--threads", "0", "-o", "t.tif"], &["--threads"]);
     write(folder.path(), "study.toml", &small_study());
     run(&["run", "study.toml", "--shard", "4/3"], &["1 <= I <= N"]);
+    run(&["fit", "a.tif", "--outer-scale", "two"], &["two", "expected a number"]);
+    run(&["traverse", "a.tif", "--missions", "many"], &["many", "expected a whole number"]);
     run(&["run", "study.toml", "--memory", "-1"], &["--memory"]);
     std::fs::create_dir(folder.path().join("mine")).unwrap();
     write(&folder.path().join("mine"), "thesis.txt", "precious");

@@ -75,7 +75,7 @@ pub struct Companions {
 #[derive(Debug, thiserror::Error)]
 pub enum ReportError {
     /// The folder holds neither a study file nor tables.
-    #[error("{path} is not a release: {}", why_not_a_release(path))]
+    #[error("{path}: not a sastrugi release: {}", why_not_a_release(path))]
     NotARelease {
         /// The folder.
         path: PathBuf,

@@ -43,9 +43,26 @@ fn done(arguments: impl IntoIterator<Item = OsString>) -> Verdict {
 
 /// `--help` and `--version` are not errors; everything else from clap is bad usage.
 fn refuse_arguments(error: &clap::Error) -> Code {
-    // A closed terminal cannot be helped.
-    let _ = error.print();
+    let told = error.render().to_string();
+    let plain = in_plain_words(&told);
+    if plain == told {
+        // In colour on a terminal; a closed one cannot be helped.
+        let _ = error.print();
+    } else {
+        output::warn(plain.trim_end());
+    }
     if error.use_stderr() { Code::Usage } else { Code::Done }
+}
+
+/// A message on arguments, in which the standard library does not speak of numbers.
+fn in_plain_words(told: &str) -> String {
+    let words = [
+        ("invalid float literal", "expected a number"),
+        ("cannot parse float from empty string", "expected a number"),
+        ("invalid digit found in string", "expected a whole number, 0 or above"),
+        ("cannot parse integer from empty string", "expected a whole number, 0 or above"),
+    ];
+    words.iter().fold(told.to_owned(), |told, (from, to)| told.replace(from, to))
 }
 
 /// Result of a verb.

@@ -144,7 +144,7 @@ fn val_unusable_companions_are_refused() {
         error.to_string()
     };
     let against = |path: &Path| error(Companions { against: Some(path.to_owned()), ..Companions::default() });
-    assert!(against(&folder.path().join("nowhere")).contains("is not a release"));
+    assert!(against(&folder.path().join("nowhere")).contains("not a sastrugi release"));
     let logs = |path: &Path| error(Companions { logs: vec![path.to_owned()], ..Companions::default() });
     assert!(logs(&folder.path().join("no.parquet")).contains("sastrugi analyze -o"));
     assert!(logs(&staging.join("tables/missions/part-0000.parquet")).contains("sastrugi analyze -o"));
@@ -244,7 +244,7 @@ fn val_unusable_releases_are_refused() {
         refused @ ReportError::NotARelease { .. } => refused.to_string(),
         other => panic!("{other}"),
     };
-    assert!(said(&folder.path().join("nowhere")).ends_with("is not a release: no such folder"));
+    assert!(said(&folder.path().join("nowhere")).ends_with(": not a sastrugi release: no such folder"));
     assert!(said(folder.path()).ends_with("it has neither study.toml nor tables/"));
     let file = folder.path().join("file");
     fs::write(&file, "text").unwrap();

@@ -164,6 +164,10 @@ pub fn info(args: &Info, common: &Common) -> Verdict {
     let result = match extension.as_str() {
         _ if !args.path.exists() => return Err(Failure::input(format!("{}: no such file", args.path.display()))),
         _ if args.path.join(mcap::BAG).is_file() => mcap::describe_bag(&args.path).map_err(Failure::input)?,
+        _ if holds_parquet(&args.path) => {
+            let message = "a folder of Parquet files; name one of them, or the release that it belongs to";
+            return Err(Failure::input(format!("{}: {message}", args.path.display())));
+        }
         _ if args.path.is_dir() => release(&args.path)?,
         "mcap" => mcap::describe_file(&args.path).map_err(Failure::input)?,
         "parquet" => sastrugi_store::parquet::describe_file(&args.path).map_err(Failure::input)?,
@@ -177,6 +181,11 @@ pub fn info(args: &Info, common: &Common) -> Verdict {
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {}", plain(note))));
     print(common.json, &result, &text)?;
     Ok(Code::Done)
+}
+
+fn holds_parquet(folder: &Path) -> bool {
+    let mut entries = std::fs::read_dir(folder).into_iter().flatten().flatten();
+    entries.any(|entry| entry.path().extension().is_some_and(|ending| ending == "parquet"))
 }
 
 fn plain(value: &Value) -> String {
