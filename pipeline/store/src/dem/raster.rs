@@ -76,7 +76,7 @@ pub enum DemError {
         path: PathBuf,
     },
     /// The file is not a complete raster of heights.
-    #[error("{}: {reason}", path.display())]
+    #[error("{}", sentence(path, reason))]
     Unusable {
         /// The file.
         path: PathBuf,
@@ -99,6 +99,13 @@ pub enum DemError {
         /// What failed.
         source: io::Error,
     },
+}
+
+/// What is wrong with a file; a reason that begins with its verb has the file as its subject.
+fn sentence(path: &Path, reason: &str) -> String {
+    let is_predicate = ["claims ", "has ", "holds "].iter().any(|verb| reason.starts_with(verb));
+    let colon = if is_predicate { "" } else { ":" };
+    format!("{}{colon} {reason}", path.display())
 }
 
 impl DemError {
