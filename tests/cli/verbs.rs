@@ -214,6 +214,26 @@ fn val_notes_of_a_texture_on_a_base() {
     assert!(said.contains("the fit is empirical; holes are filled with the fitted model (exponential)"), "{said}");
 }
 
+/// On ground without a scale, a texture of the surface is the model's at most wavelengths: a warning before the result says so.
+#[test]
+fn val_an_extrapolated_texture_is_warned_of() {
+    let folder = area();
+    let path = folder.path();
+    let size = ["--set", "size_px=[160, 140]", "--set", "cell_m=0.05"];
+    ok(path, &[&["terrain", "multifractal", "--seed", "3", "-o", "site.tif"], &size[..]].concat());
+    ok(
+        path,
+        &["fit", "site.tif", "--outer-scale", "0.5", "--bootstrap", "0", "--model", "empirical", "-o", "fit.json"],
+    );
+    let texture = ["texture", "fit.json", "--size", "8x6", "--cell", "0.05", "-o", "t.tif"];
+    let call = sastrugi_in(path, &texture);
+    let warning = "sastrugi: warning: most of the variance comes from the model";
+    assert!(call.code == 0 && call.stderr.starts_with(warning), "{} {}", call.code, call.stderr);
+    assert!(!call.stdout.contains("most of the variance"), "{}", call.stdout);
+    let residual = sastrugi_in(path, &[&texture[..], &["--covariance", "residual"]].concat());
+    assert!(residual.code == 0 && !residual.stderr.contains("warning"), "{} {}", residual.code, residual.stderr);
+}
+
 /// A surface that was scaled to 3 cm in a vehicle's band has that RMS there, by lengths, by name and by band; the map as text
 /// has a prediction beside each measured value.
 #[test]
