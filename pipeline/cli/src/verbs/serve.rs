@@ -5,6 +5,7 @@ use crate::args::{Common, LogFormat, Serve};
 use crate::failure::{Code, Failure};
 use crate::output::{print, warn};
 use sastrugi_server::{LibrarySettings, Limits, Settings, Stop};
+use sastrugi_stages::remote::check_local;
 use serde_json::json;
 use std::net::SocketAddr;
 use std::sync::OnceLock;
@@ -49,6 +50,7 @@ pub fn serve(args: &Serve, common: &Common) -> Verdict {
             args.listen
         ))
     })?;
+    args.library.as_deref().map_or(Ok(()), check_local)?;
     let token = std::env::var(TOKEN).ok().filter(|token| !token.is_empty());
     start_log(args, common);
     if !listen.ip().is_loopback() {
