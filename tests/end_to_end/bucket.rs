@@ -201,7 +201,7 @@ fn val_addresses_are_checked_first() {
         &["convert", "a.asc", "gs://b/c.tif"],
         &["terrain", "multifractal", "-o", "s3://b/c.tif"],
         &["report", "release", "-o", "s3://b/c"],
-        &["serve", "--library", "s3://b/c"],
+        &["serve", "a.toml", "--library", "s3://b/c"],
         &["merge", "part-1", "-o", "gs://b/c"],
     ] {
         let call = called(Command::new(program()).args(arguments).current_dir(path));
