@@ -56,33 +56,80 @@ impl Incidence {
     /// The same from endings sorted by their finite distances, each with its number of subjects; resampling
     /// keeps the order and needs no sorting.
     pub fn of_counted(sorted: impl IntoIterator<Item = (Ending, usize)>, causes: usize) -> Self {
-        let sorted: Vec<(Ending, usize)> = sorted.into_iter().filter(|(_, n)| *n > 0).collect();
-        let count = |is: &dyn Fn(&Ending) -> bool, all: &[(Ending, usize)]| {
-            all.iter().filter(|(e, _)| is(e)).map(|(_, n)| *n).sum::<usize>() as f64
-        };
+        let sorted: Vec<(Ending, usize)> = sorted.into_iter().collect();
         let mut incidence = Self { at: Vec::new(), shares: vec![Vec::new(); causes] };
-        let mut reached = vec![0.0; causes];
-        let (mut at_risk, mut under_way) = (count(&|_| true, &sorted), 1.0);
-        for ties in sorted.chunk_by(|a, b| a.0.at == b.0.at) {
-            let ended = count(&|e| e.cause.is_some(), ties);
-            for (k, share) in reached.iter_mut().enumerate() {
-                let own = count(&|e| e.cause == Some(k), ties);
-                *share += under_way * own / at_risk;
-            }
-            under_way *= 1.0 - ended / at_risk;
-            at_risk -= count(&|_| true, ties);
-            if ended > 0.0 {
-                incidence.at.push(ties[0].0.at);
-                incidence.shares.iter_mut().zip(&reached).for_each(|(curve, share)| curve.push(*share));
-            }
-        }
+        steps(sorted.iter().copied(), causes, |at, reached| {
+            incidence.at.push(at);
+            incidence.shares.iter_mut().zip(reached).for_each(|(curve, share)| curve.push(*share));
+        });
         incidence
+    }
+
+    /// [`Self::share`] of every cause at each of some ascending distances, shape (causes, distances), from the same endings as
+    /// [`Self::of_counted`]. The curve between the distances is not kept, so that memory does not grow with the subjects.
+    ///
+    /// ```
+    /// use sastrugi_statistics::{Ending, Incidence};
+    ///
+    /// let missions = [(10.0, Some(1)), (20.0, None), (30.0, Some(0)), (30.0, Some(0))];
+    /// let sorted = missions.map(|(at, cause)| (Ending { at, cause }, 1));
+    /// let shares = Incidence::shares_at(sorted.iter().copied(), 2, &[0.0, 10.0, 30.0]);
+    /// assert_eq!(shares, [[0.0, 0.0, 0.75], [0.0, 0.25, 0.25]]);
+    /// ```
+    pub fn shares_at(
+        sorted: impl Iterator<Item = (Ending, usize)> + Clone,
+        causes: usize,
+        distances: &[f64],
+    ) -> Vec<Vec<f64>> {
+        let mut shares = vec![vec![0.0; distances.len()]; causes];
+        let (mut from, mut before) = (0, vec![0.0; causes]);
+        let mut hold = |from: usize, to: usize, values: &[f64]| {
+            shares.iter_mut().zip(values).for_each(|(curve, value)| curve[from..to].fill(*value));
+        };
+        steps(sorted, causes, |at, reached| {
+            let to = from + distances[from..].iter().take_while(|distance| **distance < at).count();
+            hold(from, to, &before);
+            from = to;
+            before.copy_from_slice(reached);
+        });
+        hold(from, distances.len(), &before);
+        shares
     }
 
     /// Share that has ended by `cause` up to `at`, in 0..1.
     pub fn share(&self, cause: usize, at: f64) -> f64 {
         let steps = self.at.partition_point(|x| *x <= at);
         steps.checked_sub(1).map_or(0.0, |last| self.shares[cause][last])
+    }
+}
+
+/// Calls `step` at each distance at which subjects ended, ascending, with the share of every cause at and after it.
+fn steps(sorted: impl Iterator<Item = (Ending, usize)> + Clone, causes: usize, mut step: impl FnMut(f64, &[f64])) {
+    let mut at_risk: usize = sorted.clone().map(|(_, n)| n).sum();
+    let (mut reached, mut under_way) = (vec![0.0; causes], 1.0);
+    let mut own = vec![0; causes];
+    let mut rest = sorted.filter(|(_, n)| *n > 0).peekable();
+    while let Some(first) = rest.next() {
+        let at = first.0.at;
+        let (mut ended, mut all) = (0, 0);
+        own.fill(0);
+        let mut tie = Some(first);
+        while let Some((ending, n)) = tie {
+            all += n;
+            if let Some(cause) = ending.cause {
+                ended += n;
+                own.get_mut(cause).into_iter().for_each(|own| *own += n);
+            }
+            tie = rest.next_if(|(ending, _)| ending.at == at);
+        }
+        if ended > 0 {
+            for (share, own) in reached.iter_mut().zip(&own) {
+                *share += under_way * *own as f64 / at_risk as f64;
+            }
+            under_way *= 1.0 - ended as f64 / at_risk as f64;
+            step(at, &reached);
+        }
+        at_risk -= all;
     }
 }
 
@@ -173,6 +220,48 @@ mod tests {
         assert_eq!(counted.at, [1.0, 2.0, 4.0]);
         assert!((counted.share(0, 9.0) - 2.0 / 9.0).abs() < 1e-15);
         assert!((counted.share(1, 2.0) - 7.0 / 9.0 * 0.5).abs() < 1e-15);
+    }
+
+    /// The estimator as its formula reads, with every count from a pass over all subjects: the reference of the fast one.
+    fn by_definition(endings: &[Ending], causes: usize) -> Incidence {
+        let mut at: Vec<f64> = endings.iter().filter(|e| e.cause.is_some()).map(|e| e.at).collect();
+        at.sort_by(f64::total_cmp);
+        at.dedup();
+        let count = |is: &dyn Fn(&Ending) -> bool| endings.iter().filter(|e| is(e)).count() as f64;
+        let (mut survived, mut reached) = (1.0, vec![0.0; causes]);
+        let mut shares = vec![Vec::new(); causes];
+        for x in &at {
+            let at_risk = count(&|e| e.at >= *x);
+            for k in 0..causes {
+                reached[k] += survived * count(&|e| e.at == *x && e.cause == Some(k)) / at_risk;
+                shares[k].push(reached[k]);
+            }
+            survived *= 1.0 - count(&|e| e.at == *x && e.cause.is_some()) / at_risk;
+        }
+        Incidence { at, shares }
+    }
+
+    proptest! {
+        /// The same bits as by definition, at every step and at any distances, also when subjects count several times or not at all.
+        #[test]
+        fn prop_one_pass_gives_the_definition(
+            subjects in proptest::collection::vec((0u8..30, 0usize..5, 0usize..4), 0..80),
+            mut distances in proptest::collection::vec(-1.0..32.0f64, 0..20),
+        ) {
+            let of = |&(at, cause, n): &(u8, usize, usize)| (Ending { at: f64::from(at), cause: cause.checked_sub(1) }, n);
+            let mut counted: Vec<(Ending, usize)> = subjects.iter().map(of).collect();
+            counted.sort_by(|a, b| a.0.at.total_cmp(&b.0.at));
+            let repeated: Vec<Ending> = counted.iter().flat_map(|(e, n)| vec![*e; *n]).collect();
+            let expected = by_definition(&repeated, 3);
+            prop_assert_eq!(&Incidence::of_counted(counted.iter().copied(), 3), &expected);
+            distances.extend([0.0, 7.0, 29.0]);
+            distances.sort_by(f64::total_cmp);
+            let shares = Incidence::shares_at(counted.iter().copied(), 3, &distances);
+            for (k, curve) in shares.iter().enumerate() {
+                let slow: Vec<f64> = distances.iter().map(|at| expected.share(k, *at)).collect();
+                prop_assert_eq!(curve, &slow);
+            }
+        }
     }
 
     #[test]

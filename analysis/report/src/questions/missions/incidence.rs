@@ -16,6 +16,8 @@ use sastrugi_statistics::{Ending, Incidence, Interval, bootstrap};
 const CAUSES: [(&str, usize); 3] = [("stuck", 1), ("tipped", 2), ("other failure", 5)];
 /// Steps of the distance at which bands are computed.
 const STEPS: usize = 70;
+/// Largest number of steps of a curve that are drawn one by one.
+const STEPS_DRAWN_MAX: usize = 2000;
 /// Largest number of groups drawn.
 const GROUPS_MAX: usize = 12;
 const HEIGHT: f64 = 260.0;
@@ -84,16 +86,18 @@ fn curves<'a>(data: &Data, group: &'a Group<'a, MissionRow>, length: f64) -> Cur
     let incidence = Incidence::of_counted(items.iter().map(|i| (i.1, 1)), CAUSES.len());
     let (clusters, items) = numbered(&items);
     let mut stream = stream(data, &group.name, "progress_m");
+    let at: Vec<f64> = distances(length).collect();
     let redrawn = bootstrap::redraw(&[clusters], if clusters > 1 { REPLICATES } else { 0 }, &mut stream, |drawn| {
         let mut times = vec![0; clusters];
         drawn[0].iter().for_each(|&c| times[c] += 1);
-        Incidence::of_counted(items.iter().map(|(c, ending)| (*ending, times[*c])), CAUSES.len())
+        // Only the shares that are drawn: a curve has as many steps as there are failures.
+        Incidence::shares_at(items.iter().map(|(c, ending)| (*ending, times[*c])), CAUSES.len(), &at)
     });
-    let band = |cause: usize, at: f64| {
-        let values: Vec<f64> = redrawn.iter().map(|i| i.share(cause, at)).collect();
-        Interval::percentile(incidence.share(cause, at), &values, LEVEL)
+    let band = |cause: usize, step: usize| {
+        let values: Vec<f64> = redrawn.iter().map(|shares| shares[cause][step]).collect();
+        Interval::percentile(incidence.share(cause, at[step]), &values, LEVEL)
     };
-    let bands = (0..CAUSES.len()).map(|k| distances(length).map(|at| band(k, at)).collect()).collect();
+    let bands = (0..CAUSES.len()).map(|k| (0..at.len()).map(|step| band(k, step)).collect()).collect();
     Curves { group, incidence, bands }
 }
 
@@ -138,17 +142,21 @@ fn stroke(cause: usize) -> Stroke {
     Stroke::new(Paint::Outcome(kind), 2.0).dashed(dash)
 }
 
-/// The corners of a step curve, in per cent.
+/// The corners of a step curve, in per cent. Of very many steps, those within a fraction of a pixel are drawn as one.
 fn steps(incidence: &Incidence, cause: usize, length: f64) -> Vec<(f64, f64)> {
     let mut points = vec![(0.0, 0.0)];
     let mut before = 0.0;
+    let apart = if incidence.at.len() > STEPS_DRAWN_MAX { length / STEPS_DRAWN_MAX as f64 } else { 0.0 };
     for (&at, &share) in incidence.at.iter().zip(&incidence.shares[cause]) {
-        if share > before {
+        let is_apart = points.last().is_none_or(|last| at - last.0 >= apart);
+        if share > before && is_apart {
             points.extend([(at, 100.0 * before), (at, 100.0 * share)]);
             before = share;
         }
     }
+    // The last step is drawn in any case.
     points.push((length, 100.0 * before));
+    points.extend(incidence.shares[cause].last().filter(|share| **share > before).map(|share| (length, 100.0 * share)));
     points
 }
 
