@@ -109,6 +109,8 @@ pub struct Numbers {
     pub rows: Vec<Vec<Cell>>,
     /// True if the rows of a column have different units, so that each number is set with its own digits.
     pub mixed: bool,
+    /// Number of rows of which these are a random sample; `None` if these are all.
+    pub sampled_of: Option<usize>,
 }
 
 /// What a query returns.
@@ -136,7 +138,7 @@ impl Numbers {
     /// Without rows yet.
     pub fn new(query: impl Into<String>, columns: &[(&str, &str)]) -> Self {
         let columns = columns.iter().map(|&(name, unit)| Heading { name: name.into(), unit: unit.into() }).collect();
-        Self { query: query.into(), gives: Gives::Rows, columns, rows: Vec::new(), mixed: false }
+        Self { query: query.into(), gives: Gives::Rows, columns, rows: Vec::new(), mixed: false, sampled_of: None }
     }
 
     /// Without rows yet; they are computed from what the query returns.
@@ -152,6 +154,11 @@ impl Numbers {
     /// The same for rows that have different units.
     pub fn with_mixed_units(self) -> Self {
         Self { mixed: true, ..self }
+    }
+
+    /// The same where the rows are a random sample of `all`; unchanged if there are as many rows.
+    pub fn of_all(self, all: usize) -> Self {
+        Self { sampled_of: (self.rows.len() < all).then_some(all), ..self }
     }
 
     /// Columns of the rows of a table of the release that meet a condition (all rows if it is empty), with the names and units of the
@@ -183,7 +190,12 @@ impl Numbers {
     /// The file under `data/`.
     pub fn to_json(&self, id: &str, title: &str) -> Value {
         let rows: Vec<Vec<Value>> = self.rows.iter().map(|r| r.iter().map(value).collect()).collect();
-        json!({ "id": id, "title": title, "query": self.query, "query_gives": self.gives, "columns": self.columns, "rows": rows })
+        let mut file = json!({ "id": id, "title": title, "query": self.query, "query_gives": self.gives, "columns": self.columns });
+        if let Some(all) = self.sampled_of {
+            file["random_sample_of"] = all.into();
+        }
+        file["rows"] = rows.into();
+        file
     }
 }
 
@@ -267,6 +279,21 @@ mod tests {
         assert_eq!((numbers.gives, numbers.rows.len(), numbers.mixed), (Gives::Rows, 0, false));
         let names: Vec<&str> = numbers.columns.iter().map(|c| c.name.as_str()).collect();
         assert_eq!(names, ["terrain_id", "group"]);
+    }
+
+    /// A sample states of how many rows it is one; all rows state nothing.
+    #[test]
+    fn val_samples_say_so() {
+        let of_all = |all: usize| {
+            let mut numbers = Numbers::new("q", &[("n", "1")]);
+            (0..2).for_each(|n| numbers.row([count(n)]));
+            numbers.of_all(all).to_json("x", "t")
+        };
+        assert_eq!(
+            of_all(2).to_string(),
+            r#"{"id":"x","title":"t","query":"q","query_gives":"rows","columns":[{"name":"n","unit":"1"}],"rows":[[0],[1]]}"#
+        );
+        assert_eq!((&of_all(9)["random_sample_of"], &of_all(9)["rows"]), (&json!(9), &json!([[0], [1]])));
     }
 
     #[test]

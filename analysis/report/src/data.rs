@@ -1,18 +1,24 @@
 //! Input of the page: the rows and files of one assembled release, read only through `sastrugi-store`.
 //!
 //! Tables are read once; rasters and samples are read one at a time, when a figure needs them. Whatever a release lacks is an
-//! empty table or `None`: only a file that exists but cannot be read is an error.
+//! empty table or `None`: only a file that exists but cannot be read is an error. Of missions and their starts only the columns that
+//! the page needs are kept ([`Mission`], [`Start`]); of the curves of terrains, those of a random sample of each large group.
+
+mod kept;
+
+pub use kept::{Mission, Name, Names, Start};
 
 use crate::ReportError;
-use sastrugi_numeric::Grid;
+use crate::sample::sample;
+use sastrugi_numeric::{Grid, Stream, Streams};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, FormationEventRow, FormationRow, FormationSampleRow,
-    HeightDistributionRow, ImageRow, LikelihoodProfileRow, LogRow, MissionRow, ParameterRow, PhotoclinometryBandRow,
-    PhotoclinometryRow, ProfilePsdRow, PsdRow, ReplicateRow, RoutePointRow, RouteRow, RoverEffectRow, RoverRow,
-    RoverSampleRow, SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
+    HeightDistributionRow, ImageRow, LikelihoodProfileRow, LogRow, ParameterRow, PhotoclinometryBandRow,
+    PhotoclinometryRow, ProfilePsdRow, PsdRow, RoutePointRow, RouteRow, RoverEffectRow, RoverRow, RoverSampleRow,
+    SampleRow, ScoreCovarianceRow, ScoreRow, StructureRow, SurfaceRow, TerrainRow,
 };
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -22,8 +28,8 @@ pub trait Files {
     fn grid(&self, path: &str) -> Result<Option<Grid>, ReportError>;
     /// Roughness class codes.
     fn classes(&self, path: &str) -> Result<Option<Grid<u8>>, ReportError>;
-    /// Recorded samples of every mission on a terrain.
-    fn samples(&self, terrain_id: &str) -> Result<Vec<SampleRow>, ReportError>;
+    /// Recorded samples of these missions on a terrain, sorted by mission.
+    fn samples(&self, terrain_id: &str, missions: &BTreeSet<&str>) -> Result<Vec<SampleRow>, ReportError>;
     /// Points of every route.
     fn route_points(&self) -> Result<Vec<RoutePointRow>, ReportError>;
     /// Recorded samples of every team on a terrain.
@@ -34,13 +40,24 @@ pub trait Files {
     fn fit(&self, path: &str) -> Result<Option<FitFile>, ReportError>;
 }
 
-/// One file of the release.
-#[derive(Clone, Debug)]
-pub struct Artifact {
-    /// Path in the release.
-    pub path: String,
-    /// Size, bytes.
+/// Number and size of the data files of the release.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub struct Stored {
+    /// Number of all.
+    pub files: usize,
+    /// Number of recordings among them.
+    pub recordings: usize,
+    /// Size of all, bytes.
     pub bytes: u64,
+}
+
+impl Stored {
+    /// Counts a file.
+    pub fn add(&mut self, path: &str, bytes: u64) {
+        self.files += 1;
+        self.recordings += usize::from(path.ends_with(".mcap"));
+        self.bytes += bytes;
+    }
 }
 
 /// `[study]` of the study file, as far as the page shows it.
@@ -74,12 +91,15 @@ pub struct Data {
     pub study_sha256: String,
     /// Version of the program that wrote the release.
     pub version: String,
-    /// Data files of the release, by path.
-    pub artifacts: Vec<Artifact>,
+    /// Data files of the release.
+    pub stored: Stored,
     /// Items that failed. A release lists them once it is sealed.
     pub failed: Vec<FailedItem>,
     /// Heightfields.
     pub terrains: Vec<TerrainRow>,
+    /// Ids of generated terrains whose curves are not kept, because their group has more than [`CURVES_MAX`]: the others are a random
+    /// sample of that many.
+    pub without_curves: BTreeSet<String>,
     /// Fits.
     pub fits: Vec<FitRow>,
     /// Covariance bins.
@@ -105,9 +125,9 @@ pub struct Data {
     /// Covariances of their methods.
     pub scoreboard_covariance: Vec<ScoreCovarianceRow>,
     /// Missions.
-    pub missions: Vec<MissionRow>,
+    pub missions: Vec<Mission>,
     /// Starts of missions with several starts.
-    pub replicates: Vec<ReplicateRow>,
+    pub replicates: Vec<Start>,
     /// Routes.
     pub routes: Vec<RouteRow>,
     /// Rendered images.
@@ -126,7 +146,7 @@ pub struct Data {
     pub rover_effects: Vec<RoverEffectRow>,
     /// Every parameter of every run.
     pub parameters: Vec<ParameterRow>,
-    /// Hashes of decoded content by path, once the release is sealed.
+    /// Hashes of the heights of heightfields by path, once the release is sealed.
     pub contents: BTreeMap<String, String>,
     /// Another release to compare this one with.
     pub against: Option<Against>,
@@ -142,6 +162,23 @@ pub struct Against {
     pub name: String,
     /// Its data.
     pub data: Box<Data>,
+}
+
+/// Most terrains of a group whose curves (spectra, structure functions, histograms) are kept.
+pub const CURVES_MAX: usize = 200;
+
+/// The generated terrains beyond a random sample of [`CURVES_MAX`] of each group and variant.
+pub(crate) fn without_curves(seed: u64, terrains: &[TerrainRow]) -> BTreeSet<String> {
+    let mut groups: BTreeMap<(&str, Option<&str>), Vec<&str>> = BTreeMap::new();
+    for terrain in terrains.iter().filter(|terrain| terrain.stage == "terrain") {
+        groups.entry((label(terrain), terrain.variant.as_deref())).or_default().push(&terrain.terrain_id);
+    }
+    let beyond = |((label, variant), ids): ((&str, Option<&str>), Vec<&str>)| {
+        let mut stream = Streams::for_item(seed, "report", label).stream(variant.unwrap_or("curves"));
+        let kept: BTreeSet<&str> = sample(ids.clone(), CURVES_MAX, &mut stream).into_iter().collect();
+        ids.into_iter().filter(move |id| !kept.contains(id)).map(str::to_owned).collect::<Vec<_>>()
+    };
+    groups.into_iter().flat_map(beyond).collect()
 }
 
 /// Rows with one label, which are compared with other groups.
@@ -160,6 +197,11 @@ pub struct Group<'a, R> {
 }
 
 impl Data {
+    /// The random stream of a bootstrap or a sample, named by an item (a group) and by the quantity or what is drawn.
+    pub fn stream(&self, item: &str, figure: &str) -> Stream {
+        Streams::for_item(self.study.seed, "report", item).stream(figure)
+    }
+
     /// Generated terrains by group, groups in natural order: the plain terrains, or all if every one is a variant.
     pub fn terrain_groups(&self) -> Vec<Group<'_, TerrainRow>> {
         let all: Vec<&TerrainRow> = self.of_stage("terrain").collect();
@@ -167,19 +209,19 @@ impl Data {
     }
 
     /// Missions of the plain run by group, groups in natural order; all missions if every one belongs to a variant.
-    pub fn mission_groups(&self) -> Vec<Group<'_, MissionRow>> {
+    pub fn mission_groups(&self) -> Vec<Group<'_, Mission>> {
         self.groups_of(plain(self.missions.iter().collect(), |m| m.variant.is_none()))
     }
 
     /// Missions by group, groups in natural order. If the release has several runs, each is a separate group, because other vehicles
     /// or other paths are not repetitions.
-    pub fn groups_of<'a>(&'a self, missions: Vec<&'a MissionRow>) -> Vec<Group<'a, MissionRow>> {
+    pub fn groups_of<'a>(&'a self, missions: Vec<&'a Mission>) -> Vec<Group<'a, Mission>> {
         let names = self.names();
         self.grouped(missions.into_iter().map(|m| (names(m), m)))
     }
 
     /// Function that returns label and run of a mission.
-    fn names<'a>(&'a self) -> impl Fn(&MissionRow) -> Of<'a> {
+    fn names<'a>(&'a self) -> impl Fn(&Mission) -> Of<'a> {
         let kinds: BTreeMap<&str, &str> = self.terrains.iter().map(|t| (t.terrain_id.as_str(), label(t))).collect();
         let labels: BTreeSet<&str> = self.missions.iter().filter_map(|m| m.group.as_deref()).collect();
         let runs = self.runs();
@@ -241,12 +283,12 @@ impl Data {
     }
 
     /// Missions of the plain run on a terrain; all missions if every one belongs to a variant.
-    pub fn missions_on(&self, terrain_id: &str) -> Vec<&MissionRow> {
+    pub fn missions_on(&self, terrain_id: &str) -> Vec<&Mission> {
         plain(of_key(&self.missions, |m| &m.terrain_id, terrain_id).iter().collect(), |m| m.variant.is_none())
     }
 
     /// Starts of a mission, the drawn one first; empty if it has only that.
-    pub fn starts_of(&self, mission: &MissionRow) -> &[ReplicateRow] {
+    pub fn starts_of(&self, mission: &Mission) -> &[Start] {
         let on_terrain = of_key(&self.replicates, |r| &r.terrain_id, &mission.terrain_id);
         of_key(on_terrain, |r| &r.mission_id, &mission.mission_id)
     }
@@ -307,7 +349,7 @@ fn plain<R>(mut rows: Vec<&R>, is_plain: impl Fn(&R) -> bool) -> Vec<&R> {
 
 /// The run that a mission, or its plain counterpart, belongs to. A sweep appends its values to the id after a hyphen; other tables are
 /// variants of a run if their ids begin with it in the same way (`husky-torque`).
-fn run<'a>(runs: &[&'a str], mission: &MissionRow) -> Option<&'a str> {
+fn run<'a>(runs: &[&'a str], mission: &Mission) -> Option<&'a str> {
     let belongs = |run: &&&str| {
         mission.traverse_id.strip_prefix(**run).is_some_and(|rest| rest.is_empty() || rest.starts_with('-'))
     };
@@ -386,12 +428,31 @@ mod tests {
         assert_eq!(plain(vec![&one, &two], |_| false), [&1, &2]);
     }
 
+    /// Of a group with many terrains, the curves of 200 are kept, the same each time; smaller groups and other stages keep all.
+    #[test]
+    fn prop_curves_of_a_sample_of_each_large_group() {
+        let one = crate::tests::made_up::full(1, 24).terrains.swap_remove(0);
+        let terrain = |group: &str, variant: Option<&str>, stage: &str, k: usize| TerrainRow {
+            terrain_id: format!("{group}-{stage}-{}-{k}", variant.unwrap_or("plain")),
+            group: Some(group.into()),
+            variant: variant.map(str::to_owned),
+            stage: stage.into(),
+            ..one.clone()
+        };
+        let mut terrains: Vec<TerrainRow> = (0..450).map(|k| terrain("large", None, "terrain", k)).collect();
+        terrains.extend((0..CURVES_MAX).map(|k| terrain("large", Some("v = 1"), "terrain", k)));
+        terrains.extend((0..300).map(|k| terrain("small", None, "texture", k)));
+        let without = without_curves(7, &terrains);
+        assert_eq!(without.len(), 250);
+        assert!(without.iter().all(|id| id.starts_with("large-terrain-plain-")), "{without:?}");
+        assert!(without == without_curves(7, &terrains) && without != without_curves(8, &terrains));
+    }
+
     /// A variant belongs to the run whose id it extends after a hyphen, the longest of several; other ids are not runs.
     #[test]
     fn val_variants_belong_to_their_run() {
         let missions = crate::tests::made_up::full(1, 24).missions;
-        let of =
-            |id: &str| run(&["husky", "husky-soft"], &MissionRow { traverse_id: id.into(), ..missions[0].clone() });
+        let of = |id: &str| run(&["husky", "husky-soft"], &Mission { traverse_id: id.into(), ..missions[0].clone() });
         assert_eq!([of("husky"), of("husky-friction-0.5")], [Some("husky"); 2]);
         assert_eq!([of("husky-soft"), of("husky-soft-0.5")], [Some("husky-soft"); 2]);
         assert_eq!([of("huskies"), of("rover")], [None, None]);

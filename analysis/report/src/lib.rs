@@ -3,7 +3,8 @@
 //!
 //! [`render`](fn@render) and [`render_with`] write a report:
 //!
-//! 1. [`data::Data::open`] reads the tables of the release; rasters and samples follow when a figure needs them.
+//! 1. [`data::Data::open`] reads the tables of the release; rasters and samples follow when a figure needs them. Of the tables that grow with
+//!    the missions and terrains it keeps what statistics need.
 //! 2. Each question of [`questions::ALL`] answers with [`content::Block`]s: text, figures and tables with their
 //!    [`content::Numbers`], and the query that returns these numbers. A question without data has no section.
 //! 3. [`render::html::page`](render::html::page()) sets the page; every figure also goes to `figures/*.svg`, its numbers to
@@ -36,6 +37,7 @@
 //! * [`RoutePicture`]: the picture of one route, for the verb `navigate`.
 //! * [`mod@render`]: drawing, independent of what is drawn.
 //! * [`data`]: the only access to the release's rows and files.
+//! * [`mod@sample`]: random samples of what is too much to draw or to list; the page says where it shows one.
 //!
 //! No kernel runs here: spectra, histograms, covariances, backgrounds, residuals, images and class maps are read as a stage
 //! stored them. Shading and rendering a thinned relief, and differencing two stored rasters on the cells of one, count as
@@ -48,6 +50,7 @@ pub mod papers;
 pub mod questions;
 pub mod releases;
 pub mod render;
+pub mod sample;
 #[cfg(test)]
 mod tests;
 

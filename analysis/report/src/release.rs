@@ -1,15 +1,19 @@
 //! Reading of an assembled release, sealed or not. This is the only file that reads through `sastrugi-store`.
 
-use crate::data::{Against, Artifact, Data, Files, Study};
+use crate::data::{Against, Data, Files, Mission, Names, Start, Stored, Study, without_curves};
 use crate::{Companions, ReportError};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::Record;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::manifest::{self, Manifest};
+use sastrugi_schemas::manifest::Manifest;
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
-use sastrugi_schemas::tables::{FormationSampleRow, LogRow, RoutePointRow, RoverSampleRow, SampleRow, in_order};
+use sastrugi_schemas::tables::{
+    FormationSampleRow, HeightDistributionRow, LogRow, ProfilePsdRow, PsdRow, RoutePointRow, RoverSampleRow, SampleRow,
+    StructureRow, TerrainRow, in_order,
+};
 use sastrugi_store::release::{MANIFEST, SHARD, TABLES};
 use sastrugi_store::{dem, digest, parquet};
+use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::fs;
 use std::path::{Component, Path, PathBuf};
@@ -34,31 +38,32 @@ impl Data {
             return Err(ReportError::NotARelease { path: folder.to_owned() });
         }
         let toml = release.text(STUDY)?.unwrap_or_default();
-        let manifest = manifest_in(folder)?;
-        let contents = manifest.iter().flat_map(|m| &m.artifacts).filter_map(content).collect();
+        let study = study(&toml).map_err(|e| read_error(STUDY, e))?;
+        let terrains: Vec<TerrainRow> = release.rows()?;
+        let without_curves = without_curves(study.seed, &terrains);
+        let kept = |surface_id: &str| !without_curves.contains(surface_id);
+        let (contents, manifest) = contents(folder, &terrains)?;
         let (version, failed) =
             manifest.map_or_else(|| (env!("CARGO_PKG_VERSION").into(), Vec::new()), |m| (m.version, m.failed));
         Ok(Self {
-            study: study(&toml).map_err(|e| read_error(STUDY, e))?,
             study_sha256: digest::of_text(&toml),
             version: format!("sastrugi {version}"),
-            artifacts: release.artifacts()?,
+            stored: release.stored()?,
             failed,
-            terrains: release.rows()?,
             fits: release.rows()?,
             covariance: release.rows()?,
             candidates: release.rows()?,
             candidate_curves: release.rows()?,
             likelihood_profile: release.rows()?,
             surfaces: release.rows()?,
-            structure: release.rows()?,
-            profile_psd: release.rows()?,
-            psd: release.rows()?,
-            heights: release.rows()?,
+            structure: release.rows_where(|row: &StructureRow| kept(&row.surface_id))?,
+            profile_psd: release.rows_where(|row: &ProfilePsdRow| kept(&row.surface_id))?,
+            psd: release.rows_where(|row: &PsdRow| kept(&row.surface_id))?,
+            heights: release.rows_where(|row: &HeightDistributionRow| kept(&row.surface_id))?,
             scoreboard: release.rows()?,
             scoreboard_covariance: release.rows()?,
-            missions: release.rows()?,
-            replicates: release.rows()?,
+            missions: release.missions()?,
+            replicates: release.starts()?,
             routes: release.rows()?,
             images: release.rows()?,
             photoclinometry: release.rows()?,
@@ -72,6 +77,9 @@ impl Data {
             against: None,
             logs: None,
             files: Box::new(release),
+            study,
+            terrains,
+            without_curves,
         })
     }
 }
@@ -99,18 +107,22 @@ impl Data {
     }
 }
 
-/// The manifest, checked; `None` before a release is sealed.
-fn manifest_in(folder: &Path) -> Result<Option<Manifest>, ReportError> {
+/// Content hashes of the heightfields by path, and the manifest, checked, without its list of files; nothing before a release is sealed.
+fn contents(
+    folder: &Path,
+    terrains: &[TerrainRow],
+) -> Result<(BTreeMap<String, String>, Option<Manifest>), ReportError> {
+    let mut contents = BTreeMap::new();
     if !folder.join(MANIFEST).is_file() {
-        return Ok(None);
+        return Ok((contents, None));
     }
-    let sealed = sastrugi_store::release::Release::open(folder).map_err(|e| read_error(MANIFEST, e))?;
-    Ok(Some(sealed.manifest().clone()))
-}
-
-/// Path and content hash of a file; `None` if its content is not hashed.
-fn content(artifact: &manifest::Artifact) -> Option<(String, String)> {
-    Some((artifact.path.clone(), artifact.origin.content_sha256.clone()?))
+    let paths: BTreeSet<&str> = terrains.iter().map(|terrain| terrain.path.as_str()).collect();
+    let manifest = sastrugi_store::release::for_each_artifact(folder, |artifact| {
+        if let Some(content) = artifact.origin.content_sha256.filter(|_| paths.contains(artifact.path.as_str())) {
+            contents.insert(artifact.path, content);
+        }
+    });
+    Ok((contents, Some(manifest.map_err(|e| read_error(MANIFEST, e))?)))
 }
 
 /// A release folder.
@@ -127,8 +139,15 @@ impl Files for Release {
         self.read(path, dem::read_classes)
     }
 
-    fn samples(&self, terrain_id: &str) -> Result<Vec<SampleRow>, ReportError> {
-        self.rows_of(terrain_id)
+    fn samples(&self, terrain_id: &str, missions: &BTreeSet<&str>) -> Result<Vec<SampleRow>, ReportError> {
+        let mut samples = Vec::new();
+        let path = format!("{TABLES}/{}/part-{terrain_id}.parquet", SampleRow::TABLE.name);
+        self.for_each_row(&path, |row: SampleRow| {
+            if missions.contains(row.mission_id.as_str()) {
+                samples.push(row);
+            }
+        })?;
+        Ok(samples)
     }
 
     fn route_points(&self) -> Result<Vec<RoutePointRow>, ReportError> {
@@ -150,7 +169,11 @@ impl Files for Release {
 
 impl Release {
     /// Reads a file if it exists. A path that leads out of the release counts as missing.
-    fn read<T, E: Display>(&self, path: &str, read: impl Fn(&Path) -> Result<T, E>) -> Result<Option<T>, ReportError> {
+    fn read<T, E: Display>(
+        &self,
+        path: &str,
+        read: impl FnOnce(&Path) -> Result<T, E>,
+    ) -> Result<Option<T>, ReportError> {
         let inside = Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));
         let file = self.folder.join(path);
         if !inside || !file.is_file() {
@@ -176,43 +199,89 @@ impl Release {
 
     /// All rows of a table, sorted by key; empty if the release does not have it.
     fn rows<R: Record>(&self) -> Result<Vec<R>, ReportError> {
+        self.rows_where(|_: &R| true)
+    }
+
+    /// The rows of a table that meet a condition, sorted by key.
+    fn rows_where<R: Record>(&self, is_wanted: impl Fn(&R) -> bool) -> Result<Vec<R>, ReportError> {
+        let (rows, is_sorted) = self.rows_as_stored(|row: R| is_wanted(&row).then_some(row))?;
+        Ok(if is_sorted { rows } else { in_order(rows) })
+    }
+
+    /// What `f` makes of the rows of a table, file by file, and whether that is in the order of their keys.
+    fn rows_as_stored<R: Record, T>(&self, mut f: impl FnMut(R) -> Option<T>) -> Result<(Vec<T>, bool), ReportError> {
         let mut rows = Vec::new();
-        let files = self.files_below(&format!("{TABLES}/{}", R::TABLE.name))?;
-        for path in &files {
-            rows.extend(self.read(path, parquet::read_table::<R>)?.unwrap_or_default());
-        }
-        Ok(if files.len() > 1 { in_order(rows) } else { rows })
+        let mut files = 0;
+        self.for_each_file(&format!("{TABLES}/{}", R::TABLE.name), &mut |path| {
+            files += 1;
+            self.for_each_row(path, |row: R| rows.extend(f(row)))
+        })?;
+        rows.shrink_to_fit();
+        Ok((rows, files < 2))
     }
 
-    fn artifacts(&self) -> Result<Vec<Artifact>, ReportError> {
-        let mut artifacts = Vec::new();
+    /// Calls `f` with every row of a file, if it exists.
+    fn for_each_row<R: Record>(&self, path: &str, f: impl FnMut(R)) -> Result<(), ReportError> {
+        self.read(path, |file| parquet::for_each_row(file, f)).map(|_| ())
+    }
+
+    /// All missions, sorted by terrain and id, with shared names.
+    fn missions(&self) -> Result<Vec<Mission>, ReportError> {
+        let mut names = Names::default();
+        let (mut missions, is_sorted) = self.rows_as_stored(|mut mission: Mission| {
+            mission.share(&mut names);
+            Some(mission)
+        })?;
+        if !is_sorted {
+            missions.sort_by(|a, b| (&a.terrain_id, &a.mission_id).cmp(&(&b.terrain_id, &b.mission_id)));
+        }
+        Ok(missions)
+    }
+
+    /// All starts of missions with several starts, sorted by terrain, mission and number, with shared names.
+    fn starts(&self) -> Result<Vec<Start>, ReportError> {
+        let mut names = Names::default();
+        let (mut starts, is_sorted) = self.rows_as_stored(|mut start: Start| {
+            start.share(&mut names);
+            Some(start)
+        })?;
+        if !is_sorted {
+            let key = |s: &Start| (s.terrain_id.clone(), s.mission_id.clone(), s.replicate);
+            starts.sort_by_cached_key(key);
+        }
+        Ok(starts)
+    }
+
+    /// Number and size of the data files.
+    fn stored(&self) -> Result<Stored, ReportError> {
+        let mut stored = Stored::default();
         for folder in DATA_FOLDERS {
-            for path in self.files_below(folder)? {
-                let bytes = fs::metadata(self.folder.join(&path)).map_err(|e| read_error(&path, e))?.len();
-                artifacts.push(Artifact { path, bytes });
-            }
+            self.for_each_file(folder, &mut |path| {
+                let bytes = fs::metadata(self.folder.join(path)).map_err(|e| read_error(path, e))?.len();
+                stored.add(path, bytes);
+                Ok(())
+            })?;
         }
-        Ok(artifacts)
+        Ok(stored)
     }
 
-    /// Paths of the files below a folder, in order; empty if there is no such folder.
-    fn files_below(&self, folder: &str) -> Result<Vec<String>, ReportError> {
+    /// Calls `f` with the path of each file below a folder, in order; never if there is no such folder.
+    fn for_each_file(
+        &self,
+        folder: &str,
+        f: &mut dyn FnMut(&str) -> Result<(), ReportError>,
+    ) -> Result<(), ReportError> {
         let full = self.folder.join(folder);
         if !full.is_dir() {
-            return Ok(Vec::new());
+            return Ok(());
         }
         let failed = |e| read_error(folder, e);
         let mut entries = fs::read_dir(full).map_err(failed)?.collect::<Result<Vec<_>, _>>().map_err(failed)?;
         entries.sort_by_key(fs::DirEntry::file_name);
-        let mut files = Vec::new();
-        for entry in entries {
+        entries.into_iter().try_for_each(|entry| {
             let path = format!("{folder}/{}", entry.file_name().to_string_lossy());
-            match entry.path().is_dir() {
-                true => files.extend(self.files_below(&path)?),
-                false => files.push(path),
-            }
-        }
-        Ok(files)
+            if entry.path().is_dir() { self.for_each_file(&path, f) } else { f(&path) }
+        })
     }
 }
 

@@ -7,9 +7,10 @@
 //! [`Difference`], with Holm's adjustment over all quantities. A difference of means whose interval of coverage `1 - 2 alpha` lies
 //! within the margin does not matter (two one-sided tests).
 
+use crate::data::Mission;
 use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::study::Statistic;
-use sastrugi_schemas::tables::{MissionRow, TerrainRow};
+use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_schemas::{Answer, Record};
 use sastrugi_statistics::{Difference, Interval, MeanDifference, holm, permutation};
 use serde::Serialize;
@@ -138,18 +139,18 @@ impl Figures {
     }
 
     /// Adds a mission.
-    pub fn add_mission(&mut self, row: &MissionRow) {
-        let of_terrain = || self.terrains.get(&row.terrain_id).map(|t| t.label.clone());
-        let label = row.group.clone().or_else(of_terrain).unwrap_or_else(|| "all".to_owned());
-        let (variant, run) = (row.variant.clone(), Some(row.traverse_id.clone()));
-        let place = Place { table: MissionRow::TABLE.name, label, variant, run };
+    pub fn add_mission(&mut self, row: &Mission) {
+        let of_terrain = || self.terrains.get(row.terrain_id.as_str()).map(|t| t.label.clone());
+        let label = row.group.as_ref().map(String::from).or_else(of_terrain).unwrap_or_else(|| "all".to_owned());
+        let (variant, run) = (row.variant.as_ref().map(String::from), Some(String::from(&row.traverse_id)));
+        let place = Place { table: Mission::TABLE.name, label, variant, run };
         for statistic in Statistic::ALL {
             let figure = statistic.column();
             let (unit, scale) = match statistic {
                 Statistic::Success => ("%", Some(100.0)),
-                _ => (unit::<MissionRow>(figure), None),
+                _ => (unit::<Mission>(figure), None),
             };
-            self.add(&place, (figure, unit, scale), &row.terrain_id, statistic.of(row));
+            self.add(&place, (figure, unit, scale), &row.terrain_id, row.of(statistic));
         }
     }
 
@@ -393,13 +394,14 @@ mod tests {
     fn val_a_terrain_counts_by_the_mean_of_its_missions() {
         let mut data = crate::tests::made_up::full(1, 24);
         let (terrain, mission) = (data.terrains.swap_remove(0), data.missions.swap_remove(0));
-        let mission = MissionRow { variant: None, ..mission };
+        let mission = Mission { variant: None, ..mission };
         let figures = |pitch: [f64; 3]| {
             let mut figures = Figures::default();
             figures.add_terrain(&terrain, Some("hash"));
             for (outcome, rms_pitch_rate_deg_s) in ["success", "success", "stuck"].into_iter().zip(pitch) {
-                let (terrain_id, outcome, group) = (terrain.terrain_id.clone(), outcome.into(), Some("g".into()));
-                let row = MissionRow { terrain_id, outcome, group, rms_pitch_rate_deg_s, ..mission.clone() };
+                let (terrain_id, outcome, group) =
+                    (terrain.terrain_id.as_str().into(), outcome.into(), Some("g".into()));
+                let row = Mission { terrain_id, outcome, group, rms_pitch_rate_deg_s, ..mission.clone() };
                 figures.add_mission(&row);
             }
             figures

@@ -202,7 +202,6 @@ fn head(data: &Data) -> Head {
 /// counts, and documents are added when the release is sealed.
 fn key_figures(data: &Data) -> Vec<(String, String)> {
     let stage = |name: &str| data.of_stage(name).count();
-    let recordings = data.artifacts.iter().filter(|a| a.path.ends_with(".mcap")).count();
     let counts = [
         (stage("terrain"), "terrain"),
         (stage("dem"), "measured DEM"),
@@ -211,15 +210,14 @@ fn key_figures(data: &Data) -> Vec<(String, String)> {
         (data.routes.len(), "route"),
         (data.formations.len(), "team run"),
         (data.missions.len(), "mission"),
-        (recordings, "MCAP recording"),
-        (data.artifacts.len(), "data file"),
+        (data.stored.recordings, "MCAP recording"),
+        (data.stored.files, "data file"),
     ];
     let plural = |n: usize, what: &str| if n == 1 { what.to_owned() } else { format!("{what}s") };
     let named = |(n, what): (usize, &str)| (set::count(n), plural(n, what));
     let mut figures: Vec<(String, String)> = counts.into_iter().filter(|(n, _)| *n > 0).map(named).collect();
-    let bytes: u64 = data.artifacts.iter().map(|a| a.bytes).sum();
-    if bytes > 0 {
-        figures.push((set::bytes(bytes), "of data".into()));
+    if data.stored.bytes > 0 {
+        figures.push((set::bytes(data.stored.bytes), "of data".into()));
     }
     figures
 }
@@ -227,7 +225,6 @@ fn key_figures(data: &Data) -> Vec<(String, String)> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::data::Artifact;
 
     /// Names that are equal, or empty once they are valid as file names, are numbered over all sections.
     #[test]
@@ -258,8 +255,8 @@ mod tests {
         let full = crate::tests::made_up::full(1, 24);
         data.missions = full.missions[..2].to_vec();
         data.fits = full.fits[..1].to_vec();
-        let artifact = |path: &str, bytes| Artifact { path: path.into(), bytes };
-        data.artifacts = vec![artifact("mcap/a/b.mcap", 1_000_000), artifact("fit/a.json", 234_000)];
+        data.stored.add("mcap/a/b.mcap", 1_000_000);
+        data.stored.add("fit/a.json", 234_000);
         let counts: Vec<String> = key_figures(&data).into_iter().map(|(n, what)| format!("{n} {what}")).collect();
         assert_eq!(counts, ["1 covariance fit", "2 missions", "1 MCAP recording", "2 data files", "1.23 MB of data"]);
     }

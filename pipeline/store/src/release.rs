@@ -1,6 +1,7 @@
 //! The release folder: assembled in a temporary folder, sealed with a manifest and checksums, published by one rename, and verified.
 
 mod builder;
+mod manifest;
 mod pack;
 mod verify;
 
@@ -9,6 +10,7 @@ mod tests;
 
 pub(crate) use builder::sync_tree;
 pub use builder::{Head, Incoming, PartWriter, ReleaseBuilder, Staging, TablePart, beside};
+pub use manifest::for_each_artifact;
 pub use pack::{Packed, pack};
 pub use verify::{Problem, ProblemKind, VerifyReport, verify};
 
@@ -123,12 +125,7 @@ impl Release {
     /// [`ReleaseError::NotARelease`] if the folder has no sastrugi manifest.
     pub fn open(folder: &Path) -> Result<Self, ReleaseError> {
         let path = folder.join(MANIFEST);
-        let text = crate::file::read(&path).map_err(|e| match e.kind() {
-            io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
-                ReleaseError::not_a_release(folder, format!("it has no {MANIFEST}"))
-            }
-            _ => ReleaseError::io(&path)(e),
-        })?;
+        let text = crate::file::read(&path).map_err(unread(folder, &path))?;
         let manifest = parse_manifest(&text).map_err(|reason| ReleaseError::not_a_release(folder, reason))?;
         Ok(Self { folder: folder.to_owned(), manifest })
     }
@@ -202,14 +199,19 @@ impl Release {
     }
 }
 
+/// The error for a manifest that cannot be read.
+fn unread(folder: &Path, path: &Path) -> impl FnOnce(io::Error) -> ReleaseError {
+    move |e| match e.kind() {
+        io::ErrorKind::NotFound | io::ErrorKind::NotADirectory => {
+            ReleaseError::not_a_release(folder, format!("it has no {MANIFEST}"))
+        }
+        _ => ReleaseError::io(path)(e),
+    }
+}
+
 fn parse_manifest(bytes: &[u8]) -> Result<Manifest, String> {
     let manifest: Manifest = serde_json::from_slice(bytes).map_err(|e| format!("{MANIFEST} cannot be parsed: {e}"))?;
-    if manifest.program != PROGRAM || manifest.format != FORMAT {
-        return Err(format!(
-            "{MANIFEST} is of {} format {}, expected {PROGRAM} format {FORMAT}",
-            manifest.program, manifest.format
-        ));
-    }
+    check_head(&manifest)?;
     let mut paths = BTreeSet::new();
     for Artifact { path, .. } in &manifest.artifacts {
         check_path(path).map_err(|e| format!("{MANIFEST} lists an invalid path: {e}"))?;
@@ -217,8 +219,16 @@ fn parse_manifest(bytes: &[u8]) -> Result<Manifest, String> {
             return Err(format!("{MANIFEST} lists \"{path}\" twice"));
         }
     }
-    check_path(&manifest.name).map_err(|e| format!("{MANIFEST} has an invalid study name: {e}"))?;
     Ok(manifest)
+}
+
+/// Checks a manifest except for its list of files.
+fn check_head(manifest: &Manifest) -> Result<(), String> {
+    let Manifest { program, format, name, .. } = manifest;
+    if program != PROGRAM || *format != FORMAT {
+        return Err(format!("{MANIFEST} is of {program} format {format}, expected {PROGRAM} format {FORMAT}"));
+    }
+    check_path(name).map_err(|e| format!("{MANIFEST} has an invalid study name: {e}"))
 }
 
 /// Name of the table that a path belongs to.

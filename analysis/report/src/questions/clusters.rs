@@ -1,9 +1,8 @@
 //! Clusters that a bootstrap resamples: whole terrains, because missions on one terrain are correlated; if groups share their
 //! random draws (common pairs), whole blocks of paired terrains, because these are correlated too.
 
-use crate::data::{Data, Group};
-use sastrugi_numeric::{Stream, Streams, sums};
-use sastrugi_schemas::tables::MissionRow;
+use crate::data::{Data, Group, Mission};
+use sastrugi_numeric::{Stream, sums};
 use sastrugi_statistics::{Interval, cluster_interval};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -20,7 +19,7 @@ pub const BAND: f64 = 0.9;
 
 /// The random stream of a bootstrap, named by the item that is resampled (a group) and by the quantity.
 pub fn stream(data: &Data, item: &str, figure: &str) -> Stream {
-    Streams::for_item(data.study.seed, "report", item).stream(figure)
+    data.stream(item, figure)
 }
 
 /// Median of a group's values, which are given with their terrains, and its sampling band.
@@ -38,7 +37,10 @@ pub fn block(pair_id: &str) -> &str {
 }
 
 /// True when missions of at least two groups have a `pair_id` in common.
-pub fn paired(groups: &[Group<MissionRow>]) -> bool {
+pub fn paired(groups: &[Group<Mission>]) -> bool {
+    if groups.len() < 2 {
+        return false;
+    }
     let sets: Vec<BTreeSet<&str>> =
         groups.iter().map(|g| g.rows.iter().map(|m| m.pair_id.as_str()).collect()).collect();
     sets.iter().enumerate().any(|(i, a)| sets[..i].iter().any(|b| !a.is_disjoint(b)))
@@ -57,9 +59,9 @@ impl<'a> Pairing<'a> {
     }
 
     /// The pairing of groups: blocks if groups share pairs, otherwise terrains.
-    pub fn among(groups: &[Group<'a, MissionRow>]) -> Self {
+    pub fn among(groups: &[Group<'a, Mission>]) -> Self {
         let missions = groups.iter().flat_map(|g| g.rows.iter().copied());
-        let entry = |m: &'a MissionRow| (m.terrain_id.as_str(), block(&m.pair_id));
+        let entry = |m: &'a Mission| (m.terrain_id.as_str(), block(&m.pair_id));
         Self { blocks: if paired(groups) { missions.map(entry).collect() } else { BTreeMap::new() } }
     }
 
@@ -139,6 +141,7 @@ pub fn in_words(pairing: &Pairing) -> &'static str {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sastrugi_numeric::Streams;
 
     #[test]
     fn val_blocks() {

@@ -1,7 +1,7 @@
 //! Outcomes of a mission, and how each is drawn: by colour, line and mark, so that nothing depends on colour alone.
 
+use crate::data::Mission;
 use crate::render::svg::{OUTCOMES, Paint, Stroke, Symbol};
-use sastrugi_schemas::tables::MissionRow;
 
 /// One outcome.
 #[derive(Clone, Copy, Debug)]
@@ -31,17 +31,17 @@ pub const ALL: [Outcome; 6] = [
 ];
 
 /// Number of a mission's outcome in [`ALL`].
-pub fn index(mission: &MissionRow) -> usize {
-    ALL.iter().position(|o| o.word == mission.outcome).unwrap_or(ALL.len() - 1)
+pub fn index(mission: &Mission) -> usize {
+    ALL.iter().position(|o| o.word == mission.outcome.as_str()).unwrap_or(ALL.len() - 1)
 }
 
 /// True for a mission that reached its goal.
-pub fn successful(mission: &MissionRow) -> bool {
+pub fn successful(mission: &Mission) -> bool {
     index(mission) == 0
 }
 
 /// Missions by outcome.
-pub fn counts<'a>(missions: impl IntoIterator<Item = &'a MissionRow>) -> [usize; ALL.len()] {
+pub fn counts<'a>(missions: impl IntoIterator<Item = &'a Mission>) -> [usize; ALL.len()] {
     let mut counts = [0; ALL.len()];
     missions.into_iter().for_each(|m| counts[index(m)] += 1);
     counts

@@ -84,10 +84,16 @@ fn block(block: &Block) -> String {
         Block::Figures(figures) => figure_grid(figures),
         Block::Table(t) => table_block(t),
         Block::FoldedTable(t) => {
-            let summary = format!("{} ({})", t.caption, number::counted(t.numbers.rows.len(), "row"));
+            let rows = number::counted(t.numbers.rows.len(), "row");
+            let summary = format!("{} ({rows}{})", t.caption, sampled(&t.numbers));
             folded(&summary, &t.id, &table_block(t))
         }
     }
+}
+
+/// Of how many rows these are a sample, in words; empty if these are all.
+fn sampled(numbers: &Numbers) -> String {
+    numbers.sampled_of.map_or_else(String::new, |all| format!(", a random sample of {}", number::count(all)))
 }
 
 /// A single sentence is shown; several are folded under their summary.
@@ -114,7 +120,7 @@ fn figure(figure: &Figure) -> String {
     let numbers = match figure.numbers.rows.len() {
         0 => String::new(),
         1..=FIGURE_ROWS_MAX => folded("Numbers", &figure.id, &table(&figure.numbers, &figure.title)),
-        n => format!(" <span>({} rows)</span>", number::count(n)),
+        n => format!(" <span>({} rows{})</span>", number::count(n), sampled(&figure.numbers)),
     };
     format!(
         "<figure id=\"fig-{id}\">\n{svg}<figcaption><b>{}</b> {}<div class=\"links\"><a href=\"figures/{id}.svg\">SVG</a> \
@@ -161,7 +167,12 @@ fn table(numbers: &Numbers, caption: &str) -> String {
     let class = if cards { "scroll cards" } else { "scroll" };
     let caption = match numbers.rows.len().saturating_sub(TABLE_ROWS_MAX) {
         0 => escape(caption),
-        _ => format!("{} (first {TABLE_ROWS_MAX} of {} rows)", escape(caption), number::count(numbers.rows.len())),
+        _ => format!(
+            "{} (first {TABLE_ROWS_MAX} of {} rows{})",
+            escape(caption),
+            number::count(numbers.rows.len()),
+            sampled(numbers)
+        ),
     };
     format!(
         "<div class=\"{class}\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table><caption>{caption}</caption>\n\

@@ -4,15 +4,15 @@ mod navigation;
 pub mod rovers;
 
 use crate::ReportError;
-use crate::data::{Artifact, Data, Files, Study};
+use crate::data::{Data, Files, Mission, Start, Stored, Study};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{
     CandidateCurveRow, CandidateRow, CovarianceRow, FitRow, FormationSampleRow, HeightDistributionRow,
-    LikelihoodProfileRow, LogRow, MissionRow, ProfilePsdRow, PsdRow, ReplicateRow, RoutePointRow, RoverSampleRow,
-    SampleRow, StructureRow, SurfaceRow, TerrainRow,
+    LikelihoodProfileRow, LogRow, MissionRow, ProfilePsdRow, PsdRow, RoutePointRow, RoverSampleRow, SampleRow,
+    StructureRow, SurfaceRow, TerrainRow,
 };
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::TAU;
 
 /// Rasters and samples held in memory.
@@ -34,8 +34,9 @@ impl Files for Shelf {
     fn classes(&self, path: &str) -> Result<Option<Grid<u8>>, ReportError> {
         Ok(self.classes.get(path).cloned())
     }
-    fn samples(&self, terrain_id: &str) -> Result<Vec<SampleRow>, ReportError> {
-        Ok(self.samples.get(terrain_id).cloned().unwrap_or_default())
+    fn samples(&self, terrain_id: &str, missions: &BTreeSet<&str>) -> Result<Vec<SampleRow>, ReportError> {
+        let all = self.samples.get(terrain_id).into_iter().flatten();
+        Ok(all.filter(|sample| missions.contains(sample.mission_id.as_str())).cloned().collect())
     }
     fn route_points(&self) -> Result<Vec<RoutePointRow>, ReportError> {
         Ok(self.route_points.clone())
@@ -64,9 +65,10 @@ pub fn empty() -> Data {
         },
         study_sha256: "0".repeat(64),
         version: "sastrugi 0.1.0".into(),
-        artifacts: Vec::new(),
+        stored: Stored::default(),
         failed: Vec::new(),
         terrains: Vec::new(),
+        without_curves: BTreeSet::new(),
         fits: Vec::new(),
         covariance: Vec::new(),
         candidates: Vec::new(),
@@ -147,7 +149,7 @@ pub fn log() -> LogRow {
 /// A release with `per_group` terrains in each of three groups.
 pub fn full(per_group: usize, side: usize) -> Data {
     let (mut data, shelf) = parts(per_group, side);
-    data.artifacts = data.terrains.iter().map(|t| Artifact { path: t.path.clone(), bytes: 1_234_567 }).collect();
+    data.terrains.iter().for_each(|t| data.stored.add(&t.path, 1_234_567));
     data.files = Box::new(shelf);
     data
 }
@@ -175,8 +177,8 @@ fn variants(data: &mut Data) {
     for (name, word, spoilt, rougher) in
         [("wheel_friction = 0.7", "friction", 5, 0.97), ("tyre_damping_n_s_m = 250.0", "soft", 900, 1.2)]
     {
-        data.missions.extend(plain.iter().enumerate().map(|(i, m)| MissionRow {
-            mission_id: m.mission_id.replace("straight", word),
+        data.missions.extend(plain.iter().enumerate().map(|(i, m)| Mission {
+            mission_id: m.mission_id.replace("straight", word).into(),
             variant: Some(name.into()),
             outcome: if i % spoilt == 0 { "stuck".into() } else { m.outcome.clone() },
             rms_vertical_acceleration_m_s2: rougher * m.rms_vertical_acceleration_m_s2,
@@ -187,11 +189,11 @@ fn variants(data: &mut Data) {
     let variant = Some("z_scale_percent = 1.0".to_owned());
     for terrain in data.terrains.clone().into_iter().filter(steep) {
         let terrain_id = format!("{}.steep", terrain.terrain_id);
-        let on = plain.iter().filter(|m| m.terrain_id == terrain.terrain_id);
-        data.missions.extend(on.map(|m| MissionRow {
-            terrain_id: terrain_id.clone(),
-            pair_id: format!("steep-{}", m.pair_id),
-            variant: variant.clone(),
+        let on = plain.iter().filter(|m| m.terrain_id.as_str() == terrain.terrain_id);
+        data.missions.extend(on.map(|m| Mission {
+            terrain_id: terrain_id.as_str().into(),
+            pair_id: format!("steep-{}", m.pair_id).into(),
+            variant: variant.as_deref().map(Into::into),
             outcome: "out_of_bounds".into(),
             ..m.clone()
         }));
@@ -204,8 +206,7 @@ fn variants(data: &mut Data) {
 /// Five starts of every plain mission.
 fn replicates(data: &mut Data) {
     let mut s = stream("replicates");
-    for m in data.missions.iter_mut().filter(|m| m.variant.is_none()) {
-        m.replicates = 5;
+    for m in data.missions.iter().filter(|m| m.variant.is_none()) {
         let certain = s.uniform() < 0.5;
         for replicate in 1..=5 {
             let flipped = !certain && s.uniform() < 0.3;
@@ -214,22 +215,8 @@ fn replicates(data: &mut Data) {
                 (true, true) => "tipped".into(),
                 (true, false) => "success".into(),
             };
-            data.replicates.push(ReplicateRow {
-                terrain_id: m.terrain_id.clone(),
-                mission_id: m.mission_id.clone(),
-                replicate,
-                group: None,
-                variant: None,
-                start_x_m: m.start_x_m,
-                start_y_m: m.start_y_m,
-                start_heading_deg: m.heading_deg,
-                outcome,
-                time_s: m.time_s,
-                progress_m: m.progress_m,
-                rms_vertical_acceleration_m_s2: m.rms_vertical_acceleration_m_s2,
-                rms_pitch_rate_deg_s: m.rms_pitch_rate_deg_s,
-                rms_roll_rate_deg_s: m.rms_roll_rate_deg_s,
-            });
+            let (terrain_id, mission_id) = (m.terrain_id.clone(), m.mission_id.clone());
+            data.replicates.push(Start { terrain_id, mission_id, replicate, outcome });
         }
     }
 }
@@ -352,7 +339,7 @@ fn missions(data: &mut Data, shelf: &mut Shelf, terrain_id: &str, g: usize, terr
         let mut draw = |median: f64| median * scale * libm::exp(0.2 * s.normal());
         let (acceleration, pitch, roll) = (draw(0.6), draw(13.0), draw(9.5));
         let time_s = if outcome == "success" { 36.0 + s.uniform_in(0.0, 2.0) } else { 60.0 };
-        data.missions.push(MissionRow {
+        data.missions.push(Mission::from_row(&MissionRow {
             terrain_id: terrain_id.into(),
             mission_id: mission_id.clone(),
             group: None,
@@ -392,7 +379,7 @@ fn missions(data: &mut Data, shelf: &mut Shelf, terrain_id: &str, g: usize, terr
             samples: 400,
             sample_rate_hz: 20.0,
             path: format!("mcap/{terrain_id}/{mission_id}.mcap"),
-        });
+        }));
         for i in 0..400 {
             let t = f64::from(i) / 400.0;
             let wiggle = 0.4 * libm::sin(9.0 * t + x);

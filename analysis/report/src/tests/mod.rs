@@ -9,11 +9,11 @@ mod rovers;
 pub mod xml;
 
 use crate::content::Block;
-use crate::data::{Against, Data};
+use crate::data::{Against, Data, Mission};
 use crate::write::{Summary, write};
 use sastrugi_schemas::Cell;
 use sastrugi_schemas::study::HypothesisItem;
-use sastrugi_schemas::tables::{LogRow, MissionRow, TerrainRow};
+use sastrugi_schemas::tables::{LogRow, SampleRow, TerrainRow};
 use std::collections::BTreeMap;
 use std::path::Path;
 
@@ -175,7 +175,9 @@ fn prop_any_part_may_be_absent() {
         ("replicates", |d| d.replicates.clear()),
         ("plain missions", |d| d.missions.retain(|m| m.variant.is_some())),
         ("variants", |d| d.missions.retain(|m| m.variant.is_none())),
-        ("pairs", |d| d.missions.iter_mut().for_each(|m| m.pair_id = format!("{}-{}", m.terrain_id, m.mission_id))),
+        ("pairs", |d| {
+            d.missions.iter_mut().for_each(|m| m.pair_id = format!("{}-{}", m.terrain_id, m.mission_id).into())
+        }),
         ("lines", |d| d.missions.iter_mut().for_each(|m| (m.goal_x_m, m.progress_m) = (f64::NAN, f64::NAN))),
         ("fits", |d| d.fits.clear()),
         ("covariance", |d| d.covariance.clear()),
@@ -386,7 +388,7 @@ fn val_variants_stay_out_of_plain_comparisons() {
 fn val_terrains_are_the_units_of_tests() {
     let mut data = made_up::full(3, 24);
     let paired = rows(&report(&data).0, "comparison");
-    data.missions.iter_mut().for_each(|m| m.pair_id = format!("{}-{}", m.terrain_id, m.mission_id));
+    data.missions.iter_mut().for_each(|m| m.pair_id = format!("{}-{}", m.terrain_id, m.mission_id).into());
     let apart = rows(&report(&data).0, "comparison");
     for (rows, of, arrangements) in [(paired, "3 blocks, ", 8.0), (apart, "3 + 3 terrains", 20.0)] {
         assert_eq!(rows.len(), 5 * 3);
@@ -474,12 +476,12 @@ fn val_declared_claims_are_adjusted_by_family() {
 #[test]
 fn val_ties_do_not_reverse_a_claim() {
     let mut data = made_up::full(20, 24);
-    let on_steep = data.missions.iter().map(|m| m.terrain_id.clone()).filter(|id| id.starts_with("d2.60"));
+    let on_steep = data.missions.iter().map(|m| m.terrain_id.to_string()).filter(|id| id.starts_with("d2.60"));
     let terrains: std::collections::BTreeSet<String> = on_steep.collect();
     let worse: Vec<&String> = terrains.iter().take(9).collect();
     for (k, mission) in data.missions.iter_mut().enumerate() {
-        mission.pair_id = format!("{k}");
-        let fails = worse.contains(&&mission.terrain_id) && k % 2 == 0;
+        mission.pair_id = format!("{k}").into();
+        let fails = worse.iter().any(|id| mission.terrain_id == id.as_str()) && k % 2 == 0;
         mission.outcome = if fails { "stuck" } else { "success" }.into();
     }
     let groups = ["2.30", "2.60"];
@@ -550,21 +552,79 @@ fn val_paired_metrics_use_missions_that_succeed_in_both() {
     assert!(row[3] == "0 blocks, 0 missions" && row[4].is_null() && row[10].is_null(), "{row:?}");
 }
 
+/// What is too much to list or to draw is a random sample, and both the page and the file say so; statistics are those of all missions.
+#[test]
+fn prop_large_releases_are_sampled_and_say_so() {
+    let mut data = made_up::full(2, 24);
+    data.missions.retain(|m| m.variant.is_none());
+    let few = data.missions.clone();
+    let times = 21_000usize.div_ceil(few.len());
+    let copy = |(k, m): (usize, &Mission)| Mission {
+        mission_id: format!("{}-{k:04}", m.mission_id).into(),
+        pair_id: format!("{}.{k}", m.pair_id).into(),
+        time_s: m.time_s + 1e-3 * k as f64,
+        ..m.clone()
+    };
+    data.missions = few.iter().flat_map(|m| (0..times).map(move |k| (k, m))).map(copy).collect();
+    data.missions.sort_by(|a, b| (&a.terrain_id, &a.mission_id).cmp(&(&b.terrain_id, &b.mission_id)));
+    let (files, _) = report(&data);
+    assert_sound(&files);
+    let json =
+        |name: &str| -> serde_json::Value { serde_json::from_str(&files[&format!("data/{name}.json")]).unwrap() };
+    let all = json("missions");
+    assert_eq!(all["random_sample_of"].as_u64(), Some(data.missions.len() as u64));
+    assert_eq!(all["rows"].as_array().unwrap().len(), crate::sample::ROWS_MAX);
+    assert!(files["index.html"].contains("rows, a random sample of "));
+    assert!(files["index.html"].contains("; a random sample of 400 is drawn"));
+    // The counts are those of all.
+    let outcomes = rows(&files, "outcomes");
+    let missions: u64 = outcomes.iter().map(|row| row[1].as_u64().unwrap()).sum();
+    assert_eq!(missions, data.missions.len() as u64);
+    let small = report(&made_up::full(2, 24)).0;
+    assert!(small.values().all(|text| !text.contains("random sample of") && !text.contains("random_sample_of")));
+}
+
+/// Adds a run `second` with the same missions, which all get stuck.
+fn add_second_run(data: &mut Data) {
+    let second = data.missions.iter().map(|m| Mission {
+        traverse_id: "second".into(),
+        mission_id: format!("second-{}", m.mission_id).into(),
+        outcome: "stuck".into(),
+        ..m.clone()
+    });
+    let second: Vec<Mission> = second.collect();
+    data.missions.extend(second);
+    data.missions.sort_by(|a, b| (&a.terrain_id, &a.mission_id).cmp(&(&b.terrain_id, &b.mission_id)));
+}
+
+/// Missions of two runs that are drawn on the same terrain each have their own samples.
+#[test]
+fn val_runs_on_one_terrain_show_their_own_samples() {
+    let (mut data, mut shelf) = made_up::parts(2, 24);
+    data.missions.retain(|m| m.variant.is_none());
+    data.missions.iter_mut().for_each(|m| m.outcome = "success".into());
+    add_second_run(&mut data);
+    for samples in shelf.samples.values_mut() {
+        let second = samples.iter().map(|s| (format!("second-{}", s.mission_id), s.clone()));
+        let second: Vec<SampleRow> = second.map(|(mission_id, s)| SampleRow { mission_id, ..s }).collect();
+        samples.extend(second);
+        samples.sort_by(|a, b| a.mission_id.cmp(&b.mission_id));
+    }
+    data.files = Box::new(shelf);
+    let (files, _) = report(&data);
+    assert_sound(&files);
+    let (second, first): (Vec<&String>, Vec<&String>) =
+        files.keys().filter(|path| path.starts_with("figures/mission-")).partition(|path| path.contains("second-"));
+    assert_eq!((first.len(), second.len()), (1, 1), "{first:?} {second:?}");
+}
+
 /// A second run over the same terrains is a separate group everywhere, and a claim names its run.
 #[test]
 fn val_runs_are_separate_groups() {
     let mut data = made_up::full(6, 24);
     data.missions.retain(|m| m.variant.is_none());
     let first = data.missions[0].traverse_id.clone();
-    let second = data.missions.iter().map(|m| MissionRow {
-        traverse_id: "second".into(),
-        mission_id: format!("second-{}", m.mission_id),
-        outcome: "stuck".into(),
-        ..m.clone()
-    });
-    let second: Vec<MissionRow> = second.collect();
-    data.missions.extend(second);
-    data.missions.sort_by(|a, b| (&a.terrain_id, &a.mission_id).cmp(&(&b.terrain_id, &b.mission_id)));
+    add_second_run(&mut data);
     let claimed = |run: &str| {
         let groups = ["2.30", "2.60"];
         claim(serde_json::json!({ "statistic": "success", "groups": groups, "test": "difference", "traverse": run }))
@@ -624,7 +684,7 @@ fn val_a_release_is_compared_with_another() {
 #[test]
 fn val_logs_are_compared_with_missions() {
     let mut data = made_up::full(6, 24);
-    let median = |of: fn(&MissionRow) -> f64| {
+    let median = |of: fn(&Mission) -> f64| {
         let group = data.mission_groups().swap_remove(0);
         sastrugi_numeric::sums::median(&group.rows.iter().map(|m| of(m)).collect::<Vec<_>>())
     };

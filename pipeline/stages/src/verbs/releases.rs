@@ -5,11 +5,12 @@
 use super::parameters;
 use crate::error::Error;
 use sastrugi_numeric::Streams;
+use sastrugi_report::data::Mission;
 pub use sastrugi_report::releases::Quantity;
 use sastrugi_report::releases::{self, Figures, Settings};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::manifest::Artifact;
-use sastrugi_schemas::tables::{MissionRow, TerrainRow};
+use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_schemas::{Answer, ParameterError};
 use sastrugi_store::release::Release;
 use schemars::JsonSchema;
@@ -198,7 +199,7 @@ fn figures(release: &Release) -> Result<Figures, Error> {
     let content = |path: &str| contents.get(path).copied().flatten();
     release
         .for_each_row(|row: TerrainRow| figures.add_terrain(&row, content(&row.path)))
-        .and_then(|()| release.for_each_row(|row: MissionRow| figures.add_mission(&row)))?;
+        .and_then(|()| release.for_each_row(|row: Mission| figures.add_mission(&row)))?;
     Ok(figures)
 }
 

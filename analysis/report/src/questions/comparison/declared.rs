@@ -3,12 +3,11 @@
 use super::values::{self, Metric, Values};
 use super::verdicts::{self, Level, Measure, Verdict};
 use crate::content::{Block, Numbers, TableBlock, number, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::questions::clusters::Pairing;
 use crate::questions::sql;
 use crate::render::number as set;
 use sastrugi_schemas::study::{Direction, HypothesisItem, HypothesisTest};
-use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{Difference, Interval, MeanDifference, holm};
 use std::collections::BTreeSet;
 
@@ -36,7 +35,7 @@ struct Tested<'a> {
 }
 
 /// Verdicts on the hypotheses; empty when the study declares none.
-pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Block> {
+pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> Vec<Block> {
     if data.study.hypotheses.is_empty() {
         return Vec::new();
     }
@@ -50,12 +49,12 @@ pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: 
 }
 
 /// The number of supported, unsupported and undecided claims, in a sentence.
-pub fn sentence<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> String {
+pub fn sentence<'a>(data: &'a Data, groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> String {
     in_words(&tested(data, groups, pairing))
 }
 
 /// Every hypothesis with its test, adjusted over its family.
-fn tested<'a>(data: &'a Data, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Tested<'a>> {
+fn tested<'a>(data: &'a Data, groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> Vec<Tested<'a>> {
     let claims = &data.study.hypotheses;
     let family = |of: &HypothesisItem| claims.iter().filter(|h| h.family == of.family).count();
     let mut tested: Vec<Tested> = claims.iter().map(|h| test(data, h, family(h), groups, pairing)).collect();
@@ -67,7 +66,7 @@ fn test<'a>(
     data: &Data,
     claim: &'a HypothesisItem,
     family: usize,
-    groups: &'a [Group<'a, MissionRow>],
+    groups: &'a [Group<'a, Mission>],
     pairing: &Pairing<'a>,
 ) -> Tested<'a> {
     let metric = values::metric(claim.statistic, groups, pairing);

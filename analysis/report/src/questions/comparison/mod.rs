@@ -10,9 +10,8 @@ use super::Question;
 use super::clusters::{LEVEL, Pairing};
 use crate::ReportError;
 use crate::content::Block;
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::render::number as set;
-use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::normal;
 use std::collections::BTreeSet;
 use values::Metric;
@@ -47,7 +46,7 @@ pub(super) fn claims(data: &Data) -> Option<String> {
 }
 
 /// All comparisons that no hypothesis of the study declares.
-fn exploratory(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> Vec<Block> {
+fn exploratory(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> Vec<Block> {
     let heading = |_| Block::Heading("Everything else is exploratory".into());
     let mut blocks: Vec<Block> = data.study.hypotheses.first().map(heading).into_iter().collect();
     let metrics = values::metrics(groups, pairing);
@@ -73,7 +72,7 @@ fn exploratory(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> 
     blocks
 }
 
-fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> String {
+fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> String {
     let registered = match data.study.hypotheses.len() {
         0 => "Exploratory: no hypothesis was declared before the run.",
         _ => "Exploratory: nothing below was declared before the run, so its p values are only indicative.",
@@ -109,13 +108,13 @@ fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) ->
 }
 
 /// Number of terrains in the smallest group, if below [`FEW`].
-fn few_terrains(groups: &[Group<MissionRow>]) -> Option<usize> {
-    let terrains = |g: &Group<MissionRow>| g.rows.iter().map(|m| &m.terrain_id).collect::<BTreeSet<_>>().len();
+fn few_terrains(groups: &[Group<Mission>]) -> Option<usize> {
+    let terrains = |g: &Group<Mission>| g.rows.iter().map(|m| &m.terrain_id).collect::<BTreeSet<_>>().len();
     groups.iter().map(terrains).min().filter(|n| *n < FEW)
 }
 
 /// Why missions are not tested, with the false-alarm rate that such a test would have here.
-fn refusal(groups: &[Group<MissionRow>], metrics: &[Metric], pairing: &Pairing) -> String {
+fn refusal(groups: &[Group<Mission>], metrics: &[Metric], pairing: &Pairing) -> String {
     let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
     let terrains: usize =
         groups.iter().map(|g| g.rows.iter().map(|m| &m.terrain_id).collect::<BTreeSet<_>>().len()).sum();

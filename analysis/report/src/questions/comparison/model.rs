@@ -2,12 +2,11 @@
 
 use super::few_terrains;
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::questions::clusters::{LEVEL, Pairing};
 use crate::questions::outcome::successful;
 use crate::questions::sql;
 use sastrugi_schemas::Cell;
-use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::mixed_logistic::{Fit, Missions};
 use sastrugi_statistics::normal;
 use std::collections::BTreeMap;
@@ -20,7 +19,7 @@ terrains above hold for any number.";
 const OF_BLOCKS: &str = "Terrains of one block are treated as independent, which makes intervals wider than necessary.";
 
 /// The table and its explanation; a sentence instead where there is no estimate.
-pub fn blocks(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> Vec<Block> {
+pub fn blocks(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> Vec<Block> {
     let notes = [(pairing.is_common(), OF_BLOCKS), (few_terrains(groups).is_some(), FEW_TERRAINS)];
     let words = notes.iter().filter(|n| n.0).fold(WORDS.to_owned(), |words, (_, note)| format!("{words} {note}"));
     let mut blocks = vec![Block::Heading("Odds of success".into()), Block::Text(words)];
@@ -28,8 +27,8 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> V
     blocks
 }
 
-fn without_estimate(groups: &[Group<MissionRow>]) -> &'static str {
-    let one_outcome = |g: &Group<MissionRow>| g.rows.iter().all(|m| successful(m) == successful(g.rows[0]));
+fn without_estimate(groups: &[Group<Mission>]) -> &'static str {
+    let one_outcome = |g: &Group<Mission>| g.rows.iter().all(|m| successful(m) == successful(g.rows[0]));
     if groups.iter().any(one_outcome) {
         "The model has no finite estimate here: in at least one group, all missions or none succeeded."
     } else {
@@ -37,7 +36,7 @@ fn without_estimate(groups: &[Group<MissionRow>]) -> &'static str {
     }
 }
 
-fn table(data: &Data, groups: &[Group<MissionRow>]) -> Option<TableBlock> {
+fn table(data: &Data, groups: &[Group<Mission>]) -> Option<TableBlock> {
     let null = fit(groups, |_| vec![1.0])?;
     let full = fit(groups, |g| std::iter::once(1.0).chain((1..groups.len()).map(|k| unit(k == g))).collect())?;
     let columns = [
@@ -78,7 +77,7 @@ fn unit(one: bool) -> f64 {
 }
 
 /// The model with these covariates of each group.
-fn fit(groups: &[Group<MissionRow>], covariates: impl Fn(usize) -> Vec<f64>) -> Option<Fit> {
+fn fit(groups: &[Group<Mission>], covariates: impl Fn(usize) -> Vec<f64>) -> Option<Fit> {
     let mut terrains: BTreeMap<&str, BTreeMap<usize, (f64, f64)>> = BTreeMap::new();
     for (g, group) in groups.iter().enumerate() {
         for mission in &group.rows {

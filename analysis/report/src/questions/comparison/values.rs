@@ -1,11 +1,11 @@
 //! Values that are compared: for every metric and group, one number per terrain, or per block of paired terrains.
 
-use crate::data::Group;
+use crate::data::{Group, Mission};
 use crate::questions::clusters::{Pairing, block};
 use sastrugi_numeric::sums;
 use sastrugi_schemas::study::Statistic;
-use sastrugi_schemas::tables::MissionRow;
 use std::collections::{BTreeMap, BTreeSet};
+use std::rc::Rc;
 
 /// A metric that is compared.
 pub struct Metric<'a> {
@@ -31,8 +31,8 @@ pub struct Values<'a> {
     pub terrains: BTreeMap<&'a str, Vec<f64>>,
     /// Values in each cluster with the pair of each: a terrain, or a block where groups share draws.
     clusters: BTreeMap<&'a str, Vec<(&'a str, f64)>>,
-    /// Pairs of all missions, whether they have a value or not.
-    pairs: BTreeSet<&'a str>,
+    /// Pairs of all missions, whether they have a value or not; empty if no groups share pairs.
+    pairs: Rc<BTreeSet<&'a str>>,
     /// Mean of each cluster's missions.
     pub means: BTreeMap<&'a str, f64>,
 }
@@ -59,15 +59,37 @@ const METRICS: [Statistic; 5] = [
 ];
 
 /// Success, then the metrics of the successful missions.
-pub fn metrics<'a>(groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Vec<Metric<'a>> {
-    METRICS.into_iter().map(|statistic| metric(statistic, groups, pairing)).collect()
+pub fn metrics<'a>(groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> Vec<Metric<'a>> {
+    let pairs = pairs(groups, pairing);
+    METRICS.into_iter().map(|statistic| metric_of(statistic, groups, pairing, &pairs)).collect()
 }
 
 /// One metric of all groups.
-pub fn metric<'a>(statistic: Statistic, groups: &'a [Group<'a, MissionRow>], pairing: &Pairing<'a>) -> Metric<'a> {
+pub fn metric<'a>(statistic: Statistic, groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> Metric<'a> {
+    metric_of(statistic, groups, pairing, &pairs(groups, pairing))
+}
+
+/// The same with the pairs of each group.
+fn metric_of<'a>(
+    statistic: Statistic,
+    groups: &'a [Group<'a, Mission>],
+    pairing: &Pairing<'a>,
+    pairs: &[Rc<BTreeSet<&'a str>>],
+) -> Metric<'a> {
     let (name, unit) = words(statistic);
-    let groups = groups.iter().map(|g| values(g, pairing, |m| statistic.of(m))).collect();
-    Metric { name, unit, column: statistic.column(), groups }
+    let of_group = |(g, pairs): (&'a Group<'a, Mission>, &Rc<BTreeSet<&'a str>>)| {
+        values(g, pairing, Rc::clone(pairs), |m| m.of(statistic))
+    };
+    Metric { name, unit, column: statistic.column(), groups: groups.iter().zip(pairs).map(of_group).collect() }
+}
+
+/// Pairs of all missions of each group, shared by the metrics; empty if no groups share pairs.
+fn pairs<'a>(groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> Vec<Rc<BTreeSet<&'a str>>> {
+    let of_group = |group: &'a Group<'a, Mission>| match pairing.is_common() {
+        true => group.rows.iter().map(|m| m.pair_id.as_str()).collect(),
+        false => BTreeSet::new(),
+    };
+    groups.iter().map(|group| Rc::new(of_group(group))).collect()
 }
 
 /// Name of a metric, and its unit as set in text.
@@ -85,9 +107,10 @@ pub const fn words(statistic: Statistic) -> (&'static str, &'static str) {
 }
 
 fn values<'a>(
-    group: &'a Group<'a, MissionRow>,
+    group: &'a Group<'a, Mission>,
     pairing: &Pairing<'a>,
-    value: impl Fn(&MissionRow) -> f64,
+    pairs: Rc<BTreeSet<&'a str>>,
+    value: impl Fn(&Mission) -> f64,
 ) -> Values<'a> {
     let (mut terrains, mut clusters) = (BTreeMap::<&str, Vec<f64>>::new(), BTreeMap::<&str, Vec<(&str, f64)>>::new());
     for mission in &group.rows {
@@ -100,10 +123,11 @@ fn values<'a>(
             clusters.entry(cluster).or_default().push((&mission.pair_id, value));
         }
     }
+    terrains.values_mut().for_each(Vec::shrink_to_fit);
+    clusters.values_mut().for_each(Vec::shrink_to_fit);
     let mean = |values: &[(&str, f64)]| sums::mean(&values.iter().map(|v| v.1).collect::<Vec<_>>());
     let means = clusters.iter().map(|(name, values)| (*name, mean(values))).collect();
     let (name, label, run) = (&group.name, &group.label, group.run.as_deref());
-    let pairs = group.rows.iter().map(|m| m.pair_id.as_str()).collect();
     Values { name, label, run, terrains, clusters, pairs, means }
 }
 

@@ -6,13 +6,13 @@ use super::comparison::ALPHA;
 use super::outcome::{self, successful};
 use crate::ReportError;
 use crate::content::{Block, Figure, Gives, Numbers, TableBlock, count, number, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_numeric::sums;
-use sastrugi_schemas::tables::{LogRow, MissionRow};
+use sastrugi_schemas::tables::LogRow;
 use sastrugi_statistics::{Interval, Place};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -34,7 +34,7 @@ struct Shared {
     column: &'static str,
     name: &'static str,
     unit: &'static str,
-    of_mission: fn(&MissionRow) -> f64,
+    of_mission: fn(&Mission) -> f64,
     /// Value, noise floor (NaN if unknown), and whether the value is above the noise.
     of_log: fn(&LogRow) -> (f64, f64, bool),
 }
@@ -164,11 +164,11 @@ fn named(logs: &[LogRow]) -> Vec<LogRow> {
 }
 
 /// Every metric of every log, compared with the group that the log names, or with every group.
-fn placed<'a>(logs: &'a [LogRow], groups: &'a [Group<'a, MissionRow>]) -> Vec<Placed<'a>> {
+fn placed<'a>(logs: &'a [LogRow], groups: &'a [Group<'a, Mission>]) -> Vec<Placed<'a>> {
     let mut placed = Vec::new();
     for (log, row) in logs.iter().enumerate() {
-        let own = |g: &&Group<MissionRow>| row.group.as_deref().is_none_or(|label| label == g.label || label == g.name);
-        let beside: Vec<&Group<MissionRow>> = match groups.iter().any(|g| own(&g)) {
+        let own = |g: &&Group<Mission>| row.group.as_deref().is_none_or(|label| label == g.label || label == g.name);
+        let beside: Vec<&Group<Mission>> = match groups.iter().any(|g| own(&g)) {
             true => groups.iter().filter(own).collect(),
             false => groups.iter().collect(),
         };
@@ -179,7 +179,7 @@ fn placed<'a>(logs: &'a [LogRow], groups: &'a [Group<'a, MissionRow>]) -> Vec<Pl
     placed
 }
 
-fn place<'a>((log, row): (usize, &'a LogRow), group: &'a Group<'a, MissionRow>, shared: &'static Shared) -> Placed<'a> {
+fn place<'a>((log, row): (usize, &'a LogRow), group: &'a Group<'a, Mission>, shared: &'static Shared) -> Placed<'a> {
     let mut terrains: BTreeMap<&str, Vec<f64>> = BTreeMap::new();
     for mission in group.rows.iter().filter(|m| successful(m)) {
         let value = (shared.of_mission)(mission);

@@ -2,7 +2,7 @@
 
 use super::{METRICS, Metric};
 use crate::content::{Figure, Numbers, TableBlock, count, number, slug, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::papers;
 use crate::questions::clusters::band;
 use crate::questions::outcome;
@@ -11,28 +11,28 @@ use crate::render::axis::Axis;
 use crate::render::chart::{Beside, Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
-use sastrugi_schemas::tables::MissionRow;
+use crate::sample::{ROWS_MAX, sample};
 use sastrugi_statistics::{BoxPlot, Interval};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// How much outliers may widen an axis on either side, as a multiple of its length without them.
 const OUTLIERS_WIDEN: f64 = 0.5;
+/// Largest number of outliers of a group that are drawn.
+const OUTLIERS_MAX: usize = 500;
 
 /// A group as drawn.
 pub struct Sample<'a> {
     group: String,
     index: usize,
-    /// Terrain and value.
-    values: Vec<(&'a str, f64)>,
+    /// Number of terrains with values.
+    terrains: usize,
+    /// Terrain and value, or a random sample of them.
+    listed: Vec<(&'a str, f64)>,
+    /// Lowest and highest value.
+    ends: (f64, f64),
     plot: BoxPlot,
     band: Option<Interval>,
     published: Option<f64>,
-}
-
-impl Sample<'_> {
-    fn terrains(&self) -> usize {
-        self.values.iter().map(|v| v.0).collect::<BTreeSet<_>>().len()
-    }
 }
 
 /// A metric that is compared between groups, and its values.
@@ -47,7 +47,7 @@ pub struct Compared<'a> {
 }
 
 /// Success on each terrain, then the metrics of the successful missions.
-pub fn compared<'a>(data: &Data, groups: &[Group<'a, MissionRow>]) -> Vec<Compared<'a>> {
+pub fn compared<'a>(data: &Data, groups: &[Group<'a, Mission>]) -> Vec<Compared<'a>> {
     let success = Compared {
         name: "success on a terrain",
         unit: "%",
@@ -94,7 +94,7 @@ pub fn medians(data: &Data, compared: &[Compared]) -> TableBlock {
                 text(figure.unit),
                 text(&s.group),
                 count(s.plot.count),
-                count(s.terrains()),
+                count(s.terrains),
                 number(s.plot.quartile_low),
                 number(s.plot.median),
                 number(s.plot.quartile_high),
@@ -110,17 +110,23 @@ pub fn medians(data: &Data, compared: &[Compared]) -> TableBlock {
 
 fn samples<'a>(
     data: &Data,
-    groups: &[Group<'a, MissionRow>],
+    groups: &[Group<'a, Mission>],
     figure: &str,
-    values: impl Fn(&Group<'a, MissionRow>) -> Vec<(&'a str, f64)>,
+    values: impl Fn(&Group<'a, Mission>) -> Vec<(&'a str, f64)>,
 ) -> Vec<Sample<'a>> {
-    let sample = |g: &Group<'a, MissionRow>| {
-        let values = values(g);
+    let values: Vec<Vec<(&'a str, f64)>> = groups.iter().map(values).collect();
+    let is_long = values.iter().map(Vec::len).sum::<usize>() > ROWS_MAX;
+    let listed_max = if is_long { ROWS_MAX / groups.len() } else { ROWS_MAX };
+    let of_group = |(g, values): (&Group<'a, Mission>, Vec<(&'a str, f64)>)| {
         let plot = BoxPlot::of(&values.iter().map(|v| v.1).collect::<Vec<_>>())?;
         let band = band(data, &g.name, figure, &values);
-        Some(Sample { group: g.name.clone(), index: g.index, values, plot, band, published: None })
+        let terrains = values.iter().map(|v| v.0).collect::<BTreeSet<_>>().len();
+        let ends = ends(values.iter().map(|v| v.1));
+        let listed = sample(values, listed_max, &mut data.stream(&g.name, &format!("listed {figure}")));
+        let (group, index) = (g.name.clone(), g.index);
+        Some(Sample { group, index, terrains, listed, ends, plot, band, published: None })
     };
-    let mut samples: Vec<Sample<'a>> = groups.iter().filter_map(sample).collect();
+    let mut samples: Vec<Sample<'a>> = groups.iter().zip(values).filter_map(of_group).collect();
     if let Some(paper) = papers::applicable(data) {
         let medians: Vec<(&str, f64)> = samples.iter().map(|s| (s.group.as_str(), s.plot.median)).collect();
         let marks = paper.marks(figure, &medians);
@@ -130,13 +136,13 @@ fn samples<'a>(
 }
 
 /// Values of the successful missions of a group, with their terrains.
-pub fn successful<'a>(group: &Group<'a, MissionRow>, metric: &Metric) -> Vec<(&'a str, f64)> {
+pub fn successful<'a>(group: &Group<'a, Mission>, metric: &Metric) -> Vec<(&'a str, f64)> {
     let goals = group.rows.iter().filter(|m| outcome::successful(m));
     goals.map(|m| (m.terrain_id.as_str(), (metric.of)(m))).filter(|v| v.1.is_finite()).collect()
 }
 
 /// Share of successful missions on each terrain of a group, %.
-pub fn success_shares<'a>(group: &Group<'a, MissionRow>) -> Vec<(&'a str, f64)> {
+pub fn success_shares<'a>(group: &Group<'a, Mission>) -> Vec<(&'a str, f64)> {
     let mut terrains: BTreeMap<&str, (usize, usize)> = BTreeMap::new();
     for mission in &group.rows {
         let (goals, all) = terrains.entry(&mission.terrain_id).or_default();
@@ -149,7 +155,7 @@ pub fn success_shares<'a>(group: &Group<'a, MissionRow>) -> Vec<(&'a str, f64)> 
 /// Box plots of a metric; `None` when no mission has it, or when success is known on only one terrain per group.
 pub fn figure(data: &Data, compared: &Compared) -> Option<Figure> {
     let samples = &compared.samples;
-    if samples.is_empty() || compared.figure == "success" && samples.iter().all(|s| s.values.len() < 2) {
+    if samples.is_empty() || compared.figure == "success" && samples.iter().all(|s| s.plot.count < 2) {
         return None;
     }
     let label = |s: &Sample| RowLabel { name: s.group.clone(), detail: format!("n = {}", s.plot.count) };
@@ -159,17 +165,25 @@ pub fn figure(data: &Data, compared: &Compared) -> Option<Figure> {
         0 => String::new(),
         n => format!(" Triangles at the edge: {} beyond the axis.", set::counted(n, "value")),
     };
+    let of_outliers = match samples.iter().any(|s| s.plot.outliers.len() > OUTLIERS_MAX) {
+        true => {
+            format!(" Of more than {OUTLIERS_MAX} values beyond the whiskers of a group, a random sample is drawn.")
+        }
+        false => String::new(),
+    };
     let axis_title = format!("{}, {}", compared.name, compared.unit);
     let mut rows = Rows::new(&labels, 54.0, (axis, &axis_title), &legend(data, compared));
     for (row, s) in samples.iter().enumerate() {
         let beside = Beside { interval: s.band.map(|i| (i.low, i.high)), published: s.published };
-        rows.box_plot(row, &s.plot, beside, Paint::Series(s.index));
+        let mut stream = data.stream(&s.group, &format!("outliers {}", compared.figure));
+        let outliers = sample(s.plot.outliers.clone(), OUTLIERS_MAX, &mut stream);
+        rows.box_plot(row, &BoxPlot { outliers, ..s.plot.clone() }, beside, Paint::Series(s.index));
     }
     let id = if compared.figure == "success" { "success-by-terrain".into() } else { slug(compared.figure) };
     let title = papers::title(data, &id, &format!("{}.", capital(compared.name)));
     Some(Figure {
         title,
-        caption: format!("n is the number of {}.{beyond}", compared.n_is),
+        caption: format!("n is the number of {}.{beyond}{of_outliers}", compared.n_is),
         description: describe(samples, &axis_title),
         svg: rows.svg,
         numbers: numbers(compared),
@@ -182,23 +196,25 @@ fn numbers(compared: &Compared) -> Numbers {
     let mut numbers =
         Numbers::new(compared.query.clone(), &[("group", ""), ("terrain_id", ""), (column, compared.unit)]);
     for s in &compared.samples {
-        s.values.iter().for_each(|v| numbers.row([text(&s.group), text(v.0), number(v.1)]));
+        s.listed.iter().for_each(|v| numbers.row([text(&s.group), text(v.0), number(v.1)]));
     }
-    numbers
+    numbers.of_all(compared.samples.iter().map(|s| s.plot.count).sum())
 }
 
 /// The axis holds all boxes, whiskers and published medians; outliers widen it by no more than [`OUTLIERS_WIDEN`].
 fn axis(samples: &[Sample]) -> Axis {
-    let ends = |values: &mut dyn Iterator<Item = f64>| {
-        values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
-    };
     let inner = |s: &Sample| [s.plot.whisker_low, s.plot.whisker_high, s.published.unwrap_or(s.plot.median)];
-    let (low, high) = ends(&mut samples.iter().flat_map(inner));
-    let (lowest, highest) = ends(&mut samples.iter().flat_map(|s| s.values.iter().map(|v| v.1)));
+    let (low, high) = ends(samples.iter().flat_map(inner));
+    let (lowest, highest) = ends(samples.iter().flat_map(|s| [s.ends.0, s.ends.1]));
     let room = (OUTLIERS_WIDEN * (high - low)).max(1e-3 * high.abs());
     let (low, high) = (low.min(lowest.max(low - room)), high.max(highest.min(high + room)));
     let margin = 0.04 * (high - low);
     Axis::linear(low - margin, high + margin)
+}
+
+/// Lowest and highest value.
+fn ends(values: impl Iterator<Item = f64>) -> (f64, f64) {
+    values.fold((f64::INFINITY, f64::NEG_INFINITY), |(a, b), v| (a.min(v), b.max(v)))
 }
 
 /// Number of outliers beyond the axis.

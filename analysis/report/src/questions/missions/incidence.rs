@@ -1,7 +1,7 @@
 //! How far missions got: cumulative incidence of each kind of failure, over the distance along the line.
 
 use crate::content::{Block, Figure, Numbers, count, number, slug, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::questions::clusters::{LEVEL, REPLICATES, numbered, stream};
 use crate::questions::outcome;
 use crate::questions::sql;
@@ -9,7 +9,6 @@ use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, WIDTH};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke};
-use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{Ending, Incidence, Interval, bootstrap};
 
 /// Causes of failure in the order of their numbers: name, and the outcome whose colour and dashes it has.
@@ -24,14 +23,14 @@ const HEIGHT: f64 = 260.0;
 
 /// Curves of a group.
 struct Curves<'a> {
-    group: &'a Group<'a, MissionRow>,
+    group: &'a Group<'a, Mission>,
     incidence: Incidence,
     /// Interval of every cause at each of the [`STEPS`] + 1 distances; `None` where there are fewer than two clusters.
     bands: Vec<Vec<Option<Interval>>>,
 }
 
 /// Text, and one figure for each group with failures; empty when no distance is known.
-pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
+pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
     let lengths = groups.iter().flat_map(|g| g.rows.iter().map(|m| length(m))).filter(|l| l.is_finite());
     let length = lengths.fold(0.0, f64::max);
     let drawn = &groups[..groups.len().min(GROUPS_MAX)];
@@ -41,7 +40,7 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
         return Vec::new();
     }
     let heading = Block::Heading("Distance to failure".into());
-    let fails = |group: &&Group<MissionRow>| outcome::counts(group.rows.iter().copied())[1..].iter().any(|n| *n > 0);
+    let fails = |group: &&Group<Mission>| outcome::counts(group.rows.iter().copied())[1..].iter().any(|n| *n > 0);
     let whole: Vec<String> = groups
         .iter()
         .filter(|g| !fails(g))
@@ -66,11 +65,11 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
 }
 
 /// Length of a mission's line, m.
-fn length(mission: &MissionRow) -> f64 {
+fn length(mission: &Mission) -> f64 {
     libm::hypot(mission.goal_x_m - mission.start_x_m, mission.goal_y_m - mission.start_y_m)
 }
 
-fn ending(mission: &MissionRow) -> Ending {
+fn ending(mission: &Mission) -> Ending {
     let kind = outcome::index(mission);
     let own = CAUSES.iter().position(|c| c.1 == kind).unwrap_or(CAUSES.len() - 1);
     match kind {
@@ -79,7 +78,7 @@ fn ending(mission: &MissionRow) -> Ending {
     }
 }
 
-fn curves<'a>(data: &Data, group: &'a Group<'a, MissionRow>, length: f64) -> Curves<'a> {
+fn curves<'a>(data: &Data, group: &'a Group<'a, Mission>, length: f64) -> Curves<'a> {
     let items = group.rows.iter().map(|m| (m.terrain_id.as_str(), ending(m))).filter(|i| i.1.at.is_finite());
     let mut items: Vec<(&str, Ending)> = items.collect();
     items.sort_by(|a, b| a.1.at.total_cmp(&b.1.at));
@@ -146,9 +145,9 @@ fn stroke(cause: usize) -> Stroke {
 fn steps(incidence: &Incidence, cause: usize, length: f64) -> Vec<(f64, f64)> {
     let mut points = vec![(0.0, 0.0)];
     let mut before = 0.0;
-    let apart = if incidence.at.len() > STEPS_DRAWN_MAX { length / STEPS_DRAWN_MAX as f64 } else { 0.0 };
+    let apart = (incidence.at.len() > STEPS_DRAWN_MAX).then_some(length / STEPS_DRAWN_MAX as f64);
     for (&at, &share) in incidence.at.iter().zip(&incidence.shares[cause]) {
-        let is_apart = points.last().is_none_or(|last| at - last.0 >= apart);
+        let is_apart = apart.is_none_or(|apart| points.last().is_none_or(|last| at - last.0 >= apart));
         if share > before && is_apart {
             points.extend([(at, 100.0 * before), (at, 100.0 * share)]);
             before = share;

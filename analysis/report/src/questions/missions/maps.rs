@@ -2,23 +2,26 @@
 
 use crate::ReportError;
 use crate::content::{Figure, Numbers, slug};
-use crate::data::{Data, Group};
-use crate::questions::outcome;
+use crate::data::{Data, Group, Mission};
+use crate::questions::outcome::{self, ALL};
 use crate::questions::relief::{MAP_WIDTH, class_map_words, extent};
 use crate::questions::sql;
 use crate::render::chart::{Entry, Mark};
 use crate::render::map::{Key, Map};
 use crate::render::svg::{Paint, Stroke, Symbol};
 use crate::render::{number as set, picture, thin};
+use crate::sample::sample;
 use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_schemas::RoughnessClass;
-use sastrugi_schemas::tables::{MissionRow, SampleRow, TerrainRow};
+use sastrugi_schemas::tables::{SampleRow, TerrainRow};
 use std::collections::BTreeMap;
 
 /// Largest number of rows or columns of a class map.
 const PIXELS: usize = 420;
 /// Largest number of groups drawn.
 const GROUPS_MAX: usize = 12;
+/// Largest number of missions drawn on a terrain.
+const MISSIONS_MAX: usize = 400;
 /// Marks on maps do not follow the theme.
 const DARK: Paint = Paint::Fixed([0x1b, 0x20, 0x26]);
 const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
@@ -26,30 +29,37 @@ const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
 /// The terrain of a group that is drawn, with its missions and their samples.
 pub struct Drawn<'a> {
     group: String,
-    terrain: &'a TerrainRow,
-    /// Its missions.
-    pub missions: Vec<&'a MissionRow>,
+    /// The terrain.
+    pub terrain: &'a TerrainRow,
+    /// Number of its missions by outcome.
+    counts: [usize; ALL.len()],
+    /// Its missions, or a random sample of [`MISSIONS_MAX`] of them.
+    pub missions: Vec<&'a Mission>,
     /// Their samples, by mission.
     pub samples: Vec<SampleRow>,
 }
 
 /// The terrain of each group with the median share of successful missions.
-pub fn drawn<'a>(data: &'a Data, groups: &[Group<'a, MissionRow>]) -> Result<Vec<Drawn<'a>>, ReportError> {
+pub fn drawn<'a>(data: &'a Data, groups: &[Group<'a, Mission>]) -> Result<Vec<Drawn<'a>>, ReportError> {
     let mut all = Vec::new();
     for group in groups.iter().take(GROUPS_MAX) {
         let Some(terrain) = middle(group).and_then(|id| data.terrain(id)) else { continue };
-        let samples = data.files.samples(&terrain.terrain_id)?;
-        let missions = group.rows.iter().copied().filter(|m| m.terrain_id == terrain.terrain_id).collect();
-        all.push(Drawn { group: group.name.clone(), terrain, missions, samples });
+        let of_terrain = group.rows.iter().copied().filter(|m| m.terrain_id.as_str() == terrain.terrain_id);
+        let missions: Vec<&Mission> = of_terrain.collect();
+        let counts = outcome::counts(missions.iter().copied());
+        let missions = sample(missions, MISSIONS_MAX, &mut data.stream(&terrain.terrain_id, "missions drawn"));
+        let ids = missions.iter().map(|m| m.mission_id.as_str()).collect();
+        let samples = data.files.samples(&terrain.terrain_id, &ids)?;
+        all.push(Drawn { group: group.name.clone(), terrain, counts, missions, samples });
     }
     Ok(all)
 }
 
 /// Id of the terrain with the median share of successes: the lower middle of an even number, the first of equals.
-fn middle<'a>(group: &Group<'a, MissionRow>) -> Option<&'a str> {
-    let mut terrains: BTreeMap<&str, Vec<&MissionRow>> = BTreeMap::new();
+fn middle<'a>(group: &Group<'a, Mission>) -> Option<&'a str> {
+    let mut terrains: BTreeMap<&str, Vec<&Mission>> = BTreeMap::new();
     group.rows.iter().for_each(|m| terrains.entry(&m.terrain_id).or_default().push(m));
-    let share = |missions: &[&MissionRow]| outcome::counts(missions.iter().copied())[0] as f64 / missions.len() as f64;
+    let share = |missions: &[&Mission]| outcome::counts(missions.iter().copied())[0] as f64 / missions.len() as f64;
     let mut ranked: Vec<(f64, &str)> = terrains.iter().map(|(id, missions)| (share(missions), *id)).collect();
     ranked.sort_by(|a, b| a.0.total_cmp(&b.0).then(a.1.cmp(b.1)));
     let value = ranked.get(ranked.len().saturating_sub(1) / 2)?.0;
@@ -57,7 +67,7 @@ fn middle<'a>(group: &Group<'a, MissionRow>) -> Option<&'a str> {
 }
 
 /// Samples of one mission among those of a terrain, which are sorted by mission.
-pub fn of_mission<'a>(samples: &'a [SampleRow], mission: &MissionRow) -> &'a [SampleRow] {
+pub fn of_mission<'a>(samples: &'a [SampleRow], mission: &Mission) -> &'a [SampleRow] {
     let id = mission.mission_id.as_str();
     let from = samples.partition_point(|s| s.mission_id.as_str() < id);
     &samples[from..][..samples[from..].partition_point(|s| s.mission_id.as_str() <= id)]
@@ -73,17 +83,17 @@ pub fn figures(data: &Data, drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError>
 }
 
 fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
-    let Drawn { group, terrain, missions, samples } = drawn;
+    let Drawn { group, terrain, counts, missions, samples } = drawn;
+    let all: usize = counts.iter().sum();
     let Some(codes) = data.files.classes(&format!("classes/{}.tif", terrain.terrain_id))? else { return Ok(None) };
     let heights = data.files.grid(&terrain.path)?;
     let picture = picture::classes(&codes, heights.as_ref(), exaggeration(terrain.rms_slope), PIXELS)?;
     let id = slug(&format!("missions-{}", terrain.terrain_id));
-    let mut map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&entries(missions)));
+    let mut map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&entries(counts)));
     map.clip(&format!("{id}-clip"));
     missions.iter().for_each(|m| draw_mission(&mut map, m, &track_of(samples, m)));
     map.svg.close();
-    let counts = outcome::counts(missions.iter().copied());
-    let occurred = outcome::ALL.iter().zip(counts).filter(|(_, n)| *n > 0);
+    let occurred = ALL.iter().zip(counts).filter(|(_, n)| **n > 0);
     let outcomes: Vec<String> = occurred.map(|(o, n)| format!("{} {n}", o.name)).collect();
     let columns = ["mission_id", "outcome", "start_x_m", "start_y_m", "goal_x_m", "goal_y_m", "time_s", "path"];
     let plain = if missions.iter().all(|m| m.variant.is_none()) { " and variant is null" } else { "" };
@@ -92,37 +102,37 @@ fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
         id,
         title: format!("Missions, group {group}."),
         caption: format!(
-            "{}: {} of {} reached the goal. Background: {} over the relief.",
+            "{}: {} of {} reached the goal{}. Background: {} over the relief.",
             terrain.terrain_id,
             set::count(counts[0]),
-            set::counted(missions.len(), "mission"),
+            set::counted(all, "mission"),
+            if missions.len() < all { format!("; a random sample of {MISSIONS_MAX} is drawn") } else { String::new() },
             class_map_words(data)
         ),
         description: format!("Map of missions, {}; missions by outcome: {}.", extent(&codes), outcomes.join(", ")),
         svg: map.svg,
-        numbers: Numbers::select(&query, missions.iter().copied(), &columns),
+        numbers: Numbers::select(&query, missions.iter().copied(), &columns).of_all(all),
     }))
 }
 
 /// Classes, then the outcomes that occur, then start and goal.
-fn entries(missions: &[&MissionRow]) -> Vec<Entry> {
+fn entries(counts: &[usize; ALL.len()]) -> Vec<Entry> {
     let class = |c| (Mark::Fill(Paint::Fixed(picture::class_colour(c))), RoughnessClass::name(c).to_owned());
     let mut entries: Vec<Entry> = RoughnessClass::ALL.map(class).into();
-    let counts = outcome::counts(missions.iter().copied());
-    for (i, n) in counts.into_iter().enumerate().filter(|(_, n)| *n > 0) {
+    for (i, n) in counts.iter().enumerate().filter(|(_, n)| **n > 0) {
         // The ink of a legend must show on the page in either theme.
         let stroke = Stroke { paint: Paint::Outcome(i), ..outcome::track(i) };
-        entries.push((Mark::Track(stroke, outcome::ALL[i].symbol), format!("{} ({n})", outcome::ALL[i].name)));
+        entries.push((Mark::Track(stroke, ALL[i].symbol), format!("{} ({n})", ALL[i].name)));
     }
     entries.push((Mark::Symbol(Symbol::Ring, Paint::Ink), "start".into()));
-    if counts[0] < missions.len() {
+    if counts[1..].iter().any(|n| *n > 0) {
         entries.push((Mark::Symbol(Symbol::Frame, Paint::Ink), "goal not reached".into()));
     }
     entries
 }
 
 /// The path driven where it was recorded, otherwise the straight line from start to goal.
-fn track_of(samples: &[SampleRow], mission: &MissionRow) -> Vec<(f64, f64)> {
+fn track_of(samples: &[SampleRow], mission: &Mission) -> Vec<(f64, f64)> {
     let path: Vec<(f64, f64)> = of_mission(samples, mission).iter().map(|s| (s.x_m, s.y_m)).collect();
     match path.len() {
         0 | 1 => vec![(mission.start_x_m, mission.start_y_m), (mission.goal_x_m, mission.goal_y_m)],
@@ -130,7 +140,7 @@ fn track_of(samples: &[SampleRow], mission: &MissionRow) -> Vec<(f64, f64)> {
     }
 }
 
-fn draw_mission(map: &mut Map, mission: &MissionRow, path: &[(f64, f64)]) {
+fn draw_mission(map: &mut Map, mission: &Mission, path: &[(f64, f64)]) {
     let placed: Vec<(f64, f64)> = path.iter().filter_map(|&(x, y)| map.at(x, y)).collect();
     let (Some(&start), Some(&end)) = (placed.first(), placed.last()) else { return };
     let kind = outcome::index(mission);
@@ -143,6 +153,6 @@ fn draw_mission(map: &mut Map, mission: &MissionRow, path: &[(f64, f64)]) {
         map.svg.rect((goal.0 - 3.2, goal.1 - 3.2), (6.4, 6.4), LIGHT, 0.9);
         map.svg.symbol(Symbol::Frame, goal, 3.0, DARK);
     }
-    map.svg.symbol(outcome::ALL[kind].symbol, end, 5.4, LIGHT);
-    map.svg.symbol(outcome::ALL[kind].symbol, end, 4.2, stroke.paint);
+    map.svg.symbol(ALL[kind].symbol, end, 5.4, LIGHT);
+    map.svg.symbol(ALL[kind].symbol, end, 4.2, stroke.paint);
 }

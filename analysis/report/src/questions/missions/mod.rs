@@ -11,9 +11,9 @@ use super::clusters::{Pairing, REPLICATES, in_words};
 use super::{Question, outcome};
 use crate::ReportError;
 use crate::content::{Block, Numbers, TableBlock, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::render::number as set;
-use sastrugi_schemas::tables::MissionRow;
+use crate::sample::{ROWS_MAX, sample};
 use std::collections::BTreeSet;
 
 /// Registry entry.
@@ -29,7 +29,7 @@ pub struct Metric {
     /// Unit as set in text.
     pub unit: &'static str,
     /// Value in a row.
-    pub of: fn(&MissionRow) -> f64,
+    pub of: fn(&Mission) -> f64,
 }
 
 /// Metrics that are compared between groups, over successful missions only.
@@ -80,7 +80,7 @@ fn section(blocks: &mut Vec<Block>, heading: &str, words: &str, figures: Vec<cra
     }
 }
 
-fn introduction(data: &Data, groups: &[Group<MissionRow>], pairing: &Pairing) -> String {
+fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> String {
     let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
     let goals: usize = groups.iter().map(|g| g.rows.iter().filter(|m| outcome::successful(m)).count()).sum();
     let vehicles: BTreeSet<&str> = groups.iter().flat_map(|g| g.rows.iter().map(|m| m.vehicle.as_str())).collect();
@@ -136,6 +136,7 @@ fn all(data: &Data) -> TableBlock {
         "max_roll_deg",
         "path",
     ];
-    let numbers = Numbers::select("", &data.missions, &names);
+    let listed = sample(data.missions.iter().collect(), ROWS_MAX, &mut data.stream("missions", "listed"));
+    let numbers = Numbers::select("", listed, &names).of_all(data.missions.len());
     TableBlock { id: "missions".into(), caption: "All missions".into(), numbers }
 }

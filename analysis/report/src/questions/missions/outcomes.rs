@@ -1,7 +1,7 @@
 //! Outcomes by group: stacked bars with their counts.
 
 use crate::content::{Figure, Numbers, count, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::questions::outcome::{self, ALL};
 use crate::questions::sql;
 use crate::render::axis::Axis;
@@ -9,12 +9,11 @@ use crate::render::chart::{Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
 use crate::render::svg::{Anchor, Paint, text_width};
 use sastrugi_schemas::Cell;
-use sastrugi_schemas::tables::MissionRow;
 
 /// One bar per group.
-pub fn stacked(data: &Data, groups: &[Group<MissionRow>]) -> Figure {
+pub fn stacked(data: &Data, groups: &[Group<Mission>]) -> Figure {
     let counts: Vec<[usize; ALL.len()]> = groups.iter().map(|g| outcome::counts(g.rows.iter().copied())).collect();
-    let label = |g: &Group<MissionRow>| RowLabel { name: g.name.clone(), detail: format!("n = {}", g.rows.len()) };
+    let label = |g: &Group<Mission>| RowLabel { name: g.name.clone(), detail: format!("n = {}", g.rows.len()) };
     let labels: Vec<RowLabel> = groups.iter().map(label).collect();
     let occurs = |i: usize| counts.iter().any(|c| c[i] > 0);
     let kinds: Vec<usize> = (0..ALL.len()).filter(|&i| occurs(i)).collect();
@@ -47,15 +46,15 @@ fn bar(rows: &mut Rows, row: usize, counts: &[usize]) {
     }
 }
 
-fn describe(groups: &[Group<MissionRow>], counts: &[[usize; ALL.len()]]) -> String {
-    let group = |(g, c): (&Group<MissionRow>, &[usize; ALL.len()])| {
+fn describe(groups: &[Group<Mission>], counts: &[[usize; ALL.len()]]) -> String {
+    let group = |(g, c): (&Group<Mission>, &[usize; ALL.len()])| {
         let parts = ALL.iter().zip(c).filter(|(_, n)| **n > 0).map(|(o, n)| format!("{n} {}", o.name));
         format!("group {}: {}", g.name, parts.collect::<Vec<_>>().join(", "))
     };
     format!("Missions by outcome. {}.", groups.iter().zip(counts).map(group).collect::<Vec<_>>().join("; "))
 }
 
-fn numbers(data: &Data, groups: &[Group<MissionRow>], counts: &[[usize; ALL.len()]], kinds: &[usize]) -> Numbers {
+fn numbers(data: &Data, groups: &[Group<Mission>], counts: &[[usize; ALL.len()]], kinds: &[usize]) -> Numbers {
     let names = kinds.iter().map(|&i| (ALL[i].name, "1"));
     let columns: Vec<(&str, &str)> = [("group", ""), ("missions", "1")].into_iter().chain(names).collect();
     let query = format!("{} group by all", sql::missions(data, "outcome, count(*)", None));

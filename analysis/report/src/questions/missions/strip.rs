@@ -3,7 +3,7 @@
 use super::maps::{Drawn, of_mission};
 use crate::ReportError;
 use crate::content::{Figure, Gives, Heading, Numbers, number, slug};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::questions::outcome::{self, ALL};
 use crate::questions::sql::quoted;
 use crate::render::axis::Axis;
@@ -11,7 +11,7 @@ use crate::render::chart::{Entry, Mark, Plot, WIDTH, axis_room};
 use crate::render::svg::{Anchor, Paint, Stroke, Svg};
 use crate::render::{number as set, thin};
 use sastrugi_schemas::RoughnessClass;
-use sastrugi_schemas::tables::{MissionRow, SampleRow};
+use sastrugi_schemas::tables::SampleRow;
 
 /// An angle of a sample, degrees.
 type Angle = fn(&SampleRow) -> f64;
@@ -27,17 +27,19 @@ const HEAVES: f64 = 190.0;
 const SHOWN: [usize; 3] = [0, 2, 1];
 
 /// One figure for each outcome that has a mission with recorded samples.
-pub fn figures(data: &Data, groups: &[Group<MissionRow>], drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError> {
+pub fn figures(data: &Data, groups: &[Group<Mission>], drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError> {
     let mut figures = Vec::new();
     for kind in SHOWN {
-        let of_kind = |m: &&&MissionRow| outcome::index(m) == kind;
-        let mapped: Vec<&MissionRow> = drawn.iter().flat_map(|d| d.missions.iter().filter(of_kind).copied()).collect();
+        let of_kind = |m: &&&Mission| outcome::index(m) == kind;
+        let mapped: Vec<&Mission> = drawn.iter().flat_map(|d| d.missions.iter().filter(of_kind).copied()).collect();
         let all = || groups.iter().flat_map(|g| g.rows.iter().filter(of_kind).copied()).collect();
         let Some(mission) = middle(if mapped.is_empty() { all() } else { mapped }) else { continue };
-        let read = drawn.iter().find(|d| d.samples.first().is_some_and(|s| s.terrain_id == mission.terrain_id));
+        // Several groups may be drawn on one terrain, each with the samples of its own missions.
+        let read = drawn.iter().filter(|d| d.terrain.terrain_id == mission.terrain_id.as_str());
+        let read = read.map(|d| of_mission(&d.samples, mission)).find(|samples| !samples.is_empty());
         let samples = match read {
-            Some(drawn) => of_mission(&drawn.samples, mission).to_vec(),
-            None => of_mission(&data.files.samples(&mission.terrain_id)?, mission).to_vec(),
+            Some(samples) => samples.to_vec(),
+            None => data.files.samples(&mission.terrain_id, &[mission.mission_id.as_str()].into())?,
         };
         figures.extend((samples.len() > 2).then(|| draw(mission, &samples)));
     }
@@ -45,9 +47,9 @@ pub fn figures(data: &Data, groups: &[Group<MissionRow>], drawn: &[Drawn]) -> Re
 }
 
 /// The mission with the median vertical acceleration; those without a value come last.
-fn middle(mut missions: Vec<&MissionRow>) -> Option<&MissionRow> {
+fn middle(mut missions: Vec<&Mission>) -> Option<&Mission> {
     // NaN without a sign sorts after all numbers.
-    let figure = |m: &MissionRow| m.rms_vertical_acceleration_m_s2.abs();
+    let figure = |m: &Mission| m.rms_vertical_acceleration_m_s2.abs();
     missions.sort_by(|a, b| figure(a).total_cmp(&figure(b)));
     let known = missions.iter().filter(|m| figure(m).is_finite()).count();
     missions.get(known.max(1).saturating_sub(1) / 2).copied()
@@ -71,7 +73,7 @@ fn axis(values: impl Iterator<Item = f64> + Clone, least: f64, (below, above): (
     Axis::linear(low - below * length, high + above * length)
 }
 
-fn draw(mission: &MissionRow, samples: &[SampleRow]) -> Figure {
+fn draw(mission: &Mission, samples: &[SampleRow]) -> Figure {
     let id = slug(&format!("mission-{}-{}", mission.terrain_id, mission.mission_id));
     let heaves = heaves(samples);
     let angle_axis = axis(samples.iter().flat_map(|s| [s.pitch_deg, s.roll_deg]), 1.0, (0.06, 0.18));
@@ -87,7 +89,7 @@ fn time_axis(samples: &[SampleRow]) -> Axis {
     Axis::linear(0.0, samples.last().map_or(0.0, |s| s.time_s))
 }
 
-fn angles(id: &str, mission: &MissionRow, samples: &[SampleRow], y: Axis, room: f64) -> Plot {
+fn angles(id: &str, mission: &Mission, samples: &[SampleRow], y: Axis, room: f64) -> Plot {
     let entries: [Entry; 2] =
         [(Mark::Line(PITCH), "pitch (nose down positive)".into()), (Mark::Line(ROLL), "roll".into())];
     let x = (time_axis(samples), "");
@@ -106,7 +108,7 @@ fn angles(id: &str, mission: &MissionRow, samples: &[SampleRow], y: Axis, room: 
 }
 
 /// The mark of the outcome at the last sample, on the zero line, with its name.
-fn mark_end(plot: &mut Plot, mission: &MissionRow, samples: &[SampleRow]) {
+fn mark_end(plot: &mut Plot, mission: &Mission, samples: &[SampleRow]) {
     let kind = outcome::index(mission);
     let end = samples.last().map_or(0.0, |s| s.time_s);
     let Some(&(x, y)) = plot.place([(end, 0.0)]).first() else { return };
@@ -155,7 +157,7 @@ fn spacing(samples: &[SampleRow]) -> f64 {
     samples.get(1).map_or(0.0, |s| s.time_s - samples[0].time_s)
 }
 
-fn finish(id: String, mission: &MissionRow, samples: &[SampleRow], heaves: &[f64], svg: Svg) -> Figure {
+fn finish(id: String, mission: &Mission, samples: &[SampleRow], heaves: &[f64], svg: Svg) -> Figure {
     let outcome = ALL[outcome::index(mission)].name;
     let caption = format!(
         "{} on {}. Top: pitch and roll. Bottom: vertical acceleration and, along the lower edge, the roughness class under the vehicle, \

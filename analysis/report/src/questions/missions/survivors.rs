@@ -2,17 +2,16 @@
 
 use super::METRICS;
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::questions::clusters::{Clusters, LEVEL, block, paired, stream};
 use crate::questions::outcome::successful;
 use crate::questions::sql;
 use crate::render::number as set;
 use sastrugi_numeric::sums;
-use sastrugi_schemas::tables::MissionRow;
 use std::collections::BTreeMap;
 
 /// The table and its purpose; empty where groups share no pairs.
-pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
+pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
     if groups.len() < 2 || !paired(groups) {
         return Vec::new();
     }
@@ -36,8 +35,8 @@ pub fn blocks(data: &Data, groups: &[Group<MissionRow>]) -> Vec<Block> {
 }
 
 /// Missions of every pair that succeeds in every group, in the order of the groups.
-fn common<'a>(groups: &[Group<'a, MissionRow>]) -> Vec<(&'a str, Vec<&'a MissionRow>)> {
-    let mut pairs: BTreeMap<&str, Vec<&MissionRow>> = BTreeMap::new();
+fn common<'a>(groups: &[Group<'a, Mission>]) -> Vec<(&'a str, Vec<&'a Mission>)> {
+    let mut pairs: BTreeMap<&str, Vec<&Mission>> = BTreeMap::new();
     for (before, group) in groups.iter().enumerate() {
         for mission in group.rows.iter().filter(|m| successful(m)) {
             let members = pairs.entry(&mission.pair_id).or_default();
@@ -50,7 +49,7 @@ fn common<'a>(groups: &[Group<'a, MissionRow>]) -> Vec<(&'a str, Vec<&'a Mission
     pairs.into_iter().filter(|(_, members)| members.len() == groups.len()).collect()
 }
 
-fn table(data: &Data, groups: &[Group<MissionRow>], pairs: &[(&str, Vec<&MissionRow>)]) -> TableBlock {
+fn table(data: &Data, groups: &[Group<Mission>], pairs: &[(&str, Vec<&Mission>)]) -> TableBlock {
     let columns = [
         ("metric", ""),
         ("unit", ""),
@@ -71,7 +70,7 @@ fn table(data: &Data, groups: &[Group<MissionRow>], pairs: &[(&str, Vec<&Mission
                 |k: usize| pairs.iter().map(move |p| (block(p.0), (metric.of)(p.1[k]))).filter(|v| v.1.is_finite());
             let here: Vec<(&str, f64)> = of(g).collect();
             let change = |before: usize| {
-                let difference = |p: &(&'_ str, Vec<&MissionRow>)| (metric.of)(p.1[g]) - (metric.of)(p.1[before]);
+                let difference = |p: &(&'_ str, Vec<&Mission>)| (metric.of)(p.1[g]) - (metric.of)(p.1[before]);
                 let values: Vec<(String, f64)> = pairs.iter().map(|p| (block(p.0).to_owned(), difference(p))).collect();
                 values.into_iter().filter(|v| v.1.is_finite()).collect::<Vec<_>>()
             };

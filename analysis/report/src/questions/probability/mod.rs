@@ -5,12 +5,11 @@ use super::clusters::{LEVEL, REPLICATES, stream};
 use super::outcome;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, slug, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, Plot, RowLabel, Rows, WIDTH};
 use crate::render::number as set;
 use crate::render::svg::{Anchor, Paint, text_width};
-use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::{Components, Interval, bootstrap, components};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -35,7 +34,7 @@ const PARTS: [(&str, Paint); 3] = [
 
 /// A mission with the outcomes of its starts, 1 for success.
 struct Started<'a> {
-    mission: &'a MissionRow,
+    mission: &'a Mission,
     outcomes: Vec<f64>,
 }
 
@@ -114,8 +113,8 @@ fn groups(data: &Data) -> Vec<Split<'_>> {
 }
 
 /// Missions of a group with more than one start; `None` if it has none.
-fn split<'a>(data: &Data, group: &Group<'a, MissionRow>) -> Option<Split<'a>> {
-    let started = |mission: &&'a MissionRow| {
+fn split<'a>(data: &Data, group: &Group<'a, Mission>) -> Option<Split<'a>> {
+    let started = |mission: &&'a Mission| {
         let starts = data.starts_of(mission);
         let outcomes = starts.iter().map(|s| f64::from(u8::from(s.outcome == outcome::ALL[0].word))).collect();
         (starts.len() > 1).then_some(Started { mission, outcomes })

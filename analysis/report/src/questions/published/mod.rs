@@ -7,11 +7,11 @@ use super::missions::boxes::{success_shares, successful};
 use super::outcome::successful as reached;
 use crate::ReportError;
 use crate::content::{Block, Numbers, TableBlock, number, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::papers::{self, Paper, Published};
 use crate::render::number as set;
 use sastrugi_numeric::sums;
-use sastrugi_schemas::tables::{MissionRow, TerrainRow};
+use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_statistics::{BoxPlot, Interval};
 
 /// Registry entry.
@@ -183,8 +183,8 @@ fn sample<'a>(data: &'a Data, paper: &Paper, pairing: &Pairing<'a>, figure: &str
 }
 
 /// 100 for a successful mission of a group, otherwise 0, with its terrain.
-fn percents<'a>(group: &Group<'a, MissionRow>) -> Vec<(&'a str, f64)> {
-    let percent = |m: &&'a MissionRow| (m.terrain_id.as_str(), if reached(m) { 100.0 } else { 0.0 });
+fn percents<'a>(group: &Group<'a, Mission>) -> Vec<(&'a str, f64)> {
+    let percent = |m: &&'a Mission| (m.terrain_id.as_str(), if reached(m) { 100.0 } else { 0.0 });
     group.rows.iter().map(percent).collect()
 }
 

@@ -7,13 +7,12 @@ use super::outcome::successful;
 use super::sql;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, text};
-use crate::data::{Data, Group};
+use crate::data::{Data, Group, Mission};
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_numeric::sums;
-use sastrugi_schemas::tables::MissionRow;
 use sastrugi_statistics::Interval;
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -114,13 +113,13 @@ fn effects(data: &Data) -> Vec<Effect> {
     effects
 }
 
-fn effect(data: &Data, variant: &str, group: &Group<MissionRow>, plain: &Group<MissionRow>) -> Effect {
+fn effect(data: &Data, variant: &str, group: &Group<Mission>, plain: &Group<Mission>) -> Effect {
     let pairs = pairs(group, plain);
     let item = format!("{variant} in {}", group.name);
     let mut stream = stream(data, &item, "success");
     let (change, interval) = if pairs.is_empty() {
         let items =
-            |g: &Group<'_, MissionRow>| g.rows.iter().map(|m| (m.terrain_id.clone(), success(m))).collect::<Vec<_>>();
+            |g: &Group<'_, Mission>| g.rows.iter().map(|m| (m.terrain_id.clone(), success(m))).collect::<Vec<_>>();
         let difference = |v: &[Vec<f64>]| sums::mean(&v[1]) - sums::mean(&v[0]);
         let all = [items(plain), items(group)];
         let borrowed = all.each_ref().map(|g| g.iter().map(|(t, v)| (t.as_str(), *v)).collect::<Vec<_>>());
@@ -134,7 +133,7 @@ fn effect(data: &Data, variant: &str, group: &Group<MissionRow>, plain: &Group<M
         (sums::mean(&all), interval)
     };
     let medians = METRICS[..RMS].iter().map(|m| {
-        let median = |g: &Group<MissionRow>| {
+        let median = |g: &Group<Mission>| {
             let goals = g.rows.iter().filter(|m| successful(m));
             sums::median(&sums::finite(&goals.map(|row| (m.of)(row)).collect::<Vec<_>>()))
         };
@@ -154,13 +153,13 @@ fn effect(data: &Data, variant: &str, group: &Group<MissionRow>, plain: &Group<M
 }
 
 /// Success in per cent.
-fn success(mission: &MissionRow) -> f64 {
+fn success(mission: &Mission) -> f64 {
     if successful(mission) { 100.0 } else { 0.0 }
 }
 
 /// Missions of the plain run and of the variant with a `pair_id` in common.
-fn pairs<'a>(group: &Group<'a, MissionRow>, plain: &Group<'a, MissionRow>) -> Vec<(&'a MissionRow, &'a MissionRow)> {
-    let by_pair: BTreeMap<&str, &'a MissionRow> = plain.rows.iter().map(|m| (m.pair_id.as_str(), *m)).collect();
+fn pairs<'a>(group: &Group<'a, Mission>, plain: &Group<'a, Mission>) -> Vec<(&'a Mission, &'a Mission)> {
+    let by_pair: BTreeMap<&str, &'a Mission> = plain.rows.iter().map(|m| (m.pair_id.as_str(), *m)).collect();
     group.rows.iter().filter_map(|m| Some((*by_pair.get(m.pair_id.as_str())?, *m))).collect()
 }
 
@@ -296,9 +295,9 @@ fn table(data: &Data, effects: &[Effect]) -> TableBlock {
 }
 
 /// The row of a group's plain run.
-fn plain(group: &Group<MissionRow>) -> Vec<sastrugi_schemas::Cell> {
+fn plain(group: &Group<Mission>) -> Vec<sastrugi_schemas::Cell> {
     let none = || number(f64::NAN);
-    let goals: Vec<&&MissionRow> = group.rows.iter().filter(|m| successful(m)).collect();
+    let goals: Vec<&&Mission> = group.rows.iter().filter(|m| successful(m)).collect();
     let head =
         [text("none"), text(&group.name), count(goals.len()), count(group.rows.len()), none(), none(), none(), none()];
     let median = |k: usize| {

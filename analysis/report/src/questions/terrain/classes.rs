@@ -12,6 +12,7 @@ use crate::render::chart::{Entry, Mark, RowLabel, Rows, WIDTH};
 use crate::render::map::{Key, Map};
 use crate::render::svg::{Anchor, Paint, Stroke, Symbol, text_width};
 use crate::render::{number as set, picture};
+use crate::sample::sample;
 use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_schemas::{Cell, RoughnessClass};
@@ -19,6 +20,8 @@ use sastrugi_statistics::Interval;
 
 /// Largest number of rows or columns of a class map.
 const PIXELS: usize = 420;
+/// Largest number of terrains of a group that have a ring in the chart of shares.
+const RINGS_MAX: usize = 300;
 /// Text on bars does not follow the theme.
 const DARK: Paint = Paint::Fixed([0x1b, 0x20, 0x26]);
 const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
@@ -73,7 +76,10 @@ fn note_too_small(rows: &mut Rows, row: usize) {
 struct Bar {
     row: usize,
     class: RoughnessClass,
-    terrains: Vec<f64>,
+    /// Number of terrains.
+    count: usize,
+    /// Values of the terrains, or of a random sample of [`RINGS_MAX`] of them.
+    drawn: Vec<f64>,
     median: f64,
     band: Option<Interval>,
     published: Option<f64>,
@@ -99,7 +105,9 @@ fn bars(data: &Data, groups: &[&Group<TerrainRow>]) -> Vec<Bar> {
                 group.rows.iter().map(|t| (t.terrain_id.as_str(), 100.0 * share(t, class))).collect();
             let band = band(data, &group.name, column(class), &values);
             let terrains = values.into_iter().map(|v| v.1).collect();
-            Bar { row, class, terrains, median: median(&group.rows, percent), band, published }
+            let drawn = sample(terrains, RINGS_MAX, &mut data.stream(&group.name, &format!("rings {}", column(class))));
+            let (count, median) = (group.rows.len(), median(&group.rows, percent));
+            Bar { row, class, count, drawn, median, band, published }
         };
         groups.iter().enumerate().zip(marks).map(bar).collect::<Vec<_>>()
     };
@@ -123,7 +131,7 @@ fn share_bar(rows: &mut Rows, bar: &Bar) {
     let at = |rows: &Rows, percent: f64| rows.x.clamped(percent);
     let (Some(zero), Some(end)) = (at(rows, 0.0), at(rows, bar.median)) else { return };
     rows.svg.rect((zero, y - 7.0), (end - zero, 13.0), Paint::Fixed(bar.class.colour()), 1.0);
-    let terrains: Vec<f64> = bar.terrains.iter().filter_map(|t| at(rows, *t)).collect();
+    let terrains: Vec<f64> = bar.drawn.iter().filter_map(|t| at(rows, *t)).collect();
     terrains.iter().for_each(|&x| rows.svg.ring((x, y), 2.2, Stroke::new(Paint::Ink, 0.9).faint(0.6)));
     let mut last = terrains.iter().copied().fold(end, f64::max);
     if let Some((from, to)) = bar.band.and_then(|b| Some((at(rows, b.low)?, at(rows, b.high)?))) {
@@ -160,9 +168,14 @@ fn shares_figure(data: &Data, rows: Rows, groups: &[&Group<TerrainRow>], bars: &
     Figure {
         id: "class-shares".into(),
         title: papers::title(data, "class-shares", "Shares of the roughness classes."),
-        caption:
-            "Bars and numbers are medians over terrains; circles are the terrains. Medians need not add up to 100 %."
-                .into(),
+        caption: format!(
+            "Bars and numbers are medians over terrains; circles are {}. Medians need not add up to 100 %.",
+            if bars.iter().any(|bar| bar.drawn.len() < bar.count) {
+                format!("the terrains, or a random sample of {RINGS_MAX} of a group")
+            } else {
+                "the terrains".to_owned()
+            }
+        ),
         description: format!("Median shares. {}.", groups.iter().map(in_words).collect::<Vec<_>>().join("; ")),
         svg: rows.svg,
         numbers: share_numbers(groups, bars),
@@ -184,7 +197,7 @@ fn share_numbers(groups: &[&Group<TerrainRow>], bars: &[Bar]) -> Numbers {
         numbers.row([
             text(&groups[bar.row].name),
             text(bar.class.name()),
-            count(bar.terrains.len()),
+            count(bar.count),
             number(bar.median),
             number(bar.band.map_or(f64::NAN, |b| b.low)),
             number(bar.band.map_or(f64::NAN, |b| b.high)),

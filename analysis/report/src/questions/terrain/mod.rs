@@ -11,6 +11,7 @@ use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, text};
 use crate::data::{Data, Group};
 use crate::render::number as set;
+use crate::sample::{ROWS_MAX, sample};
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::TerrainRow;
 use std::collections::BTreeSet;
@@ -226,7 +227,8 @@ fn surfaces(data: &Data) -> TableBlock {
         "zeta_2",
         "zeta_2_standard_error",
     ];
-    let numbers = Numbers::select("", &data.surfaces, &names);
+    let listed = sample(data.surfaces.iter().collect(), ROWS_MAX, &mut data.stream("surfaces", "listed"));
+    let numbers = Numbers::select("", listed, &names).of_all(data.surfaces.len());
     TableBlock { id: "surfaces".into(), caption: "All surfaces (ISO 25178)".into(), numbers }
 }
 
@@ -251,6 +253,9 @@ fn all(data: &Data) -> TableBlock {
         "kurtosis",
         "path",
     ];
-    let numbers = Numbers::select("stage = 'terrain'", data.of_stage("terrain"), &names);
+    let all: Vec<&TerrainRow> = data.of_stage("terrain").collect();
+    let count = all.len();
+    let listed = sample(all, ROWS_MAX, &mut data.stream("terrains", "listed"));
+    let numbers = Numbers::select("stage = 'terrain'", listed, &names).of_all(count);
     TableBlock { id: "terrains".into(), caption: "All terrains".into(), numbers }
 }

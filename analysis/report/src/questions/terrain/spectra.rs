@@ -46,21 +46,24 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
                 ". The spectrum does not cover the band in which its slope is fitted, {ends}, so the slope is not drawn."
             ),
         };
-        let caption =
-            format!("Radially averaged two-dimensional power spectral density, one line per terrain{of_slope}");
+        let caption = format!(
+            "Radially averaged two-dimensional power spectral density, one line per terrain{}{of_slope}",
+            sampled(data, group)
+        );
         let description = format!(
             "Log-log spectra of {}; median slope {}.",
             set::counted(curves.len(), "terrain"),
             set::fixed(middle, 2)
         );
         let rows: Vec<&PsdRow> = group.rows.iter().flat_map(|t| data.spectrum(&t.terrain_id)).collect();
+        let all = of_whole_group(data, group, rows.len());
         let names = ["surface_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
         let numbers = Numbers::select(
             &format!("{} and frequency_cycles_m > 0 and psd_m4 > 0", sql::of_group("surface_id", group)),
             rows,
             &names,
         );
-        finish(id, format!("Spectra, group {}.", group.name), &caption, description, plot, numbers)
+        finish(id, format!("Spectra, group {}.", group.name), &caption, description, plot, numbers.of_all(all))
     };
     drawn.iter().map(figure).collect()
 }
@@ -80,15 +83,40 @@ pub fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
             set::fixed(kurtosis, 2)
         );
         let rows: Vec<&HeightDistributionRow> = group.rows.iter().flat_map(|t| data.histogram(&t.terrain_id)).collect();
+        let all = of_whole_group(data, group, rows.len());
         let names = ["surface_id", "bin", "low_m", "high_m", "cells", "density_per_m"];
         let numbers = Numbers::select(
             &format!("{} and isfinite(density_per_m)", sql::of_group("surface_id", group)),
             rows,
             &names,
         );
-        finish(id, format!("Heights, group {}.", group.name), &description.clone(), description, plot, numbers)
+        let caption = match sampled(data, group) {
+            words if words.is_empty() => description.clone(),
+            words => format!("{description} Lines are those{words}."),
+        };
+        finish(id, format!("Heights, group {}.", group.name), &caption, description, plot, numbers.of_all(all))
     };
     drawn.iter().map(figure).collect()
+}
+
+/// Number of terrains of a group whose curves are kept.
+fn kept(data: &Data, group: &Group<TerrainRow>) -> usize {
+    group.rows.iter().filter(|t| !data.without_curves.contains(&t.terrain_id)).count()
+}
+
+/// Of how many terrains the lines are a sample, in words; empty if every terrain has one.
+fn sampled(data: &Data, group: &Group<TerrainRow>) -> String {
+    let (kept, all) = (kept(data, group), group.rows.len());
+    if kept == all {
+        String::new()
+    } else {
+        format!(" of a random sample of {} of the {}", set::count(kept), set::count(all))
+    }
+}
+
+/// Approximate number of rows of all terrains of a group, from those of the terrains whose curves are kept.
+fn of_whole_group(data: &Data, group: &Group<TerrainRow>, rows: usize) -> usize {
+    rows * group.rows.len() / kept(data, group).max(1)
 }
 
 fn file_id(what: &str, group: &Group<TerrainRow>) -> String {

@@ -1,0 +1,102 @@
+//! The manifest of a release with very many files, read without holding the list of them.
+
+use super::{MANIFEST, ReleaseError, check_head, check_path, unread};
+use sastrugi_schemas::manifest::{Artifact, Manifest};
+use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
+use serde_json::{Map, Value};
+use std::fmt;
+use std::fs::File;
+use std::io::BufReader;
+use std::path::Path;
+
+/// Calls `f` with every file that the manifest of a release lists, and returns the manifest without them. Memory is bounded by one entry.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_schemas::manifest::Origin;
+/// use sastrugi_store::release::{Head, ReleaseBuilder, for_each_artifact};
+///
+/// let folder = tempfile::tempdir()?;
+/// let dest = folder.path().join("release");
+/// let [study_sha256, version, license] = ["", "1.0.0", "CC0-1.0"].map(str::to_owned);
+/// let mut builder = ReleaseBuilder::beside(&dest, Head { name: "snow".to_owned(), study_sha256, seed: 7, version, license })?;
+/// builder.write_text("README.md", "Snow.", Origin::default())?;
+/// builder.seal(&dest)?;
+///
+/// let mut paths = Vec::new();
+/// let manifest = for_each_artifact(&dest, |artifact| paths.push(artifact.path))?;
+/// assert_eq!((manifest.seed, paths), (7, vec!["README.md".to_owned()]));
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// [`ReleaseError::NotARelease`] if the folder has no manifest of this format, or if it lists an invalid path. A path that is listed twice is
+/// not noticed.
+pub fn for_each_artifact(folder: &Path, f: impl FnMut(Artifact)) -> Result<Manifest, ReleaseError> {
+    let path = folder.join(MANIFEST);
+    let file = crate::file::open(&path).map_err(unread(folder, &path))?;
+    let manifest = read(file, f).map_err(|e| format!("{MANIFEST} cannot be parsed: {e}"));
+    let checked = manifest.and_then(|manifest| check_head(&manifest).map(|()| manifest));
+    checked.map_err(|reason| ReleaseError::not_a_release(folder, reason))
+}
+
+fn read(file: File, f: impl FnMut(Artifact)) -> Result<Manifest, serde_json::Error> {
+    let mut json = serde_json::Deserializer::from_reader(BufReader::with_capacity(1 << 16, file));
+    let keys = json.deserialize_map(Parts(f))?;
+    json.end()?;
+    serde_json::from_value(Value::Object(keys))
+}
+
+/// The keys of a manifest; the files go to the function.
+struct Parts<F>(F);
+
+impl<'de, F: FnMut(Artifact)> Visitor<'de> for Parts<F> {
+    type Value = Map<String, Value>;
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a manifest")
+    }
+
+    fn visit_map<A: MapAccess<'de>>(mut self, mut map: A) -> Result<Self::Value, A::Error> {
+        let mut rest = Map::new();
+        while let Some(key) = map.next_key::<String>()? {
+            let value = match key.as_str() {
+                "artifacts" => {
+                    map.next_value_seed(Files(&mut self.0))?;
+                    Value::Array(Vec::new())
+                }
+                _ => map.next_value()?,
+            };
+            rest.insert(key, value);
+        }
+        Ok(rest)
+    }
+}
+
+/// The list of files.
+struct Files<'f, F>(&'f mut F);
+
+impl<'de, F: FnMut(Artifact)> DeserializeSeed<'de> for Files<'_, F> {
+    type Value = ();
+
+    fn deserialize<D: Deserializer<'de>>(self, list: D) -> Result<(), D::Error> {
+        list.deserialize_seq(self)
+    }
+}
+
+impl<'de, F: FnMut(Artifact)> Visitor<'de> for Files<'_, F> {
+    type Value = ();
+
+    fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str("a list of files")
+    }
+
+    fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        while let Some(artifact) = list.next_element::<Artifact>()? {
+            check_path(&artifact.path).map_err(|e| A::Error::custom(format!("it lists an invalid path: {e}")))?;
+            (self.0)(artifact);
+        }
+        Ok(())
+    }
+}
