@@ -6,6 +6,8 @@
 
 use rand_chacha::ChaCha20Rng;
 use rand_core::{Rng, SeedableRng};
+use std::fmt;
+use std::sync::Arc;
 
 /// Context string of the BLAKE3 key derivation.
 pub const CONTEXT: &str = "sastrugi 2026-11 random streams v1";
@@ -23,45 +25,62 @@ pub const CONTEXT: &str = "sastrugi 2026-11 random streams v1";
 /// assert!((-5.0..5.0).contains(&east_m));
 /// assert_eq!(streams.child("mission-0001").label(), "seed/42/terrain/mission-0001");
 /// ```
-#[derive(Clone, Debug, PartialEq, Eq)]
+#[derive(Clone, PartialEq, Eq)]
 pub struct Streams {
-    words: Vec<String>,
+    /// Every word after its length in bytes (32-bit little-endian): what is hashed. Shared, because a study may have a million families.
+    words: Arc<[u8]>,
 }
 
 impl Streams {
     /// Streams of study item `item` in `stage`: words `item, study seed, stage, item id`.
     pub fn for_item(study_seed: u64, stage: &str, item: &str) -> Self {
-        let words = ["item", &study_seed.to_string(), stage, item].map(str::to_owned);
-        Self { words: words.to_vec() }
+        Self::of(&[], &["item", &study_seed.to_string(), stage, item])
     }
 
     /// Streams of an explicit seed in `stage`: words `seed, seed, stage`. An item of a study with `seed = N` and a verb
     /// with `--seed N` draw from the same streams.
     pub fn for_seed(seed: u64, stage: &str) -> Self {
-        let words = ["seed", &seed.to_string(), stage].map(str::to_owned);
-        Self { words: words.to_vec() }
+        Self::of(&[], &["seed", &seed.to_string(), stage])
     }
 
     /// The family one level below, for example for one mission of a terrain.
     pub fn child(&self, word: &str) -> Self {
-        let mut words = self.words.clone();
-        words.push(word.to_owned());
-        Self { words }
+        Self::of(&self.words, &[word])
+    }
+
+    /// Words after those that are hashed already.
+    fn of(before: &[u8], words: &[&str]) -> Self {
+        let mut all = before.to_vec();
+        for word in words {
+            all.extend((word.len() as u32).to_le_bytes());
+            all.extend(word.as_bytes());
+        }
+        Self { words: all.into() }
     }
 
     /// The stream for `purpose`.
     pub fn stream(&self, purpose: &str) -> Stream {
         let mut hasher = blake3::Hasher::new_derive_key(CONTEXT);
-        for word in self.words.iter().map(String::as_str).chain([purpose]) {
-            hasher.update(&(word.len() as u32).to_le_bytes());
-            hasher.update(word.as_bytes());
-        }
+        hasher.update(&self.words).update(&(purpose.len() as u32).to_le_bytes()).update(purpose.as_bytes());
         Stream { generator: ChaCha20Rng::from_seed(*hasher.finalize().as_bytes()), spare_normal: None }
     }
 
     /// The words joined by `/`, as written in manifests.
     pub fn label(&self) -> String {
-        self.words.join("/")
+        let mut words = Vec::new();
+        let mut rest = &*self.words;
+        while let Some((length, after)) = rest.split_first_chunk() {
+            let (word, others) = after.split_at(u32::from_le_bytes(*length) as usize);
+            words.push(String::from_utf8_lossy(word));
+            rest = others;
+        }
+        words.join("/")
+    }
+}
+
+impl fmt::Debug for Streams {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.debug_tuple("Streams").field(&self.label()).finish()
     }
 }
 

@@ -37,6 +37,10 @@ impl fmt::Display for ItemRef {
 pub trait Job: Send + Sync {
     /// Everything in the study that determines the content of the result, with defaults filled in.
     fn recipe(&self) -> Value;
+    /// The same as JSON text, which goes into the key. Jobs of which a study may have very many keep the part that they share.
+    fn recipe_text(&self) -> String {
+        self.recipe().to_string()
+    }
     /// Settings that determine only how the same content is packed; changing them does not invalidate dependants. Null for the default.
     fn packing(&self) -> Value {
         Value::Null

@@ -1,8 +1,11 @@
 //! Revisions of the rooms: hashes of their sources, computed by the build script. They are used in cache keys only; a release
 //! states the crate version.
 
+use std::collections::BTreeMap;
+use std::sync::{Mutex, PoisonError};
+
 /// A room that may be part of a cache key.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+#[derive(Clone, Copy, Debug, PartialEq, Eq, PartialOrd, Ord)]
 pub enum Room {
     /// `pipeline/roughness`.
     Roughness,
@@ -43,8 +46,17 @@ fn revision_of(room: Room) -> &'static str {
     }
 }
 
-/// Revision of a stage that uses these rooms.
+/// Revision of a stage that uses these rooms; each is computed once.
 pub fn revision(rooms: &[Room]) -> String {
+    static KNOWN: Mutex<BTreeMap<Vec<Room>, String>> = Mutex::new(BTreeMap::new());
+    let mut known = KNOWN.lock().unwrap_or_else(PoisonError::into_inner);
+    match known.get(rooms) {
+        Some(revision) => revision.clone(),
+        None => known.entry(rooms.to_vec()).or_insert(computed(rooms)).clone(),
+    }
+}
+
+fn computed(rooms: &[Room]) -> String {
     let mut hasher = blake3::Hasher::new();
     for part in FOUNDATION.into_iter().chain(rooms.iter().map(|r| revision_of(*r))) {
         hasher.update(part.as_bytes());

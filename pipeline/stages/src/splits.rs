@@ -154,8 +154,8 @@ fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -
     let makers: BTreeMap<&ItemRef, &str> = fields.iter().map(|(id, field)| (&field.item, id.as_str())).collect();
     for (id, field) in fields {
         sets.root(id);
-        let parents = graph.find(&field.item).into_iter().flat_map(|p| &graph.node(p).parents);
-        parents.filter_map(|parent| makers.get(parent)).for_each(|parent| sets.join(id, parent));
+        let parents = graph.find(&field.item).into_iter().flat_map(|p| graph.parents(p));
+        parents.filter_map(|parent| makers.get(&graph.node(parent).item)).for_each(|parent| sets.join(id, parent));
         if let Some(word) = shared_draw(study, field) {
             sets.join(id, &word);
         }

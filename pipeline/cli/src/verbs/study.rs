@@ -240,7 +240,7 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     }
     let shown = plan.stale.iter().take(PLAN_LINES);
     let rows: Vec<Vec<String>> =
-        shown.map(|s| vec![format!("  {}", s.item), seconds(s.seconds), s.reason.clone()]).collect();
+        shown.map(|s| vec![format!("  {}", s.item), seconds(s.seconds), s.reason.to_string()]).collect();
     text.push('\n');
     text.push_str(&columns(&rows));
     if plan.stale.len() > PLAN_LINES {

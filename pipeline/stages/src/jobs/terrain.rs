@@ -30,13 +30,48 @@ const TRAILS: &str = "trails.geojson";
 
 struct TerrainJob {
     id: String,
+    made: Arc<Made>,
+    streams: Streams,
+}
+
+/// What the replicates of a terrain share.
+struct Made {
+    /// Their id without the number of the replicate.
+    part: Arc<str>,
     generator: Box<dyn Generator>,
+    /// Its parameters in full.
+    parameters: Arc<Value>,
     /// Inputs of the generator.
     inputs: Sources,
-    streams: Streams,
     png16: bool,
     exports: Exports,
     geotiff: GeoTiff,
+}
+
+impl Made {
+    fn of(
+        builder: &mut Builder<'_>,
+        (entry, item): (&Entry<'_>, &TerrainItem),
+        one: &Expanded,
+        copies: &mut Copies,
+    ) -> Result<Self, BuildError> {
+        let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
+        let inputs = Sources::find(builder, (entry, item), generator.as_ref(), copies)?;
+        generator.check_places(&inputs.places()).map_err(|e| entry.refuse(e))?;
+        // Parameters use the paths of files in the release instead of their present ones.
+        let released = inputs.as_released(&one.params);
+        let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
+        let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
+        Ok(Self {
+            part: Arc::clone(&one.part),
+            parameters: Arc::new(generator.parameters()),
+            generator,
+            inputs,
+            png16: item.png16,
+            exports: exports.decimated(item.export_max_error_m),
+            geotiff: builder.study.head.geotiff,
+        })
+    }
 }
 
 /// Adds the items of `[[terrain]]`.
@@ -57,45 +92,51 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let expanded = entry.expand(&item.id, item.count, &item.sweep, &params)?;
     name_families(builder, entry, &item.id, &expanded)?;
     let mut copies = Copies::new();
+    let mut made: Option<Arc<Made>> = None;
     for one in expanded {
         builder.claim(entry, STAGE, &one.id)?;
-        let generator = sastrugi_terrain::prepare(&item.kind, &one.params).map_err(|e| entry.refuse(e))?;
-        let inputs = Sources::find(builder, (entry, &item), generator.as_ref(), &mut copies)?;
-        generator.check_places(&inputs.places()).map_err(|e| entry.refuse(e))?;
-        // Parameters use the paths of files in the release instead of their present ones.
-        let released = inputs.as_released(&one.params);
-        let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
-        let shared = builder.is_paired().then(|| common(one.replicate));
-        let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
-        let field = Heightfield {
-            item: ItemRef::new(STAGE, &one.id),
-            group: item.group.clone().or_else(|| one.sweep.clone()),
-            is_grouped: item.group.is_some() || one.sweep.is_some(),
-            variant: one.sweep.filter(|_| item.group.is_some()),
-            replicate: Some(one.replicate),
-            kind: item.kind.clone(),
-            parameters: Arc::new(generator.parameters()),
-            streams: Some(streams.clone()),
-            release_path: format!("terrain/{}.tif", one.id),
-            cells: generator.geometry().len() as u64,
-            cell_m: Some(generator.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
-            geometry: Some(generator.geometry()),
-            expected: Some(generator.geometry()),
+        let made = match made.take().filter(|made| made.part == one.part) {
+            Some(known) => made.insert(known),
+            None => made.insert(Arc::new(Made::of(builder, (entry, &item), &one, &mut copies)?)),
         };
-        let geotiff = builder.study.head.geotiff;
-        let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
-        let exports = exports.decimated(item.export_max_error_m);
-        let parents = inputs.0.iter().map(|s| s.item.clone()).collect::<BTreeSet<_>>().into_iter().collect();
-        let id = one.id.clone();
-        let job = TerrainJob { id, generator, inputs, streams, png16: item.png16, exports, geotiff };
-        let node =
-            Node { item: field.item.clone(), parents, inputs: Vec::new(), stream: field.stream(), job: Box::new(job) };
-        builder.node(node)?;
-        if !item.exports.is_empty() {
-            builder.exported.insert(one.id.clone());
-        }
-        builder.heightfields.insert(one.id, field);
+        add_one(builder, &item, made, one)?;
     }
+    Ok(())
+}
+
+/// Adds one replicate.
+fn add_one(builder: &mut Builder<'_>, item: &TerrainItem, made: &Arc<Made>, one: Expanded) -> Result<(), BuildError> {
+    let shared = builder.is_paired().then(|| common(one.replicate));
+    let streams = builder.streams(STAGE, shared.as_ref().unwrap_or(&one.id), item.seed, one.replicate);
+    let geometry = made.generator.geometry();
+    let field = Heightfield {
+        item: ItemRef::new(STAGE, &one.id),
+        group: item.group.clone().or_else(|| one.sweep.clone()),
+        is_grouped: item.group.is_some() || one.sweep.is_some(),
+        variant: one.sweep.filter(|_| item.group.is_some()),
+        replicate: Some(one.replicate),
+        kind: item.kind.clone(),
+        parameters: Arc::clone(&made.parameters),
+        streams: Some(streams.clone()),
+        release_path: format!("terrain/{}.tif", one.id),
+        cells: geometry.len() as u64,
+        cell_m: Some(geometry.cell.into_iter().fold(f64::INFINITY, f64::min)),
+        geometry: Some(geometry),
+        expected: Some(geometry),
+    };
+    let sources = made.inputs.0.iter().map(|s| s.item.clone()).collect::<BTreeSet<_>>();
+    let job = TerrainJob { id: one.id.clone(), made: Arc::clone(made), streams };
+    builder.node(Node {
+        item: field.item.clone(),
+        parents: sources.into_iter().collect(),
+        inputs: Vec::new(),
+        stream: field.stream(),
+        job: Box::new(job),
+    })?;
+    if !item.exports.is_empty() {
+        builder.exported.insert(one.id.clone());
+    }
+    builder.heightfields.insert(one.id, field);
     Ok(())
 }
 
@@ -143,12 +184,12 @@ pub fn lines(work: &Work<'_>, item: &ItemRef) -> Result<Vec<Line>, JobError> {
 
 impl Job for TerrainJob {
     fn recipe(&self) -> Value {
-        json!({ "kind": self.generator.kind(), "params": self.generator.parameters() })
+        json!({ "kind": self.made.generator.kind(), "params": *self.made.parameters })
     }
 
     fn packing(&self) -> Value {
-        let raster = raster_packing(self.geotiff);
-        self.exports.packing(if self.png16 { json!({ "raster": raster, "png16": true }) } else { raster })
+        let raster = raster_packing(self.made.geotiff);
+        self.made.exports.packing(if self.made.png16 { json!({ "raster": raster, "png16": true }) } else { raster })
     }
 
     fn rooms(&self) -> &'static [Room] {
@@ -156,21 +197,21 @@ impl Job for TerrainJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        let cells = self.generator.geometry().len() as u64;
-        let after = dem::writing_bytes(cells).max(self.exports.memory_bytes(cells));
-        self.generator.memory_bytes() + 8 * self.inputs.cells() + after
+        let cells = self.made.generator.geometry().len() as u64;
+        let after = dem::writing_bytes(cells).max(self.made.exports.memory_bytes(cells));
+        self.made.generator.memory_bytes() + 8 * self.made.inputs.cells() + after
     }
 
     fn estimate(&self) -> Estimate {
-        let cells = self.generator.geometry().len() as f64;
-        let seconds = self.generator.seconds() + SECONDS_PER_WRITTEN_CELL * cells;
-        Estimate { seconds, bytes: 3.0 * cells + self.exports.bytes() }
+        let cells = self.made.generator.geometry().len() as f64;
+        let seconds = self.made.generator.seconds() + SECONDS_PER_WRITTEN_CELL * cells;
+        Estimate { seconds, bytes: 3.0 * cells + self.made.exports.bytes() }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let (inputs, crs) = self.inputs.read(work)?;
-        let made = generate(self.generator.as_ref(), &self.streams, &inputs)?;
-        let options = raster_options(self.geotiff);
+        let (inputs, crs) = self.made.inputs.read(work)?;
+        let made = generate(self.made.generator.as_ref(), &self.streams, &inputs)?;
+        let options = raster_options(self.made.geotiff);
         let mut products = vec![self.write(work, HEIGHTS, "", &made.heights, &crs, &options)?];
         for map in &made.maps {
             let (file, ending) = (format!("{}.tif", map.name), format!(".{}", map.name));
@@ -178,19 +219,19 @@ impl Job for TerrainJob {
             products.push(self.write(work, &file, &ending, &map.values, &crs, &options)?);
         }
         products.extend(self.write_lines(work, &made.lines, &crs)?);
-        if self.generator.kind() == planetary::KIND {
+        if self.made.generator.kind() == planetary::KIND {
             // Rovers drive on the world beyond the window, which is generated from the same inputs.
-            products.extend(self.inputs.keep(work)?);
+            products.extend(self.made.inputs.keep(work)?);
         }
-        let mut notes = self.generator.notes();
+        let mut notes = self.made.generator.notes();
         notes.extend(made.notes);
-        if self.png16 {
-            let note = write_png16(self.generator.as_ref(), &made.heights, &work.output("heights.png"))?;
+        if self.made.png16 {
+            let note = write_png16(self.made.generator.as_ref(), &made.heights, &work.output("heights.png"))?;
             products.push(Product::released("heights.png", format!("terrain/{}.png", self.id), None));
             notes.push(note);
         }
         let mut outcome = Outcome { products, notes };
-        self.exports.write(work, &self.id, &made.heights, &mut outcome)?;
+        self.made.exports.write(work, &self.id, &made.heights, &mut outcome)?;
         Ok(outcome)
     }
 }

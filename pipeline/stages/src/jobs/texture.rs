@@ -95,7 +95,8 @@ impl Base {
 
 /// The DEM of a fit, which is the first of its parents.
 fn fitted_dem<'b>(builder: &'b Builder<'_>, fit: &ItemRef) -> Option<&'b ItemRef> {
-    builder.graph.find(fit).and_then(|p| builder.graph.node(p).parents.first())
+    let graph = &builder.graph;
+    graph.find(fit).and_then(|p| graph.parents(p).next()).map(|dem| &graph.node(dem).item)
 }
 
 struct TextureJob {
@@ -143,7 +144,8 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         let mut entrants = Vec::new();
         let mut refusal = None;
         for method in &methods {
-            let own = if side_by_side { own_parameters(&one.params, &kinds, method) } else { one.params.clone() };
+            let own =
+                if side_by_side { own_parameters(&one.params, &kinds, method) } else { Value::clone(&one.params) };
             let checked = sastrugi_texture::method(method, &own).and_then(|synthesis| {
                 // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
                 if !side_by_side && fill.is_none() {
@@ -260,7 +262,7 @@ fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item
     let measured = base.as_ref().is_some_and(|base| [dem_job::STAGE, fit::STAGE].contains(&base.item.stage.as_str()));
     let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && item.method == fft_ma::kind().kind;
     if measured && fitted && one.params["covariance"].is_null() {
-        one.params["covariance"] = json!(fft_ma::CovarianceOf::Residual);
+        Arc::make_mut(&mut one.params)["covariance"] = json!(fft_ma::CovarianceOf::Residual);
     }
     one
 }

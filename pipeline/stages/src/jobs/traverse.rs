@@ -65,6 +65,26 @@ struct Drive {
     count: usize,
     /// Approximate simulated time of a mission, s.
     seconds_each: f64,
+    /// What its items have in common of their recipes, as JSON: the first keys and the last one.
+    recipe: [String; 2],
+}
+
+impl Drive {
+    /// The same with the common parts of the recipes.
+    fn with_recipe(self) -> Self {
+        let Self { settings, vehicle, starts, rasters, head, .. } = &self;
+        let first = json!({
+            "traverse": settings.parameters(),
+            "vehicle": vehicle.parameters(),
+            "starts": starts,
+            "rasters": rasters,
+        });
+        let last = json!({
+            "study": { "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns, "mcap": head.mcap },
+        });
+        let recipe = [first, last].map(|part| part.to_string());
+        Self { recipe, ..self }
+    }
 }
 
 struct TraverseJob {
@@ -73,7 +93,7 @@ struct TraverseJob {
     terrain: String,
     group: Option<String>,
     variant: Option<String>,
-    lines: Lines,
+    lines: Arc<Lines>,
     heightfield: ItemRef,
     /// Number of cells of the heightfield.
     cells: u64,
@@ -128,7 +148,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             return Err(entry.refuse(ParameterError::new("goal_tolerance_m", message)).into());
         }
         let starts = ReplicateSettings::new(starts, drawn.length_m).map_err(|e| entry.refuse(e))?;
-        let drive = Arc::new(Drive {
+        let drive = Drive {
             id: one.id,
             variant: one.sweep,
             vehicle,
@@ -138,7 +158,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             head: builder.study.head.clone(),
             count: drawn.count,
             seconds_each: (drawn.length_m / raw.speed_m_s).min(raw.timeout_s),
-        });
+            recipe: Default::default(),
+        };
+        let drive = Arc::new(drive.with_recipe());
         if drawn.lines.iter().any(|lines| builder.exported.contains(&lines.heightfield)) {
             vehicle::add(builder, &drive.id, &drive.vehicle, &drive.settings)?;
         }
@@ -175,7 +197,7 @@ fn add_one(
     entry: &Entry<'_>,
     traverse: &str,
     drive: &Arc<Drive>,
-    lines: &Lines,
+    lines: &Arc<Lines>,
 ) -> Result<(), StudyError> {
     let terrain = lines.heightfield.clone();
     let Some(field) = builder.heightfields.get(&terrain) else { return Ok(()) };
@@ -191,7 +213,7 @@ fn add_one(
         drive: Arc::clone(drive),
         group: field.group.clone(),
         variant: joined(field.variant.as_deref(), drive.variant.as_deref()),
-        lines: lines.clone(),
+        lines: Arc::clone(lines),
         heightfield: field.item.clone(),
         cells: field.cells,
         streams,
@@ -375,7 +397,7 @@ impl TraverseJob {
         };
         let Drive { vehicle, settings, starts, rasters, .. } = &*self.drive;
         let rasters = json!({ "wheel_friction_raster": rasters[0], "rolling_resistance_raster": rasters[1] });
-        let more = json!({ "starts": starts, "surface": rasters, "missions": self.lines.rules });
+        let more = json!({ "starts": starts, "surface": rasters, "missions": *self.lines.rules });
         let mut rows: Vec<ParameterRow> =
             numbers(vehicle, settings).into_iter().chain(stated("", &more)).map(row).collect();
         rows.sort_by(|a, b| a.parameter.cmp(&b.parameter));
@@ -399,18 +421,20 @@ fn read_raster(work: &Work<'_>, item: &ItemRef, terrain: &Grid) -> Result<Grid, 
 
 impl Job for TraverseJob {
     fn recipe(&self) -> Value {
-        let head = &self.drive.head;
-        json!({
-            "traverse": self.drive.settings.parameters(),
-            "vehicle": self.drive.vehicle.parameters(),
-            "starts": self.drive.starts,
-            "rasters": self.drive.rasters,
+        serde_json::from_str(&self.recipe_text()).unwrap_or_default()
+    }
+
+    fn recipe_text(&self) -> String {
+        let own = json!({
             "terrain": self.terrain,
             "group": self.group,
             "variant": self.variant,
             "missions": self.lines.item,
-            "study": { "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns, "mcap": head.mcap },
-        })
+        });
+        let [first, last] = &self.drive.recipe;
+        // The keys of three objects in one.
+        let inner = |object: &str| object[1..object.len() - 1].to_owned();
+        format!("{{{}}}", [first, &own.to_string(), last].map(|object| inner(object)).join(","))
     }
 
     fn rooms(&self) -> &'static [Room] {

@@ -4,12 +4,13 @@ use crate::job::ItemRef;
 use sastrugi_mobility::missions::Mission;
 use sastrugi_navigation::parameters::RouteParameters;
 use serde_json::Value;
+use std::sync::Arc;
 
 /// Missions that a traverse can refer to.
 #[derive(Clone, Debug)]
 pub struct Drawn {
     /// The missions of each heightfield.
-    pub lines: Vec<Lines>,
+    pub lines: Vec<Arc<Lines>>,
     /// Number of missions on each heightfield.
     pub count: usize,
     /// Length of a mission, m.
@@ -25,8 +26,8 @@ pub struct Lines {
     pub item: ItemRef,
     /// Names the random streams: the heightfield, or a word shared by heightfields with common draws.
     pub word: String,
-    /// Rules by which the missions are drawn or routed.
-    pub rules: Value,
+    /// Rules by which the missions are drawn or routed, shared by all heightfields.
+    pub rules: Arc<Value>,
     /// Item that drew their starts and goals.
     pub pairs: String,
     /// Number of the replicates that share draws with this one, from 0.
@@ -78,7 +79,7 @@ mod tests {
             heightfield: heightfield.to_owned(),
             item: ItemRef::new("missions", &format!("m@{heightfield}")),
             word: "word".to_owned(),
-            rules: Value::Null,
+            rules: Arc::default(),
             pairs: format!("m@{heightfield}"),
             shared,
         };

@@ -28,7 +28,7 @@ const MARK: &str = "CACHEDIR.TAG";
 const MARK_TEXT: &str = "Signature: 8a477f597d28d172789f06886806bc55\n# Work area of sastrugi: finished items of a study. It can be removed; \
     a run then makes them again.\n";
 /// Hexadecimal digits of a key.
-const KEY_DIGITS: usize = 32;
+pub(super) const KEY_DIGITS: usize = 32;
 /// Prefix of the name of a folder that a job writes into.
 const UNFINISHED: &str = "unfinished-";
 
@@ -180,6 +180,11 @@ impl Cache {
     /// True if [`Self::load`] finds a result.
     pub fn holds(&self, item: &ItemRef, key: &str) -> bool {
         self.load(item, key).is_some()
+    }
+
+    /// True if no item was tried yet.
+    pub fn is_empty(&self) -> bool {
+        !self.folder.join("items").exists()
     }
 
     /// True if the item was tried before, with any key.

@@ -4,6 +4,10 @@ use super::cache::Cache;
 use super::graph::{Graph, Ingredients};
 use serde::Serialize;
 use serde_json::Value;
+use std::borrow::Cow;
+
+/// The reason of items that were never tried.
+const NEW: &str = "new";
 
 /// One item that a run would compute.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -11,7 +15,7 @@ pub struct Stale {
     /// Stage and id.
     pub item: String,
     /// Why it is stale.
-    pub reason: String,
+    pub reason: Cow<'static, str>,
     /// Estimated time on one core, s.
     pub seconds: f64,
     /// Estimated size of its files, bytes.
@@ -36,12 +40,13 @@ pub struct PlanSummary {
 /// Compares the items of a graph with a work area; if that is empty, all items are new.
 pub fn plan(graph: &Graph, needed: &[usize], cache: &Cache) -> PlanSummary {
     let mut stale = Vec::new();
+    let is_empty = cache.is_empty();
     for &position in needed {
         let node = graph.node(position);
-        let reason = match cache.knows(&node.item) {
+        let reason = match !is_empty && cache.knows(&node.item) {
             true if cache.holds(&node.item, graph.key(position)) => continue,
             true => reason(graph, cache, position),
-            false => "new".to_owned(),
+            false => NEW.into(),
         };
         let estimate = node.job.estimate();
         let (item, memory_bytes) = (node.item.to_string(), node.job.memory_bytes());
@@ -51,14 +56,14 @@ pub fn plan(graph: &Graph, needed: &[usize], cache: &Cache) -> PlanSummary {
 }
 
 /// The reason why an item that was tried before has no current result.
-fn reason(graph: &Graph, cache: &Cache, position: usize) -> String {
+fn reason(graph: &Graph, cache: &Cache, position: usize) -> Cow<'static, str> {
     let item = &graph.node(position).item;
     if let Some(message) = cache.failure(item, graph.key(position)) {
-        return format!("failed before: {message}");
+        return format!("failed before: {message}").into();
     }
     match cache.earlier(item) {
-        Some(earlier) => difference(&earlier, &graph.ingredients(position)),
-        None => "new".to_owned(),
+        Some(earlier) => difference(&earlier, &graph.ingredients(position)).into(),
+        None => NEW.into(),
     }
 }
 

@@ -354,7 +354,8 @@ fn val_an_error_of_the_machine_stops_the_run() {
     assert_eq!((stopped.item, stopped.error.message.as_str()), (item("a"), "no space"));
     assert_eq!(area.ran(), ["a"]);
     assert_eq!(cache.failure(&item("a"), graph.key(0)), None);
-    let reasons: Vec<String> = plan(&graph, &all(&graph), &cache).stale.into_iter().map(|stale| stale.reason).collect();
+    let reasons: Vec<String> =
+        plan(&graph, &all(&graph), &cache).stale.into_iter().map(|stale| stale.reason.into_owned()).collect();
     assert_eq!(reasons, ["new", "new"]);
 }
 

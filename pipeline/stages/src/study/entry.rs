@@ -9,9 +9,10 @@ use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde_json::{Map, Value};
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
-/// Maximum number of items in a study, and so in one table: each takes about 3 KiB of memory before the run.
-pub const ITEMS_MAX: usize = 400_000;
+/// Maximum number of items in a study, and so in one table. `docs/scaling.md` states the memory of a plan.
+pub const ITEMS_MAX: usize = 1_000_000;
 
 /// One item table.
 #[derive(Clone, Copy)]
@@ -27,14 +28,14 @@ pub struct Entry<'a> {
 pub struct Expanded {
     /// Full id.
     pub id: String,
-    /// Its id without the replicate number.
-    pub part: String,
+    /// Its id without the replicate number, shared by the replicates.
+    pub part: Arc<str>,
     /// Position among the replicates, from 0.
     pub replicate: u64,
     /// The swept parameters with their values, if any.
     pub sweep: Option<String>,
-    /// Kernel parameters.
-    pub params: Value,
+    /// Kernel parameters, shared by the replicates.
+    pub params: Arc<Value>,
 }
 
 impl<'a> Entry<'a> {
@@ -111,8 +112,8 @@ impl<'a> Entry<'a> {
                 self.error("count", format!("`count` and sweeps expand to {total} items; the limit is {ITEMS_MAX}"))
             );
         }
-        let plain =
-            Expanded { id: id.to_owned(), part: id.to_owned(), replicate: 0, sweep: None, params: params.clone() };
+        let params = Arc::new(params.clone());
+        let plain = Expanded { id: id.to_owned(), part: id.into(), replicate: 0, sweep: None, params };
         let mut items = vec![plain];
         for (parameter, values) in sweep {
             items = self.sweep(items, parameter, values)?;
@@ -139,7 +140,7 @@ impl<'a> Entry<'a> {
                         ),
                     )
                 })?;
-                let mut params = item.params.clone();
+                let mut params = Value::clone(&item.params);
                 if !set_at(&mut params, parameter, value.clone()) {
                     return Err(self.error("sweep", format!("`{parameter}` is both swept and set")));
                 }
@@ -147,7 +148,7 @@ impl<'a> Entry<'a> {
                     format!("{parameter} = {}", value.as_str().map_or_else(|| value.to_string(), str::to_owned));
                 let id = format!("{}-{word}", item.id);
                 let sweep = joined(item.sweep.as_deref(), Some(&label));
-                swept.push(Expanded { part: id.clone(), id, sweep, params, ..item });
+                swept.push(Expanded { part: id.as_str().into(), id, sweep, params: Arc::new(params), ..item });
             }
         }
         Ok(swept)
@@ -258,9 +259,9 @@ mod tests {
                 .unwrap();
         let ids: Vec<&str> = items.iter().map(|i| i.id.as_str()).collect();
         assert_eq!(ids, ["a-2.3-0001", "a-2.3-0002", "a-2.6-0001", "a-2.6-0002"]);
-        assert_eq!(items[2].params, serde_json::json!({"low": {"s": 1}, "high": {"d": 2.6}}));
+        assert_eq!(*items[2].params, serde_json::json!({"low": {"s": 1}, "high": {"d": 2.6}}));
         assert_eq!(items[3].sweep.as_deref(), Some("high.d = 2.6"));
-        assert_eq!((items[3].replicate, items[3].part.as_str()), (1, "a-2.6"));
+        assert_eq!((items[3].replicate, &*items[3].part), (1, "a-2.6"));
     }
 
     #[test]
@@ -274,6 +275,6 @@ mod tests {
         );
         assert!(message("[[terrain]]\nkind = \"k\"\n").contains("missing field `id`"));
         let many = message("[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 4000000000\nsweep.d = [1,2]\n");
-        assert!(many.contains("expand to 8000000000 items; the limit is 400000"), "{many}");
+        assert!(many.contains("expand to 8000000000 items; the limit is 1000000"), "{many}");
     }
 }

@@ -103,15 +103,22 @@ pub fn add(
     given.map_err(|e| entry.refuse(e.within("route")))?;
     let plan = Plan { parameters: raw.route.clone(), vehicle, roughness: builder.study.roughness.clone() };
     let plan = Arc::new(plan);
-    let mut all = Vec::new();
+    let (mut all, mut rules) = (Vec::new(), None);
     for line in &straight.lines {
         let Some(field) = builder.heightfields.get(&line.heightfield).cloned() else { continue };
         let item = ItemRef::new(STAGE, &format!("{}@{}", envelope.id, line.heightfield));
         let parents = vec![field.item.clone(), line.item.clone()];
         let job = RoutedJob { plan: Arc::clone(&plan), straight: line.item.clone(), field, count: straight.count };
         builder.node(Node { item: item.clone(), parents, inputs: Vec::new(), stream: None, job: Box::new(job) })?;
-        let rules = json!({ "straight": line.rules, "routed": raw });
-        all.push(Lines { item, rules, ..line.clone() });
+        let rules = match &rules {
+            Some((straight, known)) if Arc::ptr_eq(straight, &line.rules) => Arc::clone(known),
+            _ => {
+                let made = Arc::new(json!({ "straight": *line.rules, "routed": raw }));
+                rules = Some((Arc::clone(&line.rules), Arc::clone(&made)));
+                made
+            }
+        };
+        all.push(Arc::new(Lines { item, rules, ..Lines::clone(line) }));
     }
     builder.missions.insert(envelope.id.clone(), Drawn { lines: all, ..straight });
     Ok(())

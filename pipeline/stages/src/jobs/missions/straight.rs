@@ -18,6 +18,7 @@ use sastrugi_schemas::study::MissionsItem;
 use sastrugi_store::dem;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
+use std::sync::Arc;
 
 /// Description of this kind of missions.
 pub fn kind() -> Kind {
@@ -84,7 +85,9 @@ pub fn add(
     for (k, id) in envelope.terrains.iter().enumerate() {
         heightfields.extend(builder.family(entry, &format!("terrains.{k}"), id)?);
     }
-    let lines: Vec<Lines> = heightfields.into_iter().map(|id| lines(builder, &envelope.id, &settings, id)).collect();
+    let rules = Arc::new(json!(settings));
+    let of = |id: String| Arc::new(lines(builder, &envelope.id, &rules, id));
+    let lines: Vec<Arc<Lines>> = heightfields.into_iter().map(of).collect();
     check_geometry(builder, entry, &lines)?;
     for one in &lines {
         let words = format!("{}@{}", envelope.id, one.word);
@@ -108,7 +111,7 @@ pub fn add(
 }
 
 /// The missions of a heightfield, with its own draws or with those shared by all replicates of the same number.
-fn lines(builder: &Builder<'_>, missions: &str, settings: &MissionSettings, heightfield: String) -> Lines {
+fn lines(builder: &Builder<'_>, missions: &str, rules: &Arc<Value>, heightfield: String) -> Lines {
     // Draws can be shared only if the cells are known to be the same.
     let known = builder.heightfields.get(&heightfield).filter(|field| builder.is_paired() && field.geometry.is_some());
     let shared = known.and_then(|field| field.replicate);
@@ -117,14 +120,14 @@ fn lines(builder: &Builder<'_>, missions: &str, settings: &MissionSettings, heig
         pairs: item.id.clone(),
         item,
         word: shared.map_or_else(|| heightfield.clone(), common),
-        rules: json!(settings),
+        rules: Arc::clone(rules),
         shared,
         heightfield,
     }
 }
 
 /// Refuses heightfields that share draws but have different cells, as far as this is known before the run.
-fn check_geometry(builder: &Builder<'_>, entry: &Entry<'_>, lines: &[Lines]) -> Result<(), BuildError> {
+fn check_geometry(builder: &Builder<'_>, entry: &Entry<'_>, lines: &[Arc<Lines>]) -> Result<(), BuildError> {
     let mut first: BTreeMap<u64, (&str, Geometry)> = BTreeMap::new();
     for one in lines {
         let geometry = builder.heightfields.get(&one.heightfield).and_then(|field| field.geometry);

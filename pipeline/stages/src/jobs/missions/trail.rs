@@ -16,6 +16,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
+use std::sync::Arc;
 
 /// Assumed length of a trail before it is known, m.
 const LENGTH_GUESS_M: f64 = 100.0;
@@ -85,21 +86,21 @@ pub fn add(
             ids.insert(one);
         }
     }
-    let mut lines = Vec::new();
+    let (mut lines, rules) = (Vec::new(), Arc::new(json!(parameters)));
     for heightfield in ids {
         let item = ItemRef::new(STAGE, &format!("{}@{heightfield}", envelope.id));
         let terrain = ItemRef::new(terrain::STAGE, &heightfield);
         let parents = vec![terrain.clone()];
         let job = TrailJob { terrain, parameters: parameters.clone() };
         builder.node(Node { item: item.clone(), parents, inputs: Vec::new(), stream: None, job: Box::new(job) })?;
-        lines.push(Lines {
+        lines.push(Arc::new(Lines {
             pairs: item.id.clone(),
             item,
             word: heightfield.clone(),
-            rules: json!(parameters),
+            rules: Arc::clone(&rules),
             shared: None,
             heightfield,
-        });
+        }));
     }
     builder.missions.insert(envelope.id.clone(), Drawn { lines, count: 1, length_m: LENGTH_GUESS_M });
     Ok(())
