@@ -47,6 +47,13 @@ impl Draft<'_> {
 #[derive(Clone, Debug)]
 pub struct DraftFile(PathBuf);
 
+impl DraftFile {
+    /// The file at a path in a folder under construction.
+    pub(crate) fn at(path: &Path) -> Self {
+        Self(path.to_owned())
+    }
+}
+
 /// A file under construction. Dropped without [`AtomicFile::commit`], it leaves nothing behind.
 ///
 /// # Examples
@@ -174,6 +181,44 @@ pub fn write<'a>(target: impl Into<Target<'a>>, bytes: &[u8]) -> io::Result<()> 
     file.commit()
 }
 
+/// Gives a complete file that is on disk a further name, or, where the file system has no such names for it (another file system, too many
+/// names), copies it and syncs the copy. The content of both is shared, so neither may be changed in place. The folder is not synced.
+///
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_store::atomic::link_or_copy;
+///
+/// let folder = tempfile::tempdir()?;
+/// let [first, second] = ["a", "b"].map(|name| folder.path().join(name));
+/// std::fs::write(&first, "snow")?;
+/// link_or_copy(&first, &second)?;
+/// std::fs::remove_file(&first)?;
+/// assert_eq!(std::fs::read_to_string(&second)?, "snow");
+/// // A name that is taken is left alone.
+/// std::fs::write(&first, "ice")?;
+/// assert!(link_or_copy(&first, &second).is_err());
+/// # Ok(())
+/// # }
+/// ```
+///
+/// # Errors
+/// A source that is not a regular file, a target that exists; the file system failed.
+pub fn link_or_copy(from: &Path, to: &Path) -> io::Result<()> {
+    // A link to a symbolic link would be another symbolic link.
+    if fs::symlink_metadata(from)?.is_file() && fs::hard_link(from, to).is_ok() {
+        return Ok(());
+    }
+    copy(from, to)
+}
+
+/// Copies a file to a name that is free, and syncs the copy.
+fn copy(from: &Path, to: &Path) -> io::Result<()> {
+    let mut source = crate::file::open(from)?;
+    let mut copied = File::create_new(to)?;
+    io::copy(&mut source, &mut copied)?;
+    copied.sync_all()
+}
+
 /// Syncs the entries of a folder to disk.
 ///
 /// # Errors
@@ -268,6 +313,31 @@ mod tests {
         write(&path, b"again").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"again");
         assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1);
+    }
+
+    /// On one file system both names are of one file; a copy has the same bytes, and neither overwrites a file.
+    #[test]
+    fn val_files_are_linked_or_copied() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("a"), b"whole").unwrap();
+        link_or_copy(&path("a"), &path("linked")).unwrap();
+        copy(&path("a"), &path("copied")).unwrap();
+        #[cfg(unix)]
+        {
+            use std::os::unix::fs::MetadataExt;
+            let inode = |name: &str| fs::metadata(path(name)).unwrap().ino();
+            assert!(inode("a") == inode("linked") && inode("a") != inode("copied"));
+            std::os::unix::fs::symlink(path("a"), path("symbolic")).unwrap();
+            link_or_copy(&path("symbolic"), &path("of-symbolic")).unwrap();
+            assert!(fs::symlink_metadata(path("of-symbolic")).unwrap().is_file());
+        }
+        for name in ["linked", "copied"] {
+            assert_eq!(fs::read(path(name)).unwrap(), b"whole");
+            assert_eq!(copy(&path("a"), &path(name)).unwrap_err().kind(), io::ErrorKind::AlreadyExists);
+        }
+        assert_eq!(link_or_copy(&path("none"), &path("b")).unwrap_err().kind(), io::ErrorKind::NotFound);
+        assert!(!path("b").exists());
     }
 
     /// Whether a file syncs its folder depends on the type of target, not on the folder's name.

@@ -173,7 +173,7 @@ pub fn notes_of(record: &Record) -> Vec<ItemNote> {
     record.notes.iter().map(note).collect()
 }
 
-/// Copies the files of all results, reading each record once. Returns the fragments of the tables.
+/// Adds the files of all results, reading each record once. Returns the fragments of the tables.
 fn add_results(
     builder: &mut ReleaseBuilder,
     contents: &Contents<'_>,
@@ -209,8 +209,8 @@ fn add_artifacts(builder: &mut ReleaseBuilder, record: &Record, folder: &Path, s
         source: folder.join(&file.product.file),
         origin: artifact.origin.clone(),
     });
-    let copied = builder.add_files(incoming.collect())?;
-    match files.iter().zip(&copied).find(|((file, _), sha256)| file.sha256 != **sha256) {
+    let added = builder.add_files(incoming.collect())?;
+    match files.iter().zip(&added).find(|((file, _), sha256)| file.sha256 != **sha256) {
         Some(((file, _), _)) => Err(damaged(folder, &record.item, &file.product.file)),
         None => Ok(()),
     }

@@ -357,7 +357,8 @@ pub fn load_record(folder: &Path) -> Option<Record> {
     are_complete(folder, &record.files).then_some(record)
 }
 
-/// Copies the files of a result and then its record into an existing folder, each flushed to disk.
+/// Copies the files of a result and then its record into an existing folder, each flushed to disk. Shards and shared caches are copies,
+/// because they are carried elsewhere or changed by others.
 ///
 /// # Errors
 /// I/O errors.

@@ -117,8 +117,7 @@ pub fn write(
     let replaced = occupant(target)?;
     check_occupant(replaced.as_ref(), &loaded.study, target, part, replace)?;
     let staging = Staging::beside(target)?;
-    let own: Vec<usize> = (0..graph.len()).filter(|&p| part.owns(graph.key(p))).collect();
-    for &position in &own {
+    for position in (0..graph.len()).filter(|&p| part.owns(graph.key(p))) {
         let (item, key) = (&graph.node(position).item, graph.key(position));
         if let Some(record) = cache.load(item, key) {
             let to = item_folder(staging.path(), item);
@@ -126,7 +125,7 @@ pub fn write(
             copy_result(&record, &cache.result_folder(item, key), &to)?;
         }
     }
-    let owned = |f: &&Failure| graph.find(&f.item).is_some_and(|p| own.contains(&p));
+    let owned = |f: &&Failure| graph.find(&f.item).is_some_and(|p| part.owns(graph.key(p)));
     let description = Description {
         part,
         program: sastrugi_store::PROGRAM.to_owned(),

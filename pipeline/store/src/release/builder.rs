@@ -1,7 +1,7 @@
 //! Assembly of a release in a temporary folder, and sealing.
 
 use super::{MANIFEST, Release, ReleaseError, SUMS, TABLES, check_path};
-use crate::atomic::sync_folder;
+use crate::atomic::{self, DraftFile, sync_folder};
 use crate::digest::{self, Hashed};
 use crate::parquet::{TableMetadata, TableWriter};
 use rayon::prelude::*;
@@ -85,28 +85,30 @@ impl PartWriter<'_> {
     /// The rows are not sorted, or the file cannot be written.
     pub fn push(&mut self, cells: Vec<Cell>) -> Result<(), ReleaseError> {
         if self.writer.is_none() {
-            self.writer = Some(TableWriter::create(self.target, self.table, Some(self.metadata))?);
+            let file = DraftFile::at(self.target);
+            self.writer = Some(TableWriter::create(&file, self.table, Some(self.metadata))?);
         }
         self.writer.as_mut().map_or(Ok(()), |writer| writer.push(cells))?;
         Ok(())
     }
 }
 
-/// A file to be copied into a release.
+/// A file to be added to a release.
 #[derive(Clone, Debug)]
 pub struct Incoming {
     /// Path in the release.
     pub path: String,
-    /// File to copy.
+    /// The file, complete and on disk.
     pub source: PathBuf,
     /// Origin.
     pub origin: Origin,
 }
 
-fn copy(source: &Path, target: &Path) -> Result<(u64, String), ReleaseError> {
-    let mut from = crate::file::open(source).map_err(ReleaseError::io(source))?;
-    let mut to = File::create(target).map_err(ReleaseError::io(target))?;
-    digest::copy(&mut from, &mut to).map_err(ReleaseError::io(target))
+/// Size and SHA-256 of a file that has got its place in the release.
+fn place(source: &Path, target: &Path) -> Result<(u64, String), ReleaseError> {
+    let at_fault = || if File::open(source).is_ok() { target } else { source };
+    atomic::link_or_copy(source, target).map_err(|e| ReleaseError::io(at_fault())(e))?;
+    digest::of_file(target).map_err(ReleaseError::io(target))
 }
 
 impl ReleaseBuilder {
@@ -146,14 +148,15 @@ impl ReleaseBuilder {
         &self.manifest.artifacts
     }
 
-    /// Copies files into the release, several at a time; returns their SHA-256 in the same order.
+    /// Adds files to the release, several at a time; returns their SHA-256 in the same order. On the file system of the release they get a
+    /// further name, and must not be changed in place any more; from elsewhere they are copied.
     ///
     /// # Errors
     /// A path is not allowed, or a file cannot be read or written.
     pub fn add_files(&mut self, files: Vec<Incoming>) -> Result<Vec<String>, ReleaseError> {
         let targets = files.iter().map(|file| self.claim(&file.path)).collect::<Result<Vec<PathBuf>, _>>()?;
         let copied: Result<Vec<(u64, String)>, ReleaseError> =
-            files.par_iter().zip(&targets).map(|(file, target)| copy(&file.source, target)).collect();
+            files.par_iter().zip(&targets).map(|(file, target)| place(&file.source, target)).collect();
         let list = |(file, (bytes, sha256)): (Incoming, (u64, String))| {
             self.manifest.artifacts.push(Artifact {
                 path: file.path,
@@ -172,7 +175,7 @@ impl ReleaseBuilder {
     /// As [`ReleaseBuilder::add_files`].
     pub fn write_text(&mut self, path: &str, text: &str, origin: Origin) -> Result<(), ReleaseError> {
         let target = self.target(path)?;
-        fs::write(&target, text).map_err(ReleaseError::io(&target))?;
+        write(&target, text)?;
         let (bytes, sha256) = (text.len() as u64, digest::of_text(text));
         self.list(Artifact { path: path.to_owned(), bytes, sha256, origin });
         Ok(())
@@ -185,6 +188,7 @@ impl ReleaseBuilder {
     pub fn adopt(&mut self, path: &str, origin: Origin) -> Result<(), ReleaseError> {
         let target = self.target(path)?;
         let (bytes, sha256) = digest::of_file(&target).map_err(ReleaseError::io(&target))?;
+        File::open(&target).and_then(|file| file.sync_all()).map_err(ReleaseError::io(&target))?;
         self.list(Artifact { path: path.to_owned(), bytes, sha256, origin });
         Ok(())
     }
@@ -261,7 +265,9 @@ impl ReleaseBuilder {
         serde_json::to_writer_pretty(&mut writer, &self.manifest)?;
         writeln!(writer).map_err(ReleaseError::io(&path))?;
         let written = writer.into_inner().map_err(|e| ReleaseError::io(&path)(e.into_error()))?;
-        Ok(written.finish().2)
+        let (file, _, sha256) = written.finish();
+        file.sync_all().map_err(ReleaseError::io(&path))?;
+        Ok(sha256)
     }
 
     /// Location of a file of the release; creates its folder.
@@ -277,8 +283,8 @@ impl ReleaseBuilder {
         Ok(target)
     }
 
-    /// Writes manifest and checksums, syncs everything to disk and gives the release its name. An existing release is
-    /// replaced.
+    /// Writes manifest and checksums, syncs the folders to disk (each file was synced when it was added) and gives the release its name. An
+    /// existing release is replaced.
     ///
     /// # Errors
     /// [`ReleaseError::Occupied`] if `dest` holds files that are not a release; the file system failed.
@@ -287,8 +293,8 @@ impl ReleaseBuilder {
         remove_empty_folders(self.staging())?;
         let sha256 = self.write_manifest()?;
         let path = self.staging().join(SUMS);
-        fs::write(&path, sums(&self.manifest, &sha256)).map_err(ReleaseError::io(&path))?;
-        sync_tree(self.staging())?;
+        write(&path, &sums(&self.manifest, &sha256))?;
+        sync_folders(self.staging())?;
         self.staging.put_in_place(dest)?;
         Ok(Release { folder: dest.to_owned(), manifest: self.manifest })
     }
@@ -399,6 +405,23 @@ impl Drop for Staging {
         // If this fails, the next run removes the folder.
         let _ = fs::remove_dir_all(&self.0);
     }
+}
+
+/// Writes a file of the folder under construction and syncs it to disk.
+fn write(path: &Path, text: &str) -> Result<(), ReleaseError> {
+    atomic::write(&DraftFile::at(path), text.as_bytes()).map_err(ReleaseError::io(path))
+}
+
+/// Syncs every folder of a tree to disk.
+fn sync_folders(folder: &Path) -> Result<(), ReleaseError> {
+    let entries =
+        fs::read_dir(folder).and_then(Iterator::collect::<Result<Vec<_>, _>>).map_err(ReleaseError::io(folder))?;
+    entries.par_iter().try_for_each(|entry| {
+        let path = entry.path();
+        let kind = entry.file_type().map_err(ReleaseError::io(&path))?;
+        if kind.is_dir() { sync_folders(&path) } else { Ok(()) }
+    })?;
+    sync_folder(folder).map_err(ReleaseError::io(folder))
 }
 
 /// Syncs every file and folder of a tree to disk.
