@@ -9,6 +9,7 @@ mod hostile;
 mod image;
 mod inputs;
 mod machine;
+mod million;
 mod perturb;
 mod photoclinometry;
 mod recipes;

@@ -3,6 +3,7 @@
 #![allow(clippy::expect_used, reason = "a test may end where it stands")]
 
 pub mod server;
+pub mod synthetic;
 
 use parquet::file::reader::FileReader;
 use parquet::file::serialized_reader::SerializedFileReader;
@@ -67,6 +68,21 @@ pub fn called(command: &mut Command) -> Called {
         stdout: String::from_utf8_lossy(&stdout).into_owned(),
         stderr: String::from_utf8_lossy(&stderr).into_owned(),
     }
+}
+
+/// Largest resident memory of a command that runs the program, KiB, as the system counts it for a child.
+///
+/// # Panics
+/// When the program fails, or there is no `python3`, which measures.
+pub fn peak_kib(folder: &Path, arguments: &[&str]) -> u64 {
+    const MEASURE: &str = "import resource, subprocess, sys\n\
+        subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)\n\
+        print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)";
+    let mut command = Command::new("python3");
+    command.args(["-c", MEASURE]).arg(program()).args(arguments).current_dir(folder);
+    let call = called(&mut command);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    call.stdout.trim().parse().expect("a number of KiB")
 }
 
 /// A temporary folder, removed when dropped.

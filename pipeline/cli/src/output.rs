@@ -4,8 +4,9 @@ use crate::failure::{Code, Failure};
 use miette::{GraphicalReportHandler, GraphicalTheme, LabeledSpan, MietteDiagnostic, NamedSource, Report};
 use sastrugi_stages::Error;
 use sastrugi_stages::study::{Refusals, StudyError};
+use serde::Serialize;
 use serde_json::Value;
-use std::io::{IsTerminal, Write};
+use std::io::{BufWriter, IsTerminal, Write};
 use std::ops::Range;
 
 /// Places farther right are given by line and column only: drawing such a long line is useless, and `miette` counts columns in 16 bits.
@@ -19,10 +20,18 @@ const REFUSALS_SHOWN: usize = 20;
 /// # Errors
 /// If stdout cannot be written.
 pub fn print(json: bool, value: &Value, text: &str) -> Result<(), Failure> {
-    let mut out = std::io::stdout().lock();
+    print_long(json, value, text)
+}
+
+/// The same for a value that may be very long, such as the plan of a million items: it is written piece by piece.
+///
+/// # Errors
+/// As [`print`].
+pub fn print_long(json: bool, value: &impl Serialize, text: &str) -> Result<(), Failure> {
+    let mut out = BufWriter::new(std::io::stdout().lock());
     let written = if json {
-        let pretty = serde_json::to_string_pretty(value).map_err(Failure::failed)?;
-        writeln!(out, "{pretty}")
+        let written = serde_json::to_writer_pretty(&mut out, value).map_err(std::io::Error::from);
+        written.and_then(|()| writeln!(out))
     } else {
         writeln!(out, "{}", text.trim_end())
     };

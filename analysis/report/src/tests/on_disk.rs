@@ -91,6 +91,32 @@ fn prop_a_release_reads_the_same_before_and_after_sealing() {
     assert_eq!(before, report(&dest));
 }
 
+/// Missions in one file per split are those of a single file, in the order of their keys, and share their names.
+#[test]
+fn prop_missions_of_several_files_are_in_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let missions = made_up::parts(2, 24).0.missions;
+    let stored = |name: &str, files: usize| {
+        let head = Head {
+            name: "made-up".into(),
+            study_sha256: "0".repeat(64),
+            seed: 7,
+            version: "0.1.0".into(),
+            license: "CC-BY-4.0".into(),
+        };
+        let mut builder = ReleaseBuilder::beside(&folder.path().join(name), head).unwrap();
+        for file in 0..files {
+            let rows = missions.iter().enumerate().filter(|(k, _)| k % files == file).map(|(_, m)| m.clone()).collect();
+            write_table(&mut builder, &format!("{file:04}"), rows);
+        }
+        crate::data::Data::open(builder.staging()).unwrap().missions
+    };
+    let cells = |missions: Vec<crate::data::Mission>| missions.iter().map(Record::cells).collect::<Vec<_>>();
+    let whole = cells(stored("whole", 1));
+    assert_eq!(whole, cells(missions.clone()));
+    assert_eq!(cells(stored("parts", 3)), whole);
+}
+
 #[test]
 fn val_failed_items_are_listed() {
     let folder = tempfile::tempdir().unwrap();

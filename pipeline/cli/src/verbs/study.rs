@@ -3,7 +3,7 @@
 use crate::Verdict;
 use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verify};
 use crate::failure::{Code, Failure};
-use crate::output::{bytes, columns, counted, print, seconds, warn};
+use crate::output::{bytes, columns, counted, print, print_long, seconds, warn};
 use crate::progress::Reporter;
 use sastrugi_report::{Companions, ReportError};
 use sastrugi_schemas::manifest::ItemNote;
@@ -246,7 +246,7 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     if plan.stale.len() > PLAN_LINES {
         text.push_str(&format!("\n  and {} more (--json lists all)", plan.stale.len() - PLAN_LINES));
     }
-    print(common.json, &serde_json::to_value(&plan).map_err(Failure::failed)?, &text)?;
+    print_long(common.json, &plan, &text)?;
     Ok(Code::Done)
 }
 

@@ -1,0 +1,94 @@
+//! Memory of studies with very many missions, as `docs/scaling.md` states it.
+
+use sastrugi_tests::synthetic::{self, MISSIONS_PER_TERRAIN};
+use sastrugi_tests::{area, peak_kib, sastrugi_in, write};
+use std::path::Path;
+
+/// Bounds on the memory of each further mission, bytes: 1 GB for a million, as for the first ones.
+const PLAN_MAX: f64 = 400.0;
+const REPORT_MAX: f64 = 1000.0;
+
+/// A study that expands to this many missions on terrains of [`MISSIONS_PER_TERRAIN`].
+fn study(folder: &Path, missions: usize) {
+    let terrains = missions.div_ceil(MISSIONS_PER_TERRAIN);
+    let text = format!(
+        "[study]\nname = \"many\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\nsize_px = [64, 64]\n\
+         count = {terrains}\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = {MISSIONS_PER_TERRAIN}\n\n[[traverse]]\nid = \"h\"\n\
+         missions = \"m\"\n"
+    );
+    write(folder, "study.toml", &text);
+}
+
+/// Bytes that each further mission takes between two numbers of missions.
+fn growth(peak_kib: impl Fn(usize) -> u64) -> f64 {
+    let (few, many) = (20_000, 200_000);
+    let [low, high] = [few, many].map(peak_kib);
+    println!("{few} missions: {low} KiB, {many}: {high} KiB");
+    1024.0 * (high as f64 - low as f64) / (many - few) as f64
+}
+
+#[test]
+#[ignore = "slow: plans 200 000 missions"]
+fn val_a_plan_takes_little_memory_for_a_mission() {
+    let folder = area();
+    let each = growth(|missions| {
+        study(folder.path(), missions);
+        peak_kib(folder.path(), &["plan", "study.toml", "-o", "release"])
+    });
+    assert!(each < PLAN_MAX, "{each} bytes");
+}
+
+#[test]
+#[ignore = "slow: reports on 200 000 missions"]
+fn val_a_report_takes_little_memory_for_a_mission() {
+    let folder = area();
+    let each = growth(|missions| {
+        let name = format!("release-{missions}");
+        synthetic::release(&folder.path().join(&name), missions).unwrap();
+        peak_kib(folder.path(), &["report", &name, "-o", &format!("report-{missions}"), "--quiet"])
+    });
+    assert!(each < REPORT_MAX, "{each} bytes");
+    // What is listed and drawn is bounded: one file alone would have 60 MB with all missions.
+    let bytes = folder_bytes(&folder.path().join("report-200000"));
+    assert!(bytes < 50_000_000, "{bytes} bytes");
+}
+
+/// Bytes of all files of a folder.
+fn folder_bytes(folder: &Path) -> u64 {
+    let entries = std::fs::read_dir(folder).unwrap().map(|entry| entry.unwrap());
+    let bytes = |entry: std::fs::DirEntry| match entry.path().is_dir() {
+        true => folder_bytes(&entry.path()),
+        false => entry.metadata().unwrap().len(),
+    };
+    entries.map(bytes).sum()
+}
+
+/// A synthetic release is a release: intact, described, and with a report that counts its missions.
+#[test]
+fn val_synthetic_releases_are_releases() {
+    let folder = area();
+    synthetic::release(&folder.path().join("release"), 130).unwrap();
+    let verified = sastrugi_in(folder.path(), &["verify", "release"]);
+    assert_eq!(verified.code, 0, "{}{}", verified.stdout, verified.stderr);
+    let report = sastrugi_in(folder.path(), &["report", "release", "-o", "report", "--quiet"]);
+    assert_eq!(report.code, 0, "{}", report.stderr);
+    let page = std::fs::read_to_string(folder.path().join("report/index.html")).unwrap();
+    // 130 missions take seven terrains of 20.
+    assert!(page.contains("<b>140</b> missions") && page.contains("<b>7</b> terrains"), "{}", &page[..2000]);
+}
+
+/// The files of a release are those of the work area under further names: nothing is copied on one file system.
+#[cfg(unix)]
+#[test]
+fn val_files_of_a_release_are_linked() {
+    use std::os::unix::fs::MetadataExt;
+    let folder = area();
+    study(folder.path(), 20);
+    let text = std::fs::read_to_string(folder.path().join("study.toml")).unwrap();
+    let short = "count = 2\nlength_m = 5.0\nborder_m = 1.5\n";
+    let study = text.replace("count = 20\n", short).replace("size_px = [64, 64]", "size_px = [320, 300]");
+    sastrugi_tests::run_study(folder.path(), &study, &[]);
+    let release = folder.path().join("release");
+    let names = |path: &str| std::fs::metadata(release.join(path)).unwrap().nlink();
+    assert_eq!(["terrain/t-0001.tif", "mcap/t-0001/h-0001.mcap", "manifest.json"].map(names), [2, 2, 1]);
+}
