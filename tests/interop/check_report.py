@@ -60,6 +60,8 @@ def runs(path, document):
     rows = [tuple(map(plain, row)) for row in duckdb.sql(document["query"]).fetchall()]
     ours = [tuple(map(plain, row)) for row in document["rows"]]
     expect(rows or not ours, f"{path.stem}: no rows from {document['query']}")
+    if "random_sample_of" in document:
+        return
     if document["query_gives"] == "rows":
         outcomes(document, rows) if path.stem in ["outcomes", "summary-outcomes"] else same_rows(path.stem, ours, rows)
 
