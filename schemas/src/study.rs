@@ -924,7 +924,6 @@ impl Default for RoughnessSection {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::tables::{Cell, Column, ColumnType, Record};
     use serde_json::{from_value, json, to_value};
 
     /// Thresholds as published: 50 and 140 levels of 0.75/128 cm per cm.

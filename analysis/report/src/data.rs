@@ -216,27 +216,35 @@ impl Data {
     /// Missions by group, groups in natural order. If the release has several runs, each is a separate group, because other vehicles
     /// or other paths are not repetitions.
     pub fn groups_of<'a>(&'a self, missions: Vec<&'a Mission>) -> Vec<Group<'a, Mission>> {
-        let names = self.names();
+        let mut names = self.names();
         self.grouped(missions.into_iter().map(|m| (names(m), m)))
     }
 
     /// Function that returns label and run of a mission.
-    fn names<'a>(&'a self) -> impl Fn(&Mission) -> Of<'a> {
-        let kinds: BTreeMap<&str, &str> = self.terrains.iter().map(|t| (t.terrain_id.as_str(), label(t))).collect();
-        let labels: BTreeSet<&str> = self.missions.iter().filter_map(|m| m.group.as_deref()).collect();
+    fn names<'a>(&'a self) -> impl FnMut(&'a Mission) -> Of<'a> {
+        let unnamed = self.missions.iter().any(|m| m.group.is_none());
+        let terrains = self.terrains.iter().filter(|_| unnamed);
+        let kinds: BTreeMap<&str, &str> = terrains.map(|t| (t.terrain_id.as_str(), label(t))).collect();
         let runs = self.runs();
+        let mut last: Option<(&'a Mission, Of<'a>)> = None;
         move |m| {
-            let own = m.group.as_deref().and_then(|group| labels.get(group).copied());
+            // Missions of one terrain follow each other.
+            let alike =
+                |n: &Mission| n.traverse_id == m.traverse_id && n.terrain_id == m.terrain_id && n.group == m.group;
             let of_terrain = || kinds.get(m.terrain_id.as_str()).copied();
-            (own.or_else(of_terrain).unwrap_or("all"), run(&runs, m))
+            let of = match last {
+                Some((before, of)) if alike(before) => of,
+                _ => (m.group.as_deref().or_else(of_terrain).unwrap_or("all"), run(&runs, m)),
+            };
+            last = Some((m, of));
+            of
         }
     }
 
     /// Ids of the runs of the plain missions; variants belong to these.
     fn runs(&self) -> Vec<&str> {
         let plain = plain(self.missions.iter().collect(), |m| m.variant.is_none());
-        let ids: BTreeSet<&str> = plain.into_iter().map(|m| m.traverse_id.as_str()).collect();
-        ids.into_iter().collect()
+        distinct(plain.into_iter().map(|m| m.traverse_id.as_str())).into_iter().collect()
     }
 
     /// True when plain missions belong to several runs.
@@ -251,25 +259,35 @@ impl Data {
             Some(run) if runs.len() > 1 => format!("{label}, {run}"),
             _ => label.to_owned(),
         };
-        let missions: BTreeSet<Of> = self.missions.iter().map(self.names()).collect();
+        let missions = self.missions.iter().map(self.names());
         let terrains = self.terrains.iter().map(|t| (label(t), None));
         let names: BTreeSet<Natural> =
-            terrains.chain(missions).map(|(label, run)| natural(&named(label, run))).collect();
+            distinct(terrains.chain(missions)).into_iter().map(|(label, run)| natural(&named(label, run))).collect();
         let index = |key: &Natural| names.iter().position(|n| n == key).unwrap_or(names.len());
-        let mut groups: BTreeMap<Natural, (Of, Vec<&R>)> = BTreeMap::new();
-        let mut keys: BTreeMap<Of, Natural> = BTreeMap::new();
+        let mut groups: Vec<(Of, Vec<&R>)> = Vec::new();
+        let (mut places, mut keys) = (BTreeMap::<Of, usize>::new(), BTreeMap::<Natural, usize>::new());
         for (of, row) in rows {
-            let key = keys.entry(of).or_insert_with(|| natural(&named(of.0, of.1)));
-            groups.entry(key.clone()).or_insert_with(|| (of, Vec::new())).1.push(row);
+            let place = *places.entry(of).or_insert_with(|| {
+                // Labels and runs may have one name.
+                let place = *keys.entry(natural(&named(of.0, of.1))).or_insert(groups.len());
+                if place == groups.len() {
+                    groups.push((of, Vec::new()));
+                }
+                place
+            });
+            groups[place].1.push(row);
         }
-        let group = |(key, ((label, run), rows)): (Natural, (Of, _))| Group {
-            index: index(&key),
-            name: key.1,
-            label: label.to_owned(),
-            run: run.map(str::to_owned),
-            rows,
+        let group = |(key, place): (Natural, usize)| {
+            let ((label, run), rows) = &mut groups[place];
+            Group {
+                index: index(&key),
+                name: key.1,
+                label: (*label).to_owned(),
+                run: run.map(str::to_owned),
+                rows: std::mem::take(rows),
+            }
         };
-        groups.into_iter().map(group).collect()
+        keys.into_iter().map(group).collect()
     }
 
     /// Heightfields of a stage.
@@ -337,6 +355,19 @@ impl Data {
     pub fn histogram(&self, id: &str) -> Vec<&HeightDistributionRow> {
         of_key(&self.heights, |r| &r.surface_id, id).iter().filter(|r| r.density_per_m.is_finite()).collect()
     }
+}
+
+/// The different items; equal ones that follow each other are looked up once.
+fn distinct<T: Ord + Copy>(items: impl Iterator<Item = T>) -> BTreeSet<T> {
+    let mut all = BTreeSet::new();
+    let mut last = None;
+    for item in items {
+        if last != Some(item) {
+            all.insert(item);
+            last = Some(item);
+        }
+    }
+    all
 }
 
 /// The plain rows; all of them if none is plain.

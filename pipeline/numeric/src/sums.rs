@@ -60,6 +60,33 @@ pub fn median(values: &[f64]) -> f64 {
     quantile_sorted(&[low, high], if last % 2 == 0 { 0.0 } else { 0.5 })
 }
 
+/// Median of sorted values of which each counts a number of times, equal to [`median`] of the repeated values; NaN for none. Cost: two passes,
+/// nothing is repeated.
+///
+/// ```
+/// use sastrugi_numeric::sums::median_counted;
+///
+/// let sorted = [(1.0, 2), (2.0, 0), (4.0, 1), (8.0, 3)];
+/// // Of 1, 1, 4, 8, 8, 8.
+/// assert_eq!(median_counted(sorted.iter().copied()), 6.0);
+/// ```
+pub fn median_counted(sorted: impl Iterator<Item = (f64, usize)> + Clone) -> f64 {
+    let Some(last) = sorted.clone().map(|(_, n)| n).sum::<usize>().checked_sub(1) else { return f64::NAN };
+    let (mut rest, mut left) = (sorted, last / 2);
+    // The value with `left` others before it, and how many of it follow.
+    let Some((low, more)) = rest.find_map(|(value, n)| match left.checked_sub(n) {
+        Some(others) => {
+            left = others;
+            None
+        }
+        None => Some((value, n - left - 1)),
+    }) else {
+        return f64::NAN;
+    };
+    let high = if more > 0 { low } else { rest.find(|(_, n)| *n > 0).map_or(low, |(value, _)| value) };
+    quantile_sorted(&[low, high], if last % 2 == 0 { 0.0 } else { 0.5 })
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -81,6 +108,21 @@ mod tests {
                 sorted.sort_by(f64::total_cmp);
                 let (a, b) = (median(&values[..n]), quantile_sorted(&sorted, 0.5));
                 assert_eq!(a.to_bits(), b.to_bits(), "{n}: {a} {b}");
+            }
+        }
+    }
+
+    /// The same bits as of the repeated values, for counts of 0 to 3 and every length.
+    #[test]
+    fn prop_counts_are_repetitions() {
+        let sorted: Vec<f64> = (0..60u32).map(|k| f64::from(k / 2) - 7.3).collect();
+        for n in 0..=sorted.len() {
+            for salt in 0..8u32 {
+                let count = |k: u32| ((k + salt).wrapping_mul(2_654_435_761) >> 28) as usize % 4;
+                let counted: Vec<(f64, usize)> = sorted[..n].iter().zip(0..).map(|(v, k)| (*v, count(k))).collect();
+                let repeated: Vec<f64> = counted.iter().flat_map(|(v, n)| vec![*v; *n]).collect();
+                let (a, b) = (median_counted(counted.iter().copied()), median(&repeated));
+                assert_eq!(a.to_bits(), b.to_bits(), "{counted:?}: {a} {b}");
             }
         }
     }

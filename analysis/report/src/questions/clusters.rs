@@ -4,7 +4,7 @@
 use crate::data::{Data, Group, Mission};
 use sastrugi_numeric::{Stream, sums};
 use sastrugi_statistics::{Interval, cluster_interval};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashMap, HashSet};
 
 /// Bootstrap samples behind an interval.
 pub const REPLICATES: usize = 1000;
@@ -27,8 +27,24 @@ pub fn band(data: &Data, group: &str, figure: &str, values: &[(&str, f64)]) -> O
     let mut values: Vec<(&str, f64)> = values.iter().copied().filter(|v| v.1.is_finite()).collect();
     // Resampling keeps the order, and the median of sorted values is fast.
     values.sort_by(|a, b| a.1.total_cmp(&b.1));
-    let clusters = Clusters::new(&[values]);
-    clusters.interval(&mut stream(data, group, figure), BAND, |pooled| sums::median(&pooled[0]))
+    let (clusters, items) = numbered(&values);
+    let median = |drawn: &[Vec<usize>]| {
+        let times = times(&drawn[0], clusters);
+        sums::median_counted(items.iter().map(|(cluster, value)| (*value, times[*cluster])))
+    };
+    cluster_interval(&[clusters], replicates(items.len()), BAND, &mut stream(data, group, figure), median)
+}
+
+/// Number of bootstrap samples for an interval of this many values.
+fn replicates(values: usize) -> usize {
+    (DRAWN_MAX / values.max(1)).clamp(REPLICATES_MIN, REPLICATES)
+}
+
+/// How often each of `clusters` clusters was drawn.
+pub fn times(drawn: &[usize], clusters: usize) -> Vec<usize> {
+    let mut times = vec![0; clusters];
+    drawn.iter().for_each(|&c| times[c] += 1);
+    times
 }
 
 /// The block of a pair: its id without the number of the mission.
@@ -41,9 +57,14 @@ pub fn paired(groups: &[Group<Mission>]) -> bool {
     if groups.len() < 2 {
         return false;
     }
-    let sets: Vec<BTreeSet<&str>> =
-        groups.iter().map(|g| g.rows.iter().map(|m| m.pair_id.as_str()).collect()).collect();
-    sets.iter().enumerate().any(|(i, a)| sets[..i].iter().any(|b| !a.is_disjoint(b)))
+    let mut first: HashMap<&str, usize> = HashMap::new();
+    let mut missions = groups.iter().enumerate().flat_map(|(g, group)| group.rows.iter().map(move |m| (g, *m)));
+    missions.any(|(g, mission)| *first.entry(&mission.pair_id).or_insert(g) != g)
+}
+
+/// The different names, in order. Most names of missions occur many times.
+fn distinct<'a>(names: impl Iterator<Item = &'a str>) -> BTreeSet<&'a str> {
+    names.collect::<HashSet<&str>>().into_iter().collect()
 }
 
 /// Which cluster each terrain of a comparison belongs to.
@@ -78,8 +99,8 @@ impl<'a> Pairing<'a> {
 
 /// Number of clusters, and every item with the number of its cluster in the order of their names.
 pub fn numbered<T: Copy>(items: &[(&str, T)]) -> (usize, Vec<(usize, T)>) {
-    let names: BTreeSet<&str> = items.iter().map(|i| i.0).collect();
-    let numbers: BTreeMap<&str, usize> = names.into_iter().enumerate().map(|(k, name)| (name, k)).collect();
+    let names = distinct(items.iter().map(|i| i.0));
+    let numbers: HashMap<&str, usize> = names.into_iter().enumerate().map(|(k, name)| (name, k)).collect();
     (numbers.len(), items.iter().map(|(name, item)| (numbers[name], *item)).collect())
 }
 
@@ -95,12 +116,12 @@ pub struct Clusters<T> {
 impl<T: Copy> Clusters<T> {
     /// From the clusters and items of each group.
     pub fn new(groups: &[Vec<(&str, T)>]) -> Self {
-        let names: Vec<BTreeSet<&str>> = groups.iter().map(|g| g.iter().map(|v| v.0).collect()).collect();
+        let names: Vec<BTreeSet<&str>> = groups.iter().map(|g| distinct(g.iter().map(|v| v.0))).collect();
         let common = names.iter().enumerate().any(|(i, a)| names[..i].iter().any(|b| !a.is_disjoint(b)));
         let samples: Vec<BTreeSet<&str>> = if common { vec![names.into_iter().flatten().collect()] } else { names };
         let of_group = |(g, items): (usize, &Vec<(&str, T)>)| {
             let sample = if common { 0 } else { g };
-            let numbers: BTreeMap<&str, usize> = samples[sample].iter().enumerate().map(|(i, n)| (*n, i)).collect();
+            let numbers: HashMap<&str, usize> = samples[sample].iter().enumerate().map(|(i, n)| (*n, i)).collect();
             (sample, items.iter().map(|(name, item)| (numbers[name], *item)).collect())
         };
         let groups = groups.iter().enumerate().map(of_group).collect();
@@ -109,12 +130,7 @@ impl<T: Copy> Clusters<T> {
 
     /// The items of every group when these clusters are drawn, each as often as its cluster, in their original order.
     pub fn pooled(&self, drawn: &[Vec<usize>]) -> Vec<Vec<T>> {
-        let times = |(drawn, n): (&Vec<usize>, &usize)| {
-            let mut times = vec![0; *n];
-            drawn.iter().for_each(|&c| times[c] += 1);
-            times
-        };
-        let times: Vec<Vec<usize>> = drawn.iter().zip(&self.samples).map(times).collect();
+        let times: Vec<Vec<usize>> = drawn.iter().zip(&self.samples).map(|(drawn, n)| times(drawn, *n)).collect();
         let group = |(sample, items): &(usize, Vec<(usize, T)>)| {
             let mut pooled = Vec::with_capacity(items.len());
             for (cluster, item) in items {
@@ -128,8 +144,7 @@ impl<T: Copy> Clusters<T> {
     /// Percentile interval of a statistic of the items of every group; `None` with fewer than two clusters.
     pub fn interval(&self, stream: &mut Stream, level: f64, statistic: impl Fn(&[Vec<T>]) -> f64) -> Option<Interval> {
         let values: usize = self.groups.iter().map(|g| g.1.len()).sum();
-        let replicates = (DRAWN_MAX / values.max(1)).clamp(REPLICATES_MIN, REPLICATES);
-        cluster_interval(&self.samples, replicates, level, stream, |drawn| statistic(&self.pooled(drawn)))
+        cluster_interval(&self.samples, replicates(values), level, stream, |drawn| statistic(&self.pooled(drawn)))
     }
 }
 
@@ -147,6 +162,33 @@ mod tests {
     fn val_blocks() {
         assert_eq!(block("straight-0003-0017"), "straight-0003");
         assert_eq!(block("alone"), "alone");
+    }
+
+    /// The same bits as the median of the pooled values of each bootstrap sample, which are listed one by one.
+    #[test]
+    fn prop_a_band_is_that_of_pooled_values() {
+        let data = crate::tests::made_up::empty();
+        let mut s = Streams::for_seed(1, "clusters-test").stream("band");
+        for n in [1, 2, 7, 60, 61] {
+            let names: Vec<String> = (0..n).map(|_| format!("t{}", s.below(9))).collect();
+            let values: Vec<(&str, f64)> =
+                names.iter().map(|name| (name.as_str(), (4.0 * s.normal()).round())).collect();
+            let fast = band(&data, "group", "figure", &values);
+            let pooled = Clusters::new(&[values]);
+            let slow = pooled.interval(&mut stream(&data, "group", "figure"), BAND, |pooled| sums::median(&pooled[0]));
+            assert_eq!(fast, slow, "{n}");
+        }
+    }
+
+    /// Two groups share pairs if any mission of one has the pair of a mission of the other; a pair that is twice in one group is none.
+    #[test]
+    fn val_pairs_between_groups() {
+        let missions = crate::tests::made_up::full(1, 24).missions;
+        let with = |pair: &str| Mission { pair_id: pair.into(), ..missions[0].clone() };
+        let [a, b] = ["a", "b"].map(with);
+        let group = |rows: Vec<_>| Group { name: String::new(), label: String::new(), run: None, index: 0, rows };
+        assert!(paired(&[group(vec![&a]), group(vec![&b]), group(vec![&b, &a])]));
+        assert!(!paired(&[group(vec![&a, &a]), group(vec![&b, &b])]) && !paired(&[group(vec![&a, &a])]));
     }
 
     /// Groups with common clusters are resampled together, so the difference of equal groups has no scatter; independent groups do.

@@ -2,7 +2,7 @@
 
 use crate::content::{Block, Figure, Numbers, count, number, slug, text};
 use crate::data::{Data, Group, Mission};
-use crate::questions::clusters::{LEVEL, REPLICATES, numbered, stream};
+use crate::questions::clusters::{LEVEL, REPLICATES, numbered, stream, times};
 use crate::questions::outcome;
 use crate::questions::sql;
 use crate::render::axis::Axis;
@@ -87,8 +87,7 @@ fn curves<'a>(data: &Data, group: &'a Group<'a, Mission>, length: f64) -> Curves
     let mut stream = stream(data, &group.name, "progress_m");
     let at: Vec<f64> = distances(length).collect();
     let redrawn = bootstrap::redraw(&[clusters], if clusters > 1 { REPLICATES } else { 0 }, &mut stream, |drawn| {
-        let mut times = vec![0; clusters];
-        drawn[0].iter().for_each(|&c| times[c] += 1);
+        let times = times(&drawn[0], clusters);
         // Only the shares that are drawn: a curve has as many steps as there are failures.
         Incidence::shares_at(items.iter().map(|(c, ending)| (*ending, times[*c])), CAUSES.len(), &at)
     });
