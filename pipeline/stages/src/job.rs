@@ -58,6 +58,21 @@ pub trait Job: Send + Sync {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError>;
 }
 
+/// One JSON object with the keys of several, in their order: the recipe of a job from the part that it shares with others and its own.
+///
+/// # Panics
+/// When a text is not that of an object (a bug).
+pub(crate) fn joined(objects: &[&str]) -> String {
+    let inner = |object: &&str| object.strip_prefix('{').and_then(|rest| rest.strip_suffix('}')).map(str::to_owned);
+    let parts: Option<Vec<String>> = objects.iter().map(inner).collect();
+    format!("{{{}}}", parts.unwrap_or_else(|| panic!("{objects:?} are not all JSON objects")).join(","))
+}
+
+/// A recipe from its text.
+pub(crate) fn parsed(recipe: &str) -> Value {
+    serde_json::from_str(recipe).unwrap_or_default()
+}
+
 /// Rough cost of an item on one core.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Estimate {

@@ -406,6 +406,19 @@ mod tests {
         assert!(summary.stale.iter().all(|item| item.reason == "new"));
     }
 
+    /// The text that goes into a key is that of the recipe, however a job keeps it, also beside groups, variants and odd characters.
+    #[test]
+    fn prop_recipes_and_their_texts_agree() {
+        let odd = STUDY.replace("id = \"t\"\n", "id = \"t\"\ngroup = \"\\\"a é\"\n");
+        for text in [STUDY, &odd] {
+            let loaded = load_text(text, "study", Path::new("")).unwrap();
+            for (position, node) in loaded.graph.nodes().iter().enumerate() {
+                assert_eq!(node.job.recipe_text(), node.job.recipe().to_string(), "{}", node.item);
+                assert!(node.job.recipe().is_object() && loaded.graph.key(position).len() == 32);
+            }
+        }
+    }
+
     #[test]
     fn val_the_released_study_points_into_the_release() {
         let folder = tempfile::tempdir().unwrap();

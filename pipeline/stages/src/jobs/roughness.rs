@@ -2,7 +2,7 @@
 
 use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield};
-use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, joined, parsed};
 use crate::operations::dem::input_error;
 use crate::operations::roughness::settings;
 use crate::revision::Room;
@@ -33,15 +33,36 @@ const SECONDS_PER_CELL: f64 = 6e-7;
 pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
     // Shared by all items, to keep the memory of each small.
     let section = Arc::new(builder.study.roughness.clone());
-    let node = |(id, field): (&String, &Heightfield)| Node {
-        item: item(id),
-        parents: vec![field.item.clone()],
-        inputs: Vec::new(),
-        stream: None,
-        job: Box::new(RoughnessJob { id: id.clone(), field: field.clone(), section: Arc::clone(&section) }),
-    };
-    let nodes: Vec<Node> = builder.heightfields.iter().map(node).collect();
+    let mut nodes = Vec::new();
+    let mut last: Option<(&Heightfield, Arc<str>)> = None;
+    for (id, field) in &builder.heightfields {
+        let shared = match &last {
+            Some((before, shared)) if are_alike(before, field) => Arc::clone(shared),
+            _ => shared_recipe(&section, field).into(),
+        };
+        last = Some((field, Arc::clone(&shared)));
+        let job = RoughnessJob { id: id.clone(), field: field.clone(), section: Arc::clone(&section), shared };
+        let parents = vec![field.item.clone()];
+        nodes.push(Node { item: item(id), parents, inputs: Vec::new(), stream: None, job: Box::new(job) });
+    }
     Ok(nodes.into_iter().try_for_each(|node| builder.node(node))?)
+}
+
+/// True if two heightfields have the same shared part of the recipe; replicates do, and follow each other.
+fn are_alike(a: &Heightfield, b: &Heightfield) -> bool {
+    Arc::ptr_eq(&a.parameters, &b.parameters) && (&a.group, &a.variant, &a.kind) == (&b.group, &b.variant, &b.kind)
+}
+
+/// What the replicates of a heightfield share of their recipes, as JSON.
+fn shared_recipe(section: &RoughnessSection, field: &Heightfield) -> String {
+    let shared = json!({
+        "section": section,
+        "group": field.group,
+        "variant": field.variant,
+        "kind": field.kind,
+        "params": *field.parameters,
+    });
+    shared.to_string()
 }
 
 /// Describes one heightfield.
@@ -49,6 +70,8 @@ struct RoughnessJob {
     id: String,
     field: Heightfield,
     section: Arc<RoughnessSection>,
+    /// What it shares of its recipe.
+    shared: Arc<str>,
 }
 
 impl RoughnessJob {
@@ -90,14 +113,11 @@ impl RoughnessJob {
 
 impl Job for RoughnessJob {
     fn recipe(&self) -> Value {
-        json!({
-            "section": *self.section,
-            "group": self.field.group,
-            "variant": self.field.variant,
-            "kind": self.field.kind,
-            "params": *self.field.parameters,
-            "path": self.field.release_path,
-        })
+        parsed(&self.recipe_text())
+    }
+
+    fn recipe_text(&self) -> String {
+        joined(&[&self.shared, &json!({ "path": self.field.release_path }).to_string()])
     }
 
     fn rooms(&self) -> &'static [Room] {

@@ -4,7 +4,7 @@ use super::exports::Exports;
 use super::inputs::{Copies, Sources};
 use super::rasters::{SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
-use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, parsed};
 use crate::operations::terrains::{generate, values_of, write_png16};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -41,6 +41,8 @@ struct Made {
     generator: Box<dyn Generator>,
     /// Its parameters in full.
     parameters: Arc<Value>,
+    /// The recipe, as JSON text.
+    recipe: String,
     /// Inputs of the generator.
     inputs: Sources,
     png16: bool,
@@ -62,9 +64,11 @@ impl Made {
         let released = inputs.as_released(&one.params);
         let generator = sastrugi_terrain::prepare(&item.kind, &released).map_err(|e| entry.refuse(e))?;
         let exports = Exports::new(&item.exports, &generator.geometry()).map_err(|e| entry.error("exports", e))?;
+        let parameters = generator.parameters();
         Ok(Self {
             part: Arc::clone(&one.part),
-            parameters: Arc::new(generator.parameters()),
+            recipe: json!({ "kind": generator.kind(), "params": parameters }).to_string(),
+            parameters: Arc::new(parameters),
             generator,
             inputs,
             png16: item.png16,
@@ -184,7 +188,11 @@ pub fn lines(work: &Work<'_>, item: &ItemRef) -> Result<Vec<Line>, JobError> {
 
 impl Job for TerrainJob {
     fn recipe(&self) -> Value {
-        json!({ "kind": self.made.generator.kind(), "params": *self.made.parameters })
+        parsed(&self.made.recipe)
+    }
+
+    fn recipe_text(&self) -> String {
+        self.made.recipe.clone()
     }
 
     fn packing(&self) -> Value {

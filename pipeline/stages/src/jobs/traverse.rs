@@ -3,7 +3,7 @@
 use super::dem as measured;
 use super::{missions, roughness, vehicle};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
-use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, joined as joined_recipe, parsed};
 use crate::operations::dem::input_error;
 use crate::operations::drawn::Lines;
 use crate::revision::Room;
@@ -421,7 +421,7 @@ fn read_raster(work: &Work<'_>, item: &ItemRef, terrain: &Grid) -> Result<Grid, 
 
 impl Job for TraverseJob {
     fn recipe(&self) -> Value {
-        serde_json::from_str(&self.recipe_text()).unwrap_or_default()
+        parsed(&self.recipe_text())
     }
 
     fn recipe_text(&self) -> String {
@@ -432,9 +432,7 @@ impl Job for TraverseJob {
             "missions": self.lines.item,
         });
         let [first, last] = &self.drive.recipe;
-        // The keys of three objects in one.
-        let inner = |object: &str| object[1..object.len() - 1].to_owned();
-        format!("{{{}}}", [first, &own.to_string(), last].map(|object| inner(object)).join(","))
+        joined_recipe(&[first, &own.to_string(), last])
     }
 
     fn rooms(&self) -> &'static [Room] {
