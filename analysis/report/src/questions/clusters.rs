@@ -35,8 +35,8 @@ pub fn band(data: &Data, group: &str, figure: &str, values: &[(&str, f64)]) -> O
     cluster_interval(&[clusters], replicates(items.len()), BAND, &mut stream(data, group, figure), median)
 }
 
-/// Number of bootstrap samples for an interval of this many values.
-fn replicates(values: usize) -> usize {
+/// Number of bootstrap samples for an interval of this many values: [`REPLICATES`] up to 10 000 of them.
+pub fn replicates(values: usize) -> usize {
     (DRAWN_MAX / values.max(1)).clamp(REPLICATES_MIN, REPLICATES)
 }
 

@@ -2,7 +2,7 @@
 
 use crate::content::{Block, Figure, Numbers, count, number, slug, text};
 use crate::data::{Data, Group, Mission};
-use crate::questions::clusters::{LEVEL, REPLICATES, numbered, stream, times};
+use crate::questions::clusters::{LEVEL, REPLICATES, numbered, replicates, stream, times};
 use crate::questions::outcome;
 use crate::questions::sql;
 use crate::render::axis::Axis;
@@ -49,11 +49,13 @@ pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
     if whole.len() == groups.len() {
         return vec![heading, Block::Text("No mission failed.".into())];
     }
+    let is_large = drawn.iter().any(|g| replicates(g.rows.len()) < REPLICATES);
+    let fewer = if is_large { " (fewer in groups of more than 10 000 missions)" } else { "" };
     let words = format!(
         "The curves give the share of missions that have failed up to a distance along their line, by cause: competing risks, \
          by Aalen and Johansen's estimator (1978). Missions that reach the goal are censored there. Only missions that meet no \
          severe obstacle reach the goal, so metrics of successful missions describe the ground that lets vehicles pass. Bands are \
-         pointwise {} % intervals from {REPLICATES} bootstrap samples of whole terrains.",
+         pointwise {} % intervals from {REPLICATES} bootstrap samples of whole terrains{fewer}.",
         set::fixed(100.0 * LEVEL, 0)
     );
     let figures = all.iter().filter(|c| top > 0.0 && fails(&c.group)).map(|c| figure(data, c, length, top)).collect();
@@ -86,11 +88,12 @@ fn curves<'a>(data: &Data, group: &'a Group<'a, Mission>, length: f64) -> Curves
     let (clusters, items) = numbered(&items);
     let mut stream = stream(data, &group.name, "progress_m");
     let at: Vec<f64> = distances(length).collect();
-    let redrawn = bootstrap::redraw(&[clusters], if clusters > 1 { REPLICATES } else { 0 }, &mut stream, |drawn| {
-        let times = times(&drawn[0], clusters);
-        // Only the shares that are drawn: a curve has as many steps as there are failures.
-        Incidence::shares_at(items.iter().map(|(c, ending)| (*ending, times[*c])), CAUSES.len(), &at)
-    });
+    let redrawn =
+        bootstrap::redraw(&[clusters], if clusters > 1 { replicates(items.len()) } else { 0 }, &mut stream, |drawn| {
+            let times = times(&drawn[0], clusters);
+            // Only the shares that are drawn: a curve has as many steps as there are failures.
+            Incidence::shares_at(items.iter().map(|(c, ending)| (*ending, times[*c])), CAUSES.len(), &at)
+        });
     let band = |cause: usize, step: usize| {
         let values: Vec<f64> = redrawn.iter().map(|shares| shares[cause][step]).collect();
         Interval::percentile(incidence.share(cause, at[step]), &values, LEVEL)
