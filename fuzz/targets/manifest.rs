@@ -1,13 +1,19 @@
-//! The manifest and the sums of a release, parted by a zero byte.
+//! The manifest and the sums of a release, parted by a zero byte. What is read at once is the same piece by piece.
 #![no_main]
 
 use sastrugi_fuzz::{file, folder};
-use sastrugi_store::release::{MANIFEST, Release, SUMS, verify};
+use sastrugi_schemas::manifest::Manifest;
+use sastrugi_store::release::{MANIFEST, Release, SUMS, for_each_artifact, verify};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
     let (manifest, sums) = bytes.iter().position(|b| *b == 0).map_or((bytes, &[][..]), |at| bytes.split_at(at));
     file(MANIFEST, manifest);
     file(SUMS, sums.strip_prefix(&[0]).unwrap_or(sums));
-    let _ = Release::open(folder());
+    let mut artifacts = Vec::new();
+    let pieces = for_each_artifact(folder(), |artifact| artifacts.push(artifact));
+    if let Ok(whole) = Release::open(folder()) {
+        let rest = pieces.expect("a manifest that can be read at once");
+        assert_eq!(&Manifest { artifacts, ..rest }, whole.manifest());
+    }
     let _ = verify(folder());
 });

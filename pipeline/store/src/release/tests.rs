@@ -130,6 +130,46 @@ fn rebuilt(dest: &Path, manifest: &str) -> PathBuf {
     dest.to_owned()
 }
 
+/// The files one by one and the rest are the manifest that is read at once; what that refuses is refused.
+#[test]
+fn prop_a_manifest_read_piece_by_piece_is_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    let release = sealed(&dest);
+    let mut artifacts = Vec::new();
+    let rest = for_each_artifact(&dest, |artifact| artifacts.push(artifact)).unwrap();
+    assert_eq!(&Manifest { artifacts, ..rest }, release.manifest());
+    let text = fs::read_to_string(dest.join(MANIFEST)).unwrap();
+    for (from, to) in [
+        ("\"program\": \"sastrugi\"", "\"program\": \"other\""),
+        ("\"format\": 1", "\"format\": 2"),
+        ("README.md", "../README.md"),
+        ("\"artifacts\": [", "\"artifacts\": {"),
+    ] {
+        assert!(text.contains(from), "{from}");
+        fs::write(dest.join(MANIFEST), text.replace(from, to)).unwrap();
+        let refused = for_each_artifact(&dest, drop).map(drop);
+        assert!(matches!(refused, Err(ReleaseError::NotARelease { .. })), "{to}: {refused:?}");
+        assert!(Release::open(&dest).is_err(), "{to}");
+    }
+}
+
+/// A file that is added from the same file system is not copied, and has its own hash.
+#[test]
+fn val_added_files_have_their_hashes() {
+    let folder = tempfile::tempdir().unwrap();
+    let source = folder.path().join("made.bin");
+    fs::write(&source, b"made").unwrap();
+    let mut builder = ReleaseBuilder::beside(&folder.path().join("release"), head()).unwrap();
+    let incoming = |path: &str| Incoming { path: path.to_owned(), source: source.clone(), origin: Origin::default() };
+    let sums = builder.add_files(vec![incoming("a/made.bin"), incoming("b/made.bin")]).unwrap();
+    assert_eq!(sums, [digest::of_bytes(b"made"), digest::of_bytes(b"made")]);
+    assert!(builder.add_files(vec![incoming("a/made.bin")]).is_err());
+    builder.seal(&folder.path().join("release")).unwrap();
+    assert_eq!(verify(&folder.path().join("release")).unwrap().problems, vec![]);
+    assert_eq!(fs::read(&source).unwrap(), b"made");
+}
+
 #[test]
 fn val_missing_extra_and_truncated_files_are_named() {
     let folder = tempfile::tempdir().unwrap();
