@@ -186,7 +186,8 @@ mod tests {
         let mut builder = ReleaseBuilder::beside(&dest, head).unwrap();
         builder.write_text("README.md", text, Origin::default()).unwrap();
         builder.write_text("dem/a.asc", "ncols 1", Origin::default()).unwrap();
-        builder.seal(&dest).unwrap()
+        builder.seal(&dest).unwrap();
+        Release::open(&dest).unwrap()
     }
 
     /// What is uploaded is downloaded and verifies; uploading it again changes nothing; another release is refused.

@@ -131,7 +131,7 @@ pub fn run_sharing(
                 failures: &execution.failures,
                 replace: request.replace,
             };
-            assemble(&contents, request.output, progress)?.manifest().notes.clone()
+            assemble(&contents, request.output, progress)?
         }
     };
     cache.drop_orphans(graph)?;
@@ -350,7 +350,7 @@ pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Pr
         failures: &joined.failures,
         replace,
     };
-    let notes = assemble(&contents, output, progress)?.manifest().notes.clone();
+    let notes = assemble(&contents, output, progress)?;
     let (failures, failed_in) = (joined.failures, joined.failed_in);
     Ok(RunSummary { output: output.to_owned(), items, computed: 0, failures, notes, failed_in, cache: None })
 }

@@ -1,6 +1,7 @@
 //! The release folder: assembled in a temporary folder, sealed with a manifest and checksums, published by one rename, and verified.
 
 mod builder;
+mod listed;
 mod manifest;
 mod pack;
 mod verify;
@@ -10,6 +11,7 @@ mod tests;
 
 pub(crate) use builder::sync_tree;
 pub use builder::{Head, Incoming, PartWriter, ReleaseBuilder, Staging, TablePart, beside};
+pub use listed::Listed;
 pub use manifest::for_each_artifact;
 pub use pack::{Packed, pack};
 pub use verify::{Problem, ProblemKind, VerifyReport, verify};

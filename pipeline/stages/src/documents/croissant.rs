@@ -10,9 +10,10 @@ use super::described::{Described, Maker, ORGANIZATION, add_terms, citation_line,
 use super::spdx_list;
 use crate::jobs::{exports, original};
 use crate::splits::PARTS;
-use sastrugi_schemas::manifest::{Artifact, Source};
+use sastrugi_schemas::manifest::Source;
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::tables::{self, Column, ColumnType, Table};
+use sastrugi_store::release::Listed;
 use serde_json::{Value, json};
 
 /// Record set of the splits, and the column that names a split.
@@ -173,9 +174,9 @@ fn work(source: &Source) -> Value {
 fn distribution(described: &Described<'_>) -> Vec<Value> {
     let few = |table: &&&'static Table| described.parts(table.name).count() <= DESCRIBED_FILES;
     let parts = |table: &&'static Table| described.parts(table.name);
-    let given = described.artifacts.iter().filter(|a| original::only_copies(&a.origin.stage));
-    let mut files: Vec<Value> = given.map(|artifact| file_object(artifact, media_of(&artifact.path))).collect();
-    files.extend(tables::ALL.iter().filter(few).flat_map(parts).map(|artifact| file_object(artifact, PARQUET)));
+    let given = described.files.iter().filter(|file| original::only_copies(&file.origin().stage));
+    let mut files: Vec<Value> = given.map(|file| file_object(file, media_of(file.path()))).collect();
+    files.extend(tables::ALL.iter().filter(few).flat_map(parts).map(|file| file_object(file, PARQUET)));
     let several = tables::ALL.iter().filter(|table| is_set(table, described));
     files.extend(several.map(|table| {
         let includes = format!("tables/{}/*.parquet", table.name);
@@ -183,7 +184,7 @@ fn distribution(described: &Described<'_>) -> Vec<Value> {
     }));
     let there = |folder: &str, ending: &str| {
         let folder = format!("{folder}/");
-        described.artifacts.iter().any(|a| a.path.starts_with(&folder) && a.path.ends_with(ending))
+        described.files.iter().any(|file| file.path().starts_with(&folder) && file.path().ends_with(ending))
     };
     let maps: Vec<String> = described.maps().map(map_files).collect();
     for (id, folder, ending, media, what) in SETS.into_iter().filter(|(_, folder, ending, ..)| there(folder, ending)) {
@@ -218,15 +219,15 @@ fn media_of(path: &str) -> &'static str {
     }
 }
 
-fn file_object(artifact: &Artifact, media: &str) -> Value {
+fn file_object(file: &Listed, media: &str) -> Value {
     json!({
         "@type": "cr:FileObject",
-        "@id": artifact.path,
-        "name": artifact.path,
-        "contentUrl": artifact.path,
-        "contentSize": format!("{} B", artifact.bytes),
+        "@id": file.path(),
+        "name": file.path(),
+        "contentUrl": file.path(),
+        "contentSize": format!("{} B", file.bytes()),
         "encodingFormat": media,
-        "sha256": artifact.sha256,
+        "sha256": file.sha256(),
     })
 }
 
@@ -262,7 +263,7 @@ fn set_id(table: &Table) -> String {
 fn record_set(table: &Table, described: &Described<'_>) -> Option<Value> {
     let first = described.parts(table.name).next()?;
     let source = match is_set(table, described) {
-        false => json!({ "fileObject": { "@id": first.path } }),
+        false => json!({ "fileObject": { "@id": first.path() } }),
         true => json!({ "fileSet": { "@id": set_id(table) } }),
     };
     let keys = table.columns.iter().filter(|column| column.key);

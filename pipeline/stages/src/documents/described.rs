@@ -3,9 +3,10 @@
 use super::spdx_list;
 use crate::runner::execute::Failure;
 use crate::splits::{self, OTHER, PARTS, Splits};
-use sastrugi_schemas::manifest::{Artifact, Source};
+use sastrugi_schemas::manifest::Source;
 use sastrugi_schemas::study::{Creator, StudyHead};
 use sastrugi_schemas::tables::{self, Table};
+use sastrugi_store::release::Listed;
 use sastrugi_terrain::{MAPS, MapKind};
 use serde_json::Value;
 
@@ -75,7 +76,7 @@ pub struct Described<'a> {
     /// Measured data.
     pub sources: &'a [Source],
     /// Files of the release, sorted by path, except documents, report, manifest and checksums.
-    pub artifacts: &'a [Artifact],
+    pub files: &'a [Listed],
     /// Split (training, validation or test) of each terrain.
     pub splits: &'a Splits,
     /// Items without a result.
@@ -85,20 +86,20 @@ pub struct Described<'a> {
 impl<'a> Described<'a> {
     /// Kinds of maps in the release.
     pub fn maps(&self) -> impl Iterator<Item = MapKind> {
-        MAPS.into_iter().filter(|map| self.artifacts.iter().any(|artifact| is_map(&artifact.path, map.name)))
+        MAPS.into_iter().filter(|map| self.files.iter().any(|file| is_map(file.path(), map.name)))
     }
 
     /// Files of a table, in order.
-    pub fn parts(&self, table: &str) -> impl Iterator<Item = &'a Artifact> {
+    pub fn parts(&self, table: &str) -> impl Iterator<Item = &'a Listed> {
         let folder = format!("tables/{table}/");
-        self.artifacts.iter().filter(move |artifact| artifact.path.starts_with(&folder))
+        self.files.iter().filter(move |file| file.path().starts_with(&folder))
     }
 
     /// Paths of a table's files by split, files of rows without a split last; empty if the files are not divided by split.
     pub fn by_part(&self, table: &Table) -> Vec<(&'static str, Vec<&'a str>)> {
         let part = |path: &str| splits::of_file(table, part_name(path)?, self.splits);
         let of = |wanted: &'static str| {
-            let paths = self.parts(table.name).map(|artifact| artifact.path.as_str());
+            let paths = self.parts(table.name).map(Listed::path);
             (wanted, paths.filter(|path| part(path) == Some(wanted)).collect::<Vec<&'a str>>())
         };
         PARTS.into_iter().chain([OTHER]).map(of).filter(|(_, paths)| !paths.is_empty()).collect()
@@ -125,7 +126,7 @@ impl<'a> Described<'a> {
 
     /// Whether the release has files in that folder; the report is written after the documents.
     pub fn has(&self, folder: &str) -> bool {
-        folder == "report/" || self.artifacts.iter().any(|artifact| artifact.path.starts_with(folder))
+        folder == "report/" || self.files.iter().any(|file| file.path().starts_with(folder))
     }
 }
 

@@ -7,8 +7,9 @@ use super::described::{Described, FOLDERS, Maker, ORGANIZATION, add_terms, citat
 use super::spdx_list;
 use crate::job::ItemRef;
 use crate::jobs::original;
-use sastrugi_schemas::manifest::{Artifact, PROGRAM as PROGRAM_NAME, Source};
+use sastrugi_schemas::manifest::{PROGRAM as PROGRAM_NAME, Source};
 use sastrugi_schemas::tables;
+use sastrugi_store::release::Listed;
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -178,19 +179,20 @@ struct Stages {
 impl Stages {
     fn of(described: &Described<'_>) -> Self {
         let mut stages = Self::default();
-        let released = || described.artifacts.iter().filter(|a| !a.origin.stage.is_empty());
+        let released = || described.files.iter().filter(|file| !file.origin().stage.is_empty());
         let mut of_item: BTreeMap<String, BTreeSet<String>> = BTreeMap::new();
-        for artifact in released().filter(|a| !a.origin.item.is_empty()) {
-            let item = ItemRef::new(&artifact.origin.stage, &artifact.origin.item).to_string();
-            of_item.entry(item).or_default().insert(entity(artifact));
+        for file in released().filter(|file| !file.origin().item.is_empty()) {
+            let item = ItemRef::new(&file.origin().stage, &file.origin().item).to_string();
+            of_item.entry(item).or_default().insert(entity(file));
         }
-        let (given, derived): (Vec<_>, Vec<_>) = released().partition(|a| original::only_copies(&a.origin.stage));
+        let (given, derived): (Vec<_>, Vec<_>) =
+            released().partition(|file| original::only_copies(&file.origin().stage));
         stages.given = given.into_iter().map(entity).collect();
-        for artifact in derived {
-            let stage = &artifact.origin.stage;
-            stages.made.entry(stage.clone()).or_default().insert(entity(artifact));
+        for file in derived {
+            let stage = &file.origin().stage;
+            stages.made.entry(stage.clone()).or_default().insert(entity(file));
             let used = stages.used.entry(stage.clone()).or_insert_with(|| BTreeSet::from([STUDY.to_owned()]));
-            used.extend(artifact.origin.parents.iter().filter_map(|parent| of_item.get(parent)).flatten().cloned());
+            used.extend(file.origin().parents.iter().filter_map(|parent| of_item.get(parent)).flatten().cloned());
         }
         stages.share_tables();
         stages.add_report(described);
@@ -208,8 +210,8 @@ impl Stages {
 
     /// The report is derived from the study, the tables and the rasters.
     fn add_report(&mut self, described: &Described<'_>) {
-        let shown = |a: &&Artifact| a.path.starts_with("tables/") || a.path.ends_with(".tif");
-        let derived = described.artifacts.iter().filter(|a| !original::only_copies(&a.origin.stage));
+        let shown = |file: &&Listed| file.path().starts_with("tables/") || file.path().ends_with(".tif");
+        let derived = described.files.iter().filter(|file| !original::only_copies(&file.origin().stage));
         let used = derived.filter(shown).map(entity).chain([STUDY.to_owned()]).collect();
         self.used.insert("report".to_owned(), used);
         self.made.insert("report".to_owned(), BTreeSet::from(["report/".to_owned()]));
@@ -243,27 +245,27 @@ fn action_id(stage: &str) -> String {
 }
 
 /// The entity of a file: itself if it is an input, else its folder.
-fn entity(artifact: &Artifact) -> String {
-    let path = &artifact.path;
+fn entity(file: &Listed) -> String {
+    let path = file.path();
     let words: Vec<&str> = path.split('/').collect();
     match words[..] {
-        ["dem" | "mask" | "input", ..] => path.clone(),
+        ["dem" | "mask" | "input", ..] => path.to_owned(),
         ["tables", table, ..] => format!("tables/{table}/"),
         [folder, _, ..] => format!("{folder}/"),
-        _ => path.clone(),
+        _ => path.to_owned(),
     }
 }
 
 fn described_entity(id: &str, described: &Described<'_>) -> Value {
-    if let Some(artifact) = described.artifacts.iter().find(|a| a.path == id) {
+    if let Some(found) = described.files.iter().find(|file| file.path() == id) {
         let mut file = json!({
             "@id": id,
             "@type": "File",
             "name": id,
-            "contentSize": artifact.bytes.to_string(),
-            "sha256": artifact.sha256,
+            "contentSize": found.bytes().to_string(),
+            "sha256": found.sha256(),
         });
-        let sources = described.sources.iter().filter(|s| artifact.origin.sources.contains(&s.id));
+        let sources = described.sources.iter().filter(|s| found.origin().sources.contains(&s.id));
         file["isBasedOn"] = sources.map(|s| json!({ "@id": source_id(s) })).collect();
         return file;
     }

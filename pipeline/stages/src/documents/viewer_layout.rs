@@ -6,6 +6,6 @@ use sastrugi_store::mcap::VIEWER_LAYOUT;
 
 /// The text of the layout, if the release has recordings for the viewer.
 pub fn text(described: &Described<'_>) -> Option<String> {
-    let recorded = || described.artifacts.iter().any(|artifact| artifact.path.ends_with(".mcap"));
+    let recorded = || described.files.iter().any(|file| file.path().ends_with(".mcap"));
     (described.head.mcap == McapFlavour::Viewer && recorded()).then(|| VIEWER_LAYOUT.to_owned())
 }

@@ -16,7 +16,7 @@ use crate::job::ItemRef;
 use crate::splits::Splits;
 use crate::study::Study;
 use sastrugi_schemas::manifest::{Artifact, FailedItem, ItemNote, Origin};
-use sastrugi_store::release::{self, Head, Incoming, Release, ReleaseBuilder};
+use sastrugi_store::release::{self, Head, Incoming, ReleaseBuilder, for_each_artifact};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -36,11 +36,11 @@ pub struct Contents<'a> {
     pub replace: bool,
 }
 
-/// Assembles and seals a release.
+/// Assembles and seals a release, and returns its notes.
 ///
 /// # Errors
 /// A destination that is not a sastrugi release, is one of another study, or has fewer failed items of the same study, results that cannot be read, or an I/O error.
-pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Release, Error> {
+pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Vec<ItemNote>, Error> {
     let mut sources = Sources::of(contents.study)?;
     let _lock = DestinationLock::take(dest)?;
     contents.check_replaced(dest)?;
@@ -60,7 +60,7 @@ pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -
     progress.phase("writing the report");
     add_report(&mut builder, progress)?;
     progress.phase("writing checksums");
-    builder.seal(dest).map_err(Error::from)
+    Ok(builder.seal(dest)?.notes)
 }
 
 /// Ensures that only one process writes to a destination. The lock file next to it is removed when the writer ends; the operating system
@@ -98,9 +98,9 @@ impl Contents<'_> {
     /// Refuses to replace a release of another study, or one of the same study by one with more failed items.
     fn check_replaced(&self, dest: &Path) -> Result<(), Error> {
         check_other_study(self.study, dest, self.replace)?;
-        let Ok(there) = Release::open(dest) else { return Ok(()) };
-        let (before, now) = (there.manifest().failed.len(), self.failures.len());
-        let same = there.manifest().study_sha256 == sastrugi_store::digest::of_text(self.text);
+        let Ok(there) = for_each_artifact(dest, drop) else { return Ok(()) };
+        let (before, now) = (there.failed.len(), self.failures.len());
+        let same = there.study_sha256 == sastrugi_store::digest::of_text(self.text);
         match same && before < now && !self.replace {
             true => Err(fewer_items(dest, before, now)),
             false => Ok(()),
@@ -218,8 +218,8 @@ fn add_artifacts(builder: &mut ReleaseBuilder, record: &Record, folder: &Path, s
 
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {
     let (head, failures) = (&contents.study.head, contents.failures);
-    let (splits, artifacts) = (contents.splits, builder.artifacts());
-    let described = Described { head, sources: &sources.list, artifacts, splits, failures };
+    let (splits, files) = (contents.splits, builder.files());
+    let described = Described { head, sources: &sources.list, files, splits, failures };
     let study = ("study.toml", contents.text.to_owned());
     for (path, text) in [study].into_iter().chain(documents::all(&described)) {
         builder.write_text(path, &text, Origin::default())?;

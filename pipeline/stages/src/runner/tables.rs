@@ -304,7 +304,8 @@ mod tests {
             let dest = self.folder.path().join("release");
             let mut builder = ReleaseBuilder::beside(&dest, head)?;
             std::mem::take(&mut self.fragments).write(&mut builder, splits)?;
-            Ok(builder.seal(&dest)?)
+            builder.seal(&dest)?;
+            Ok(Release::open(&dest)?)
         }
     }
 

@@ -1,18 +1,19 @@
 //! Assembly of a release in a temporary folder, and sealing.
 
-use super::{MANIFEST, Release, ReleaseError, SUMS, TABLES, check_path};
-use crate::atomic::{self, DraftFile, sync_folder};
+use super::listed::{Listed, Listing};
+use super::{MANIFEST, ReleaseError, SUMS, TABLES, check_path, for_each_artifact};
+use crate::atomic::{self, AtomicFile, DraftFile, sync_folder};
 use crate::digest::{self, Hashed};
 use crate::parquet::{TableMetadata, TableWriter};
 use rayon::prelude::*;
-use sastrugi_schemas::manifest::{Artifact, FORMAT, FailedItem, ItemNote, Manifest, Origin, PROGRAM, Source};
+use sastrugi_schemas::manifest::{FORMAT, FailedItem, ItemNote, Manifest, Origin, PROGRAM, Source};
 use sastrugi_schemas::{Cell, Table};
 use std::collections::BTreeSet;
 use std::ffi::OsString;
-use std::fmt::Write as _;
 use std::fs::{self, File};
-use std::io::{BufWriter, ErrorKind, Write as _};
+use std::io::{self, BufWriter, ErrorKind, Write};
 use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// Identity of a release.
 #[derive(Clone, Debug, PartialEq, Eq)]
@@ -46,8 +47,24 @@ impl Head {
 pub struct ReleaseBuilder {
     staging: Staging,
     metadata: TableMetadata,
+    /// The manifest without its files.
     manifest: Manifest,
-    paths: BTreeSet<String>,
+    files: Vec<Listed>,
+    /// Paths of the files, listed or to be listed.
+    paths: BTreeSet<Arc<str>>,
+}
+
+/// A path that is reserved for a file of the release, and its location in the folder under construction.
+struct Claimed {
+    path: Arc<str>,
+    target: PathBuf,
+}
+
+/// A file of a table, as it was written.
+struct Written {
+    bytes: u64,
+    sha256: String,
+    origin: Origin,
 }
 
 /// One file of a table.
@@ -134,7 +151,7 @@ impl ReleaseBuilder {
             failed: vec![],
             notes: vec![],
         };
-        Ok(Self { staging, metadata, manifest, paths: BTreeSet::new() })
+        Ok(Self { staging, metadata, manifest, files: Vec::new(), paths: BTreeSet::new() })
     }
 
     /// The folder under construction.
@@ -143,9 +160,13 @@ impl ReleaseBuilder {
     }
 
     /// The files listed so far, by path.
-    pub fn artifacts(&mut self) -> &[Artifact] {
-        self.manifest.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
-        &self.manifest.artifacts
+    pub fn files(&mut self) -> &[Listed] {
+        self.sort_files();
+        &self.files
+    }
+
+    fn sort_files(&mut self) {
+        self.files.sort_by(|a, b| a.path().cmp(b.path()));
     }
 
     /// Adds files to the release, several at a time; returns their SHA-256 in the same order. On the file system of the release they get a
@@ -154,19 +175,15 @@ impl ReleaseBuilder {
     /// # Errors
     /// A path is not allowed, or a file cannot be read or written.
     pub fn add_files(&mut self, files: Vec<Incoming>) -> Result<Vec<String>, ReleaseError> {
-        let targets = files.iter().map(|file| self.claim(&file.path)).collect::<Result<Vec<PathBuf>, _>>()?;
-        let copied: Result<Vec<(u64, String)>, ReleaseError> =
-            files.par_iter().zip(&targets).map(|(file, target)| place(&file.source, target)).collect();
-        let list = |(file, (bytes, sha256)): (Incoming, (u64, String))| {
-            self.manifest.artifacts.push(Artifact {
-                path: file.path,
-                bytes,
-                sha256: sha256.clone(),
-                origin: file.origin,
-            });
-            sha256
-        };
-        Ok(files.into_iter().zip(copied?).map(list).collect())
+        let claimed = files.iter().map(|file| self.claim(&file.path)).collect::<Result<Vec<Claimed>, _>>()?;
+        let placed: Result<Vec<(u64, String)>, ReleaseError> =
+            files.par_iter().zip(&claimed).map(|(file, claimed)| place(&file.source, &claimed.target)).collect();
+        let mut sums = Vec::new();
+        for ((file, claimed), (bytes, sha256)) in files.into_iter().zip(claimed).zip(placed?) {
+            self.list(claimed, bytes, &sha256, file.origin);
+            sums.push(sha256);
+        }
+        Ok(sums)
     }
 
     /// Writes a text file into the release.
@@ -174,10 +191,9 @@ impl ReleaseBuilder {
     /// # Errors
     /// As [`ReleaseBuilder::add_files`].
     pub fn write_text(&mut self, path: &str, text: &str, origin: Origin) -> Result<(), ReleaseError> {
-        let target = self.target(path)?;
-        write(&target, text)?;
-        let (bytes, sha256) = (text.len() as u64, digest::of_text(text));
-        self.list(Artifact { path: path.to_owned(), bytes, sha256, origin });
+        let claimed = self.claim(path)?;
+        write(&claimed.target, text)?;
+        self.list(claimed, text.len() as u64, &digest::of_text(text), origin);
         Ok(())
     }
 
@@ -186,10 +202,11 @@ impl ReleaseBuilder {
     /// # Errors
     /// As [`ReleaseBuilder::add_files`].
     pub fn adopt(&mut self, path: &str, origin: Origin) -> Result<(), ReleaseError> {
-        let target = self.target(path)?;
-        let (bytes, sha256) = digest::of_file(&target).map_err(ReleaseError::io(&target))?;
-        File::open(&target).and_then(|file| file.sync_all()).map_err(ReleaseError::io(&target))?;
-        self.list(Artifact { path: path.to_owned(), bytes, sha256, origin });
+        let claimed = self.claim(path)?;
+        let target = &claimed.target;
+        let (bytes, sha256) = digest::of_file(target).map_err(ReleaseError::io(target))?;
+        File::open(target).and_then(|file| file.sync_all()).map_err(ReleaseError::io(target))?;
+        self.list(claimed, bytes, &sha256, origin);
         Ok(())
     }
 
@@ -203,9 +220,9 @@ impl ReleaseBuilder {
         parts: Vec<TablePart>,
         fill: impl Fn(&TablePart, &mut PartWriter<'_>) -> Result<(), E> + Sync,
     ) -> Result<(), E> {
-        let targets = parts.iter().map(|part| self.claim(&part.path())).collect::<Result<Vec<PathBuf>, _>>()?;
+        let claimed = parts.iter().map(|part| self.claim(&part.path())).collect::<Result<Vec<Claimed>, _>>()?;
         let metadata = &self.metadata;
-        let write = |(part, target): (&TablePart, &PathBuf)| {
+        let write = |(part, Claimed { target, .. }): (&TablePart, &Claimed)| {
             let mut rows = PartWriter { table: part.table, target, metadata, writer: None };
             fill(part, &mut rows)?;
             let Some(writer) = rows.writer else { return Ok(None) };
@@ -213,10 +230,14 @@ impl ReleaseBuilder {
             let (bytes, sha256) = digest::of_file(target).map_err(ReleaseError::io(target))?;
             let content_sha256 = Some(summary.content_sha256);
             let origin = Origin { content_sha256, records: Some(summary.rows), ..part.origin.clone() };
-            Ok(Some(Artifact { path: part.path(), bytes, sha256, origin }))
+            Ok(Some(Written { bytes, sha256, origin }))
         };
-        let written: Result<Vec<Option<Artifact>>, E> = parts.par_iter().zip(&targets).map(write).collect();
-        self.manifest.artifacts.extend(written?.into_iter().flatten());
+        let written: Result<Vec<Option<Written>>, E> = parts.par_iter().zip(&claimed).map(write).collect();
+        for (claimed, written) in claimed.into_iter().zip(written?) {
+            if let Some(Written { bytes, sha256, origin }) = written {
+                self.list(claimed, bytes, &sha256, origin);
+            }
+        }
         Ok(())
     }
 
@@ -235,16 +256,23 @@ impl ReleaseBuilder {
         self.manifest.notes.push(note);
     }
 
-    fn list(&mut self, artifact: Artifact) {
-        self.paths.insert(artifact.path.clone());
-        self.manifest.artifacts.push(artifact);
+    fn list(&mut self, claimed: Claimed, bytes: u64, sha256: &str, origin: Origin) {
+        let listed = Listed::new(claimed.path, bytes, sha256, origin, self.files.last());
+        self.files.push(listed);
     }
 
-    /// Reserves the path of a file that is listed later.
-    fn claim(&mut self, path: &str) -> Result<PathBuf, ReleaseError> {
-        let target = self.target(path)?;
-        self.paths.insert(path.to_owned());
-        Ok(target)
+    /// Reserves the path of a file that is listed later; creates its folder.
+    fn claim(&mut self, path: &str) -> Result<Claimed, ReleaseError> {
+        check_path(path)?;
+        let path: Arc<str> = path.into();
+        if !self.paths.insert(Arc::clone(&path)) {
+            return Err(ReleaseError::Path { path: path.to_string(), reason: "it is already listed" });
+        }
+        let target = self.staging().join(&*path);
+        if let Some(folder) = target.parent() {
+            fs::create_dir_all(folder).map_err(ReleaseError::io(folder))?;
+        }
+        Ok(Claimed { path, target })
     }
 
     /// Writes the manifest so far, for readers of the folder under construction (the report); sealing rewrites it.
@@ -257,12 +285,12 @@ impl ReleaseBuilder {
 
     /// Sorts and writes the manifest, and returns its SHA-256.
     fn write_manifest(&mut self) -> Result<String, ReleaseError> {
-        self.manifest.artifacts.sort_by(|a, b| a.path.cmp(&b.path));
+        self.sort_files();
         self.manifest.failed.sort_by(|a, b| (&a.stage, &a.item).cmp(&(&b.stage, &b.item)));
         let path = self.staging().join(MANIFEST);
         let file = File::create(&path).map_err(ReleaseError::io(&path))?;
         let mut writer = BufWriter::new(Hashed::new(file));
-        serde_json::to_writer_pretty(&mut writer, &self.manifest)?;
+        serde_json::to_writer_pretty(&mut writer, &Listing { manifest: &self.manifest, files: &self.files })?;
         writeln!(writer).map_err(ReleaseError::io(&path))?;
         let written = writer.into_inner().map_err(|e| ReleaseError::io(&path)(e.into_error()))?;
         let (file, _, sha256) = written.finish();
@@ -270,47 +298,47 @@ impl ReleaseBuilder {
         Ok(sha256)
     }
 
-    /// Location of a file of the release; creates its folder.
-    fn target(&self, path: &str) -> Result<PathBuf, ReleaseError> {
-        check_path(path)?;
-        if self.paths.contains(path) {
-            return Err(ReleaseError::Path { path: path.to_owned(), reason: "it is already listed" });
-        }
-        let target = self.staging().join(path);
-        if let Some(folder) = target.parent() {
-            fs::create_dir_all(folder).map_err(ReleaseError::io(folder))?;
-        }
-        Ok(target)
-    }
-
     /// Writes manifest and checksums, syncs the folders to disk (each file was synced when it was added) and gives the release its name. An
-    /// existing release is replaced.
+    /// existing release is replaced. Returns the manifest without its list of files.
     ///
     /// # Errors
     /// [`ReleaseError::Occupied`] if `dest` holds files that are not a release; the file system failed.
-    pub fn seal(mut self, dest: &Path) -> Result<Release, ReleaseError> {
+    pub fn seal(mut self, dest: &Path) -> Result<Manifest, ReleaseError> {
         check_dest(dest)?;
         remove_empty_folders(self.staging())?;
         let sha256 = self.write_manifest()?;
-        let path = self.staging().join(SUMS);
-        write(&path, &sums(&self.manifest, &sha256))?;
+        self.write_sums(&sha256)?;
         sync_folders(self.staging())?;
         self.staging.put_in_place(dest)?;
-        Ok(Release { folder: dest.to_owned(), manifest: self.manifest })
+        Ok(self.manifest)
+    }
+
+    /// Writes the checksums of the files, which are sorted, and of the manifest.
+    fn write_sums(&self, manifest_sha256: &str) -> Result<(), ReleaseError> {
+        let path = self.staging().join(SUMS);
+        let files = self.files.iter().map(|file| (file.path(), file.sha256()));
+        let written = AtomicFile::create(&DraftFile::at(&path)).and_then(|mut out| {
+            write_sums(&mut out, files, manifest_sha256)?;
+            out.commit()
+        });
+        written.map_err(ReleaseError::io(&path))
     }
 }
 
-/// The text of `SHA256SUMS`: every file of the manifest and the manifest itself, by path.
-pub(super) fn sums(manifest: &Manifest, manifest_sha256: &str) -> String {
-    let mut lines: Vec<(&str, &str)> =
-        manifest.artifacts.iter().map(|a| (a.path.as_str(), a.sha256.as_str())).collect();
-    lines.push((MANIFEST, manifest_sha256));
-    lines.sort_unstable();
-    lines.iter().fold(String::new(), |mut text, (path, sha256)| {
-        // Writing to a string cannot fail.
-        let _ = writeln!(text, "{sha256}  {path}");
-        text
-    })
+/// Writes the lines of `SHA256SUMS`: every file, which come sorted by path, and the manifest in its place among them.
+pub(super) fn write_sums<'a>(
+    out: &mut impl Write,
+    files: impl Iterator<Item = (&'a str, &'a str)>,
+    manifest_sha256: &str,
+) -> io::Result<()> {
+    let mut manifest = Some((MANIFEST, manifest_sha256));
+    for (path, sha256) in files {
+        if let Some((name, own)) = manifest.take_if(|(name, _)| *name < path) {
+            writeln!(out, "{own}  {name}")?;
+        }
+        writeln!(out, "{sha256}  {path}")?;
+    }
+    manifest.into_iter().try_for_each(|(name, own)| writeln!(out, "{own}  {name}"))
 }
 
 /// Refuses a destination that holds files that are not a release.
@@ -318,9 +346,9 @@ fn check_dest(dest: &Path) -> Result<(), ReleaseError> {
     let occupied = || ReleaseError::Occupied { path: dest.to_owned() };
     match fs::read_dir(dest).map(|mut entries| entries.next().is_none()) {
         Ok(true) => Ok(()),
-        Ok(false) => Release::open(dest).map(drop).map_err(|_| occupied()),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => Ok(()),
-        Err(e) if e.kind() == std::io::ErrorKind::NotADirectory => Err(occupied()),
+        Ok(false) => for_each_artifact(dest, drop).map(drop).map_err(|_| occupied()),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(()),
+        Err(e) if e.kind() == ErrorKind::NotADirectory => Err(occupied()),
         Err(e) => Err(ReleaseError::io(dest)(e)),
     }
 }
@@ -334,7 +362,7 @@ pub fn beside(dest: &Path, role: &str) -> PathBuf {
 
 fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
     match fs::remove_dir_all(folder) {
-        Err(e) if e.kind() != std::io::ErrorKind::NotFound => Err(ReleaseError::io(folder)(e)),
+        Err(e) if e.kind() != ErrorKind::NotFound => Err(ReleaseError::io(folder)(e)),
         _ => Ok(()),
     }
 }

@@ -35,7 +35,8 @@ fn sealed(dest: &Path) -> Release {
         rows.iter().try_for_each(|row| writer.push(row.cells()))
     };
     builder.write_tables(vec![single(&PsdRow::TABLE), single(&CovarianceRow::TABLE)], fill).unwrap();
-    builder.seal(dest).unwrap()
+    builder.seal(dest).unwrap();
+    Release::open(dest).unwrap()
 }
 
 #[test]

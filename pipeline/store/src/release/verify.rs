@@ -1,6 +1,6 @@
 //! Verification of a release against its own checksums, manifest and table descriptions.
 
-use super::builder::sums;
+use super::builder::write_sums;
 use super::{MANIFEST, ReleaseError, SUMS, check_path, parse_manifest, table_of};
 use crate::digest;
 use crate::parquet::check_table;
@@ -121,7 +121,7 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
         _ => true,
     });
     if let (Some(manifest), Some(bytes), Some(text)) = (&manifest, &manifest_text, &sums_text)
-        && sums(manifest, &digest::of_bytes(bytes)).as_bytes() != text
+        && sums_of(manifest, &digest::of_bytes(bytes)).ok().as_ref() != Some(text)
     {
         problem(SUMS, ProblemKind::Inconsistent, format!("does not match {MANIFEST} line by line"));
     }
@@ -148,6 +148,16 @@ fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, ReleaseError> {
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
         Err(e) => Err(ReleaseError::io(path)(e)),
     }
+}
+
+/// The bytes of `SHA256SUMS` for a manifest.
+fn sums_of(manifest: &Manifest, manifest_sha256: &str) -> io::Result<Vec<u8>> {
+    let files = manifest.artifacts.iter().map(|artifact| (artifact.path.as_str(), artifact.sha256.as_str()));
+    let mut files: Vec<(&str, &str)> = files.collect();
+    files.sort_unstable();
+    let mut text = Vec::new();
+    write_sums(&mut text, files.into_iter(), manifest_sha256)?;
+    Ok(text)
 }
 
 /// Hash by path; malformed lines are left to the comparison with the manifest.
