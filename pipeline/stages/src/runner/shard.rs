@@ -13,11 +13,13 @@ use crate::loaded::Loaded;
 use crate::splits::Splits;
 use crate::studies::head_of;
 use crate::study::Study;
+use sastrugi_store::atomic::{self, AtomicFile};
+use sastrugi_store::digest;
 use sastrugi_store::release::{Staging, check_path};
-use sastrugi_store::{atomic, digest};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::fs;
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
 
 const DESCRIPTION: &str = sastrugi_store::release::SHARD;
@@ -137,15 +139,20 @@ pub fn write(
     if let Some(before) = replaced.filter(|before| !replace && before.holds_more_than(&description)) {
         return Err(fewer_items(target, before.failures.len(), description.failures.len()));
     }
-    let text = serde_json::to_vec_pretty(&description).map_err(Error::failed)?;
-    for (name, bytes) in [(STUDY, study.as_bytes()), (DESCRIPTION, &text)] {
-        let path = staging.path().join(name);
-        atomic::write(&path, bytes).map_err(|e| Error::at(&path, e))?;
-    }
+    let [of_study, of_description] = [STUDY, DESCRIPTION].map(|name| staging.path().join(name));
+    atomic::write(&of_study, study.as_bytes()).map_err(|e| Error::at(&of_study, e))?;
+    description.write(&of_description).map_err(|e| Error::at(&of_description, e))?;
     staging.put_in_place(target).map_err(Error::from)
 }
 
 impl Description {
+    /// Writes the description piece by piece: it lists all items of the study.
+    fn write(&self, path: &Path) -> io::Result<()> {
+        let mut file = AtomicFile::create(path)?;
+        serde_json::to_writer_pretty(&mut file, self)?;
+        file.commit()
+    }
+
     /// Checks that the part is valid and that all items stay inside the folder.
     fn check(&self) -> Result<(), String> {
         let Part { index, count } = self.part;
@@ -240,15 +247,18 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     if !problems.is_empty() {
         return Err(Error::Input(problems.join("; ")));
     }
-    let Some((folder, first)) = shards.first() else { return Err(Error::Usage("no shards given".to_owned())) };
+    let Some(Placed { folder, shard: first, .. }) = shards.first() else {
+        return Err(Error::Usage("no shards given".to_owned()));
+    };
     let study = sastrugi_store::file::read_text(&folder.join(STUDY))
         .map_err(|e| Error::Input(format!("{}: {e}", folder.display())))?;
     if sastrugi_store::digest::of_text(&study) != first.study_sha256 {
         return Err(Error::Input(format!("{}: study.toml was changed after the shard was written", folder.display())));
     }
     let failures: BTreeMap<ItemRef, Failure> =
-        shards.iter().flat_map(|(_, s)| &s.failures).map(|f| (f.item.clone(), f.clone())).collect();
-    let failed_in = shards.iter().flat_map(|(_, s)| s.failures.iter().map(|f| (f.item.to_string(), s.part.index)));
+        shards.iter().flat_map(|p| &p.shard.failures).map(|f| (f.item.clone(), f.clone())).collect();
+    let failed_in = shards.iter().map(|p| &p.shard);
+    let failed_in = failed_in.flat_map(|s| s.failures.iter().map(|f| (f.item.to_string(), s.part.index)));
     Ok(Joined {
         study,
         results: results(&shards, &failures)?,
@@ -259,24 +269,39 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
 }
 
 /// A shard and its folder.
-type Placed<'a> = (&'a PathBuf, Description);
+struct Placed<'a> {
+    folder: &'a PathBuf,
+    /// Its description. Shards of one study list the same items, so only the first one keeps them.
+    shard: Description,
+    /// Whether it lists the items of the first one.
+    has_same_items: bool,
+}
 
 /// The shards, and why other folders are not shards.
 fn read_all(folders: &[PathBuf]) -> (Vec<Placed<'_>>, Vec<String>) {
     let (mut shards, mut problems) = (Vec::new(), Vec::new());
     for folder in folders {
         match read(folder) {
-            Ok(description) => shards.push((folder, description)),
+            Ok(shard) => place(&mut shards, folder, shard),
             Err(e) => problems.push(e.to_string()),
         }
     }
     (shards, problems)
 }
 
+/// Adds a shard, whose items are compared with those of the first one.
+fn place<'a>(shards: &mut Vec<Placed<'a>>, folder: &'a PathBuf, mut shard: Description) {
+    let has_same_items = match shards.first() {
+        Some(first) => std::mem::take(&mut shard.items) == first.shard.items,
+        None => true,
+    };
+    shards.push(Placed { folder, shard, has_same_items });
+}
+
 /// The folders of all results, parents before children.
 fn results(shards: &[Placed<'_>], failures: &BTreeMap<ItemRef, Failure>) -> Result<Vec<PathBuf>, Error> {
-    let by_part: BTreeMap<u32, &PathBuf> = shards.iter().map(|(folder, s)| (s.part.index, *folder)).collect();
-    let Some((_, first)) = shards.first() else { return Ok(Vec::new()) };
+    let by_part: BTreeMap<u32, &PathBuf> = shards.iter().map(|p| (p.shard.part.index, p.folder)).collect();
+    let Some(Placed { shard: first, .. }) = shards.first() else { return Ok(Vec::new()) };
     let mut results = Vec::new();
     let mut missing: BTreeMap<u32, Vec<&ItemRef>> = BTreeMap::new();
     for (item, key) in &first.items {
@@ -331,22 +356,22 @@ fn is_intact(record: &Record, folder: &Path) -> bool {
 
 fn read(folder: &Path) -> Result<Description, Error> {
     let path = folder.join(DESCRIPTION);
-    let bytes = sastrugi_store::file::read(&path)
+    let file = sastrugi_store::file::open(&path)
         .map_err(|_| Error::Input(format!("{} is not a shard: it has no {DESCRIPTION}", folder.display())))?;
-    let description: Description =
-        serde_json::from_slice(&bytes).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    let description: Description = serde_json::from_reader(BufReader::with_capacity(1 << 16, file))
+        .map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
     description.check().map_err(|reason| Error::Input(format!("{}: {reason}", path.display())))?;
     Ok(description)
 }
 
 /// Why shards do not form one complete study.
 fn check_set(shards: &[Placed<'_>]) -> Vec<String> {
-    let Some((first_folder, first)) = shards.first() else { return Vec::new() };
+    let Some(Placed { folder: first_folder, shard: first, .. }) = shards.first() else { return Vec::new() };
     let mut problems = Vec::new();
     let mut seen: BTreeMap<u32, &PathBuf> = BTreeMap::new();
-    for (folder, shard) in shards {
+    for Placed { folder, shard, has_same_items } in shards {
         let name = folder.display();
-        if shard.study_sha256 != first.study_sha256 || shard.items != first.items {
+        if shard.study_sha256 != first.study_sha256 || !has_same_items {
             problems.push(format!(
                 "{name} is from another study, or another revision of the program, than {}",
                 first_folder.display()
@@ -439,7 +464,8 @@ mod tests {
     fn val_only_complete_sets_are_merged() {
         let folders = ["one", "two", "three"].map(PathBuf::from);
         let check = |shards: &[Description]| {
-            let placed: Vec<Placed<'_>> = folders.iter().zip(shards.iter().cloned()).collect();
+            let mut placed = Vec::new();
+            folders.iter().zip(shards.iter().cloned()).for_each(|(folder, shard)| place(&mut placed, folder, shard));
             check_set(&placed).join("; ")
         };
         assert_eq!(check(&[description(3, 3), description(1, 3), description(2, 3)]), "");
