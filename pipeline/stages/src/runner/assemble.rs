@@ -113,11 +113,11 @@ impl Contents<'_> {
 /// # Errors
 /// Such a destination.
 pub fn check_other_study(study: &Study, dest: &Path, replace: bool) -> Result<(), Error> {
-    match Release::open(dest) {
-        Ok(there) if there.manifest().name != study.head.name && !replace => Err(Error::Usage(format!(
+    match for_each_artifact(dest, drop) {
+        Ok(there) if there.name != study.head.name && !replace => Err(Error::Usage(format!(
             "{} is a release of the study `{}`; choose another folder with -o, or use --replace to replace it",
             dest.display(),
-            there.manifest().name
+            there.name
         ))),
         _ => Ok(()),
     }
