@@ -171,3 +171,14 @@ fn val_a_killed_report_is_complete_or_absent() {
     assert!(call.code == 2 && said.contains("diary is a file, not a folder"), "{} {said}", call.code);
     assert_eq!(fs::read_to_string(path.join("diary")).unwrap(), "mine");
 }
+
+/// A point cloud on which the decoder panics (found by fuzzing) is refused in one sentence, without the panic's message.
+#[test]
+fn val_a_panic_of_a_decoder_is_not_printed() {
+    let folder = area();
+    let seed = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/seeds/points/index_out_of_bounds.laz");
+    fs::copy(seed, folder.path().join("cloud.laz")).unwrap();
+    let call = sastrugi_in(folder.path(), &["info", "cloud.laz"]);
+    ends_with(&call, 65, "cloud.laz: is damaged: its points cannot be decoded");
+    assert_eq!(call.stderr.trim_end().lines().count(), 1, "{}", call.stderr);
+}

@@ -62,6 +62,7 @@ pub mod dem;
 pub mod digest;
 pub mod file;
 pub mod geojson;
+mod guard;
 pub mod lerobot;
 pub mod mask;
 pub mod mcap;

@@ -14,6 +14,7 @@ pub use stream::{Batches, FFI_ArrowArrayStream, FFI_ArrowSchema, TableFiles};
 use crate::PROGRAM;
 use crate::atomic::{AtomicFile, Refused, Target};
 use crate::digest::ContentHash;
+use crate::guard::unless_panicking;
 use arrow_array::builder::{BooleanBuilder, Float32Builder, Float64Builder, Int64Builder, ListBuilder, StringBuilder};
 use arrow_array::types::{ArrowPrimitiveType, Float32Type, Float64Type};
 use arrow_array::{
@@ -33,7 +34,6 @@ use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::fs::File;
 use std::io;
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
@@ -540,9 +540,9 @@ fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<Fi
 
 /// Runs the decoder, which panics on some damaged files, and turns a panic into an error.
 fn decoding<T, E: ToString>(path: &Path, decode: impl FnOnce() -> Result<T, E>) -> Result<T, TableError> {
-    match catch_unwind(AssertUnwindSafe(decode)) {
-        Ok(decoded) => decoded.map_err(|e| TableError::unusable(path, e)),
-        Err(_) => Err(TableError::unusable(path, "the file is damaged: decoding failed")),
+    match unless_panicking(decode) {
+        Some(decoded) => decoded.map_err(|e| TableError::unusable(path, e)),
+        None => Err(TableError::unusable(path, "the file is damaged: decoding failed")),
     }
 }
 

@@ -8,10 +8,10 @@ use super::header::{Compression, DeclaredSize, unreadable};
 use super::laszip;
 use crate::dem::crs::Crs;
 use crate::dem::raster::Refusal;
+use crate::guard::unless_panicking;
 use laz::LasZipError;
 use std::fs::File;
 use std::io::{BufReader, Read, Seek, SeekFrom};
-use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::path::{Path, PathBuf};
 
 /// Decoded points held at a time, bytes (one point at least).
@@ -130,10 +130,10 @@ impl Points {
 
 /// Runs the decoder, which panics on some damaged files, and turns a panic into an error.
 fn guarded<T>(decode: impl FnOnce() -> Result<T, LasZipError>) -> Result<T, Refusal> {
-    match catch_unwind(AssertUnwindSafe(decode)) {
-        Ok(Ok(decoded)) => Ok(decoded),
-        Ok(Err(LasZipError::IoError(error))) => Err(unreadable(&error)),
-        Ok(Err(error)) => Err(Refusal::new(format!("is damaged or truncated: {error}"))),
-        Err(_) => Err(Refusal::new("is damaged: its points cannot be decoded")),
+    match unless_panicking(decode) {
+        Some(Ok(decoded)) => Ok(decoded),
+        Some(Err(LasZipError::IoError(error))) => Err(unreadable(&error)),
+        Some(Err(error)) => Err(Refusal::new(format!("is damaged or truncated: {error}"))),
+        None => Err(Refusal::new("is damaged: its points cannot be decoded")),
     }
 }
