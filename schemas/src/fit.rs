@@ -1,6 +1,7 @@
 //! The fit file (JSON), written by `fit` and read by `texture`.
 
 use crate::coregistration::Minus;
+use crate::statistics::Statistics;
 use serde::{Deserialize, Deserializer, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -55,6 +56,9 @@ pub struct FitFile {
     /// Quantiles of the residual at equally spaced probabilities from 0 to 1, m.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub height_quantiles_m: Vec<f64>,
+    /// Statistics of the residual beyond its covariance, if requested.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub statistics: Option<Box<Statistics>>,
     /// The model as arguments of GSTools' classes.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub gstools: Option<GsTools>,
@@ -528,7 +532,8 @@ mod tests {
         assert_eq!(["sigma_m", "nugget_m2", SILL_OVER_RANGE].map(|name| fit.parameter(name)), [Some(0.03), None, None]);
         assert_eq!(fit.quoted("range_m"), Some(Quoted::Estimate { value: 0.28, interval: None }));
         let written = serde_json::to_value(&fit).unwrap();
-        for absent in ["intervals", "block_intervals", "map", "carried", "profile", "verdict", "settings"] {
+        for absent in ["intervals", "block_intervals", "map", "carried", "statistics", "profile", "verdict", "settings"]
+        {
             assert!(written.get(absent).is_none(), "{absent}");
         }
         assert_eq!(serde_json::from_value::<FitFile>(written).unwrap(), fit);

@@ -45,6 +45,7 @@ pub mod kind;
 pub mod log;
 pub mod manifest;
 pub mod mechanism;
+pub mod statistics;
 pub mod study;
 pub mod tables;
 pub mod topics;

@@ -90,6 +90,7 @@ pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<
         settings: serde_json::to_value(case.settings.parameters()).unwrap_or_default(),
         source: None,
         height_quantiles_m: Vec::new(),
+        statistics: None,
     }
 }
 

@@ -1,0 +1,292 @@
+//! The section `statistics` of a fit file: what methods need that reproduce more of a measured residual than its covariance.
+//!
+//! It holds statistics, never heights of cells: the DEM cannot be recovered from it. Its size does not depend on the DEM's: at most
+//! [`LAGS_MAX`] lags along each axis, 129 probabilities and 32 bands, below 1 MB as JSON.
+
+use crate::ParameterError;
+use serde::{Deserialize, Serialize};
+
+/// Version of the section.
+pub const VERSION: u32 = 1;
+/// Most lags of the covariance along one axis.
+pub const LAGS_MAX: usize = 96;
+
+/// Statistics of a residual: heights minus their moving average, m.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Statistics {
+    /// Version of this section, [`VERSION`].
+    pub version: u32,
+    /// Cells of the residual, east-west and north-south, m; textures from these statistics have the same cells.
+    pub cell_m: [f64; 2],
+    /// Cells with data.
+    pub cells: u64,
+    /// Probabilities of all quantiles below, ascending from 0 to 1.
+    pub probabilities: Vec<f64>,
+    /// Quantiles of the residual, m.
+    pub heights_m: Vec<f64>,
+    /// Covariance by lag.
+    pub covariance: LagCovariances,
+    /// The same of the Laplacian (five points, with the shorter side of a cell as the unit of length), m2: the power of waves that are too
+    /// short and weak for the covariance of the heights to hold.
+    pub laplacian: LagCovariances,
+    /// Patchiness, for the method `modulated`.
+    pub modulation: Modulation,
+    /// Increments and wavelets, for the method `wavelet_statistics`.
+    pub wavelets: Wavelets,
+}
+
+/// A covariance about zero by lag, without trimming.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct LagCovariances {
+    /// Lags southwards, cells: 0, 1, 2 ..., in steps of one cell first and wider apart further out.
+    pub rows: Vec<u32>,
+    /// Lags eastwards (and westwards), cells, likewise.
+    pub cols: Vec<u32>,
+    /// Covariance, m2, for each lag southwards (outer) and for lags from the farthest west through 0 to the farthest east (inner).
+    pub covariance_m2: Vec<f64>,
+}
+
+/// Parameters of the amplitude field of a residual that is rough in patches.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Modulation {
+    /// Variance of the logarithm of the amplitude; 0 for a residual that is equally rough everywhere.
+    pub log_variance: f64,
+    /// Distance over which the correlation of the logarithm falls to 1/e, m.
+    pub range_m: f64,
+    /// Lags of the flatness, cells.
+    pub lags: Vec<u32>,
+    /// Measured flatness `<d^4> / <d^2>^2` of the increments d over each lag, both axes together; 3 for a normal residual.
+    pub flatness: Vec<f64>,
+    /// Flatness of the fitted model.
+    pub fitted_flatness: Vec<f64>,
+}
+
+/// Distributions of differences between cells, and joint statistics of the magnitudes of wavelets.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Wavelets {
+    /// Differences between cells, with their quantiles.
+    pub differences: Vec<Difference>,
+    /// Octaves of wavelets, from the finest; each has four orientations.
+    pub octaves: u32,
+    /// Added to magnitudes before their logarithm is taken, m.
+    pub floor_m: f64,
+    /// Mean logarithm of the magnitude of each band, octave by octave; in an octave by direction of the wave vector, 0, 45, 90 and 135
+    /// degrees from east towards south.
+    pub mean_log: Vec<f64>,
+    /// Covariance of these logarithms between bands, row by row.
+    pub covariance_log: Vec<f64>,
+}
+
+/// A weighted difference between neighbouring cells and its distribution.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Difference {
+    /// `[rows south, columns east, weight]` of each cell.
+    pub stencil: Vec<(i32, i32, f64)>,
+    /// Quantiles at the section's probabilities, m.
+    pub quantiles_m: Vec<f64>,
+}
+
+impl Statistics {
+    /// Most quantiles, bands, differences and cells of a stencil that are read.
+    const COUNTS_MAX: [(&'static str, usize); 4] = [
+        ("probabilities", 1025),
+        ("wavelets.mean_log", 64),
+        ("wavelets.differences", 64),
+        ("wavelets.differences.stencil", 64),
+    ];
+
+    /// Checks a section read from a file.
+    ///
+    /// # Errors
+    /// Another version; tables of the wrong size, out of order, or with values that are not finite.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let refuse = |key: &str, message: String| Err(ParameterError::new(format!("statistics.{key}"), message));
+        if self.version != VERSION {
+            return refuse(
+                "version",
+                format!("is {}; this program reads version {VERSION}: fit the DEM again", self.version),
+            );
+        }
+        for side in self.cell_m {
+            ParameterError::positive("cell_m", side).map_err(|e| e.within("statistics"))?;
+        }
+        self.check_counts()?;
+        let n = self.probabilities.len();
+        if n < 2 || self.probabilities[0] != 0.0 || self.probabilities[n - 1] != 1.0 || !ascends(&self.probabilities) {
+            return refuse("probabilities", "must ascend from 0 to 1".to_owned());
+        }
+        if self.probabilities.windows(2).any(|pair| pair[0] == pair[1]) {
+            return refuse("probabilities", "must not repeat a value".to_owned());
+        }
+        self.check_quantiles("heights_m", &self.heights_m)?;
+        self.covariance.check().map_err(|e| e.within("statistics.covariance"))?;
+        self.laplacian.check().map_err(|e| e.within("statistics.laplacian"))?;
+        ParameterError::not_negative("log_variance", self.modulation.log_variance)
+            .and(ParameterError::positive("range_m", self.modulation.range_m))
+            .map_err(|e| e.within("statistics.modulation"))?;
+        for difference in &self.wavelets.differences {
+            self.check_quantiles("wavelets.differences.quantiles_m", &difference.quantiles_m)?;
+            let weights: f64 = difference.stencil.iter().map(|(_, _, weight)| weight * weight).sum();
+            if !(weights.is_finite() && weights > 0.0) {
+                return refuse(
+                    "wavelets.differences.stencil",
+                    "must have finite weights, one of them not 0".to_owned(),
+                );
+            }
+        }
+        self.wavelets.check().map_err(|e| e.within("statistics.wavelets"))
+    }
+
+    fn check_counts(&self) -> Result<(), ParameterError> {
+        let wavelets = &self.wavelets;
+        let cells = wavelets.differences.iter().map(|d| d.stencil.len()).max().unwrap_or(0);
+        let counts = [self.probabilities.len(), wavelets.mean_log.len(), wavelets.differences.len(), cells];
+        for ((key, most), count) in Self::COUNTS_MAX.into_iter().zip(counts) {
+            if count > most {
+                let message = format!("has {count} entries; the most is {most}");
+                return Err(ParameterError::new(format!("statistics.{key}"), message));
+            }
+        }
+        Ok(())
+    }
+
+    fn check_quantiles(&self, key: &str, quantiles_m: &[f64]) -> Result<(), ParameterError> {
+        if quantiles_m.len() == self.probabilities.len() && ascends(quantiles_m) {
+            return Ok(());
+        }
+        let message = format!("must be {} finite heights in ascending order", self.probabilities.len());
+        Err(ParameterError::new(format!("statistics.{key}"), message))
+    }
+}
+
+/// Whether values are finite and never decrease.
+fn ascends(values: &[f64]) -> bool {
+    values.iter().all(|v| v.is_finite()) && values.windows(2).all(|pair| pair[0] <= pair[1])
+}
+
+impl LagCovariances {
+    /// Checks a table read from a file.
+    ///
+    /// # Errors
+    /// Lags that do not start at 0 or do not ascend; too few, too many or non-finite values; a variance that is not positive.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        for (key, lags) in [("rows", &self.rows), ("cols", &self.cols)] {
+            let ascend = lags.windows(2).all(|pair| pair[0] < pair[1]);
+            if lags.first() != Some(&0) || !ascend || lags.len() > LAGS_MAX {
+                return Err(ParameterError::new(key, format!("must be at most {LAGS_MAX} lags that ascend from 0")));
+            }
+        }
+        let needed = self.rows.len() * self.inner();
+        if self.covariance_m2.len() != needed || self.covariance_m2.iter().any(|c| !c.is_finite()) {
+            return Err(ParameterError::new("covariance_m2", format!("must be {needed} finite values")));
+        }
+        ParameterError::positive("covariance_m2", self.variance_m2()).map(drop)
+    }
+
+    /// Values of a lag southwards.
+    pub fn inner(&self) -> usize {
+        2 * self.cols.len() - 1
+    }
+
+    /// Covariance at lag 0, m2.
+    pub fn variance_m2(&self) -> f64 {
+        self.covariance_m2[self.cols.len() - 1]
+    }
+}
+
+impl Wavelets {
+    /// Orientations of an octave.
+    pub const ORIENTATIONS: usize = 4;
+
+    /// Checks a table read from a file.
+    ///
+    /// # Errors
+    /// Tables of the wrong size, values that are not finite, a variance that is not positive.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let bands = Self::ORIENTATIONS * self.octaves as usize;
+        if self.mean_log.len() != bands || self.mean_log.iter().any(|v| !v.is_finite()) {
+            return Err(ParameterError::new(
+                "mean_log",
+                format!("must be {bands} finite values, four for each octave"),
+            ));
+        }
+        let needed = bands * bands;
+        if self.covariance_log.len() != needed || self.covariance_log.iter().any(|v| !v.is_finite()) {
+            return Err(ParameterError::new("covariance_log", format!("must be {needed} finite values")));
+        }
+        for band in 0..bands {
+            ParameterError::positive("covariance_log", self.covariance_log[band * bands + band])?;
+        }
+        ParameterError::positive("floor_m", self.floor_m).map(drop)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn small() -> Statistics {
+        Statistics {
+            version: VERSION,
+            cell_m: [0.5, 0.25],
+            cells: 12,
+            probabilities: vec![0.0, 0.5, 1.0],
+            heights_m: vec![-1.0, 0.0, 2.0],
+            covariance: LagCovariances {
+                rows: vec![0, 1],
+                cols: vec![0, 1],
+                covariance_m2: vec![0.5, 1.0, 0.5, 0.1, 0.4, 0.1],
+            },
+            laplacian: LagCovariances { rows: vec![0], cols: vec![0], covariance_m2: vec![0.2] },
+            modulation: Modulation { log_variance: 0.3, range_m: 2.0, ..Modulation::default() },
+            wavelets: Wavelets {
+                differences: vec![Difference {
+                    stencil: vec![(0, 0, -1.0), (0, 1, 1.0)],
+                    quantiles_m: vec![-1.0, 0.0, 1.0],
+                }],
+                octaves: 1,
+                floor_m: 1e-6,
+                mean_log: vec![0.0; 4],
+                covariance_log: (0..16).map(|k| if k % 5 == 0 { 1.0 } else { 0.0 }).collect(),
+            },
+        }
+    }
+
+    #[test]
+    fn prop_sections_read_back() {
+        let text = serde_json::to_string(&small()).unwrap();
+        let again: Statistics = serde_json::from_str(&text).unwrap();
+        assert_eq!(again, small());
+        assert!(again.check().is_ok());
+        assert_eq!((again.covariance.variance_m2(), again.covariance.inner()), (1.0, 3));
+    }
+
+    /// Each kind of damage is refused with the key of the damaged table.
+    #[test]
+    fn val_damaged_sections_are_refused() {
+        /// A damaged table, and what damages it.
+        type Damage = (&'static str, fn(&mut Statistics));
+        let damages: [Damage; 15] = [
+            ("statistics.version", |s| s.version = 2),
+            ("statistics.cell_m", |s| s.cell_m[1] = 0.0),
+            ("statistics.probabilities", |s| s.probabilities[0] = 0.1),
+            ("statistics.probabilities", |s| s.probabilities[1] = 1.0),
+            ("statistics.probabilities", |s| s.probabilities = vec![0.0; 2000]),
+            ("statistics.heights_m", |s| s.heights_m[0] = 1.0),
+            ("statistics.covariance.rows", |s| s.covariance.rows = vec![0, 0]),
+            ("statistics.covariance.cols", |s| s.covariance.cols = Vec::new()),
+            ("statistics.covariance.covariance_m2", |s| s.covariance.covariance_m2[1] = -1.0),
+            ("statistics.laplacian.covariance_m2", |s| s.laplacian.covariance_m2.clear()),
+            ("statistics.modulation.range_m", |s| s.modulation.range_m = 0.0),
+            ("statistics.wavelets.differences.quantiles_m", |s| s.wavelets.differences[0].quantiles_m[2] = f64::NAN),
+            ("statistics.wavelets.differences.stencil", |s| s.wavelets.differences[0].stencil.clear()),
+            ("statistics.wavelets.mean_log", |s| s.wavelets.octaves = 2),
+            ("statistics.wavelets.covariance_log", |s| s.wavelets.covariance_log[5] = 0.0),
+        ];
+        for (key, damage) in damages {
+            let mut damaged = small();
+            damage(&mut damaged);
+            assert_eq!(damaged.check().err().map(|e| e.key).as_deref(), Some(key));
+        }
+    }
+}
