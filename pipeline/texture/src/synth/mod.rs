@@ -14,10 +14,13 @@ pub mod conditional;
 pub mod fft_ma;
 pub mod gaussians;
 pub mod marginal;
+pub mod modulated;
 pub mod quasi_wavelets;
 pub mod reach;
 pub mod scoreboard;
+pub mod statistics;
 pub mod tile;
+pub mod wavelet_statistics;
 
 use crate::covariance::Covariance;
 use marginal::Marginal;

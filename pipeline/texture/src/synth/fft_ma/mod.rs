@@ -441,7 +441,7 @@ pub(crate) fn random_spectrum(
 }
 
 /// Column `kx` of such a spectrum with `cols` columns.
-fn random_column(
+pub(crate) fn random_column(
     kx: usize,
     cols: usize,
     amplitude: impl Fn(usize) -> f64,

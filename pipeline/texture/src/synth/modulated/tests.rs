@@ -1,0 +1,219 @@
+use super::*;
+use crate::synth::fft_ma::torus_covariance;
+use crate::synth::statistics::tails;
+use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_schemas::statistics::{LagCovariances, Modulation, VERSION, Wavelets};
+use sastrugi_statistics::normal;
+
+/// Quantiles of a unit normal number times a log-normal amplitude, with those of 1e-7 and 1 - 1e-7 at the ends.
+fn product_quantiles(log_variance: f64) -> Vec<f64> {
+    let step = 0.02;
+    let amplitudes: Vec<(f64, f64)> = (0..700)
+        .map(|k| -7.0 + (f64::from(k) + 0.5) * step)
+        .map(|w| (amplitude(log_variance, w), normal::pdf(w) * step))
+        .collect();
+    let below = |y: f64| amplitudes.iter().map(|(a, weight)| weight * normal::cdf(y / a)).sum::<f64>();
+    let quantile = |p: f64| {
+        let (mut low, mut high) = (-40.0, 40.0);
+        for _ in 0..60 {
+            let middle = 0.5 * (low + high);
+            if below(middle) < p { low = middle } else { high = middle }
+        }
+        0.5 * (low + high)
+    };
+    tails::probabilities().into_iter().map(|p| quantile(p.clamp(1e-7, 1.0 - 1e-7))).collect()
+}
+
+/// Statistics with an exponential covariance of unit variance and of `range` cells, half as long northwards; heights as of the product.
+fn statistics(range: f64, log_variance: f64, patches: f64) -> Statistics {
+    let at = |row: f64, col: f64| libm::exp(-(col * col + 4.0 * row * row).sqrt() / range);
+    // The Laplacian twice, as the weighted sum of 13 neighbours.
+    let second = |f: &dyn Fn(f64, f64) -> f64, r: f64, c: f64| {
+        f(r + 1.0, c) + f(r - 1.0, c) + f(r, c + 1.0) + f(r, c - 1.0) - 4.0 * f(r, c)
+    };
+    let fourth = |row: f64, col: f64| second(&|r, c| second(&at, r, c), row, col);
+    let table = |last: i32, f: &dyn Fn(f64, f64) -> f64| {
+        let lags: Vec<u32> = (0..=last as u32).collect();
+        let covariance_m2 = (0..=last).flat_map(|r| (-last..=last).map(move |c| (r, c)));
+        let covariance_m2 = covariance_m2.map(|(r, c)| f(f64::from(r), f64::from(c))).collect();
+        LagCovariances { rows: lags.clone(), cols: lags, covariance_m2 }
+    };
+    Statistics {
+        version: VERSION,
+        cell_m: [0.5, 0.5],
+        cells: 10_000,
+        probabilities: tails::probabilities(),
+        heights_m: product_quantiles(log_variance),
+        covariance: table(40, &at),
+        laplacian: table(16, &fourth),
+        modulation: Modulation { log_variance, range_m: 0.5 * patches, ..Modulation::default() },
+        wavelets: Wavelets { floor_m: 1.0, ..Wavelets::default() },
+    }
+}
+
+/// Uniform heights without modulation: the correlation is `6 / pi * asin(r / 2)` (Pearson 1907), whatever the amplitude's correlation.
+#[test]
+fn val_uniform_heights() {
+    let transform = Transform::new(&[0.0, 1.0], &[3.0, 5.0], 1.0, 0.0);
+    for r in [-0.5, 0.0, 0.2, 0.7, 0.95] {
+        let expected = 6.0 / PI * libm::asin(0.5 * r);
+        for rho in [0.0, 0.4, 1.0] {
+            assert!((transform.covariance_m2(r, rho) - expected).abs() < 1e-4, "{r} {rho}");
+        }
+    }
+    // The middle and the ends of the heights about their mean, in units of their standard deviation.
+    assert!(transform.height_m(0.0).abs() < 1e-9 && (transform.height_m(30.0) - 3f64.sqrt()).abs() < 1e-3);
+}
+
+/// Heights that are distributed as the product itself leave it as it is: `r exp(-s^2 (1 - rho))`, within 1 % of the variance, as the
+/// quantiles end at 1e-7 and are linear between their probabilities.
+#[test]
+fn val_the_product_alone() {
+    for log_variance in [0.1, 0.3] {
+        let transform = Transform::new(&tails::probabilities(), &product_quantiles(log_variance), 1.0, log_variance);
+        assert!((transform.height_m(0.7) - 0.7).abs() < 0.02, "{}", transform.height_m(0.7));
+        for (r, rho) in [(0.0, 0.0), (0.3, 0.2), (0.6, 0.9), (0.9, 0.5), (-0.4, 0.3), (0.97, 1.0)] {
+            let expected = r * libm::exp(-log_variance * (1.0 - rho));
+            let found = transform.covariance_m2(r, rho);
+            assert!((found - expected).abs() < 0.01, "{log_variance}, {r}, {rho}: {found} {expected}");
+        }
+    }
+}
+
+/// The table inverts the covariance to 1 % of the variance, where a correlation of G gives it at all; beyond, it ends at 1.
+#[test]
+fn prop_the_table_inverts_the_covariance() {
+    let mut quantiles: Vec<f64> = product_quantiles(0.6).iter().map(|q| q + 0.1 * q * q.abs().min(3.0)).collect();
+    quantiles.sort_by(f64::total_cmp);
+    let transform = Transform::new(&tails::probabilities(), &quantiles, 2.0, 0.6);
+    let table = transform.normal_correlation();
+    for rho in [0.0, 0.31, 0.77, 1.0] {
+        for r in [-0.3, 0.0, 0.25, 0.5, 0.83, 0.99] {
+            let c = transform.covariance_m2(r, rho) / 2.0;
+            let back = transform.covariance_m2(table.at(c, rho), rho) / 2.0;
+            assert!((back - c).abs() < 0.01, "{r} {rho}: {back} {c}");
+        }
+    }
+    assert!(table.at(0.999, 0.0) > 0.999_9);
+}
+
+/// Means over `count` textures of what `f` finds in each, and six standard errors of each mean.
+fn over_textures(made: &Modulated, count: u64, f: impl Fn(&Grid) -> Vec<f64>) -> Vec<(f64, f64)> {
+    let [rows, cols] = made.shape;
+    let found: Vec<Vec<f64>> = (0..count)
+        .map(|seed| {
+            f(&Grid::new(Geometry::square(rows, cols, 0.5), made.make(&Streams::for_seed(seed, "modulated-test"))))
+        })
+        .collect();
+    (0..found[0].len())
+        .map(|k| {
+            let values: Vec<f64> = found.iter().map(|of_one| of_one[k]).collect();
+            (sums::mean(&values), 6.0 * (sums::variance(&values) / (count - 1) as f64).sqrt())
+        })
+        .collect()
+}
+
+/// The covariance of the textures is the stated one, along both axes (it is anisotropic). Null: equal on average; thresholds at six standard
+/// errors from 48 textures (1e-6 each for Student's t with 47 degrees of freedom) and 2 % of the variance for negative eigenvalues.
+#[test]
+fn stat_the_stated_covariance_is_achieved() {
+    let statistics = statistics(4.0, 0.3, 6.0);
+    let made = Modulated::new(&statistics, [128, 128], &ModulatedParameters::default()).unwrap();
+    assert!(made.clip_share() < 0.02, "{}", made.clip_share());
+    let lags = [(0, 0), (0, 1), (1, 0), (0, 3), (2, 0), (2, 3), (0, 8), (5, 0)];
+    let found = over_textures(&made, 48, |z| {
+        let covariance = torus_covariance(z);
+        lags.iter().map(|(r, c)| covariance[r * 128 + c]).collect()
+    });
+    for ((r, c), (mean, six)) in lags.iter().zip(found) {
+        let wanted = libm::exp(-((c * c + 4 * r * r) as f64).sqrt() / 4.0);
+        assert!((mean - wanted).abs() < six + 0.02, "{r} {c}: {mean} {wanted} {six}");
+    }
+}
+
+/// Second and fourth moments of increments are those of the closed form. Null: equal on average, thresholds as above and 3 % for the quantiles'
+/// ends; without modulation the flatness would be 3 instead of 4.5 to 5.5.
+#[test]
+fn stat_flatness_is_that_of_the_closed_form() {
+    let log_variance = 0.15;
+    let statistics = statistics(4.0, log_variance, 8.0);
+    let made = Modulated::new(&statistics, [160, 160], &ModulatedParameters::default()).unwrap();
+    for lag in [1, 4] {
+        let moments = over_textures(&made, 48, |z| {
+            let d = |k: usize| z.at(k / 160, (k % 160 + lag) % 160) - z.at(k / 160, k % 160);
+            let mean = |power: i32| {
+                sums::mean(&(0..160 * 160).map(|k| (0..power).map(|_| d(k)).product()).collect::<Vec<f64>>())
+            };
+            vec![mean(2), mean(4)]
+        });
+        let c = libm::exp(-(lag as f64) / 4.0);
+        let rho = libm::exp(-(lag as f64 / 8.0) * (lag as f64 / 8.0));
+        let second = 2.0 * (1.0 - c);
+        let fourth = flatness(c, rho, log_variance) * second * second;
+        for ((mean, six), wanted) in moments.into_iter().zip([second, fourth]) {
+            assert!((mean - wanted).abs() < six + 0.03 * wanted, "{lag}: {mean} {wanted} {six}");
+        }
+    }
+}
+
+/// The fit finds the amplitude of a field of its own kind. Null: log variance 0.3, range 8 cells. 768 x 768 cells hold some 2300 patches;
+/// `<A^8> / <A^4>^2 = exp(16 s^2)` = 120 gives the flatness a standard error of 23 % and the log variance one of 0.06: the upper bound is five
+/// of them (3e-7), the lower four (3e-5, and an error there is skewed towards larger values).
+#[test]
+fn stat_the_fit_finds_the_amplitude() {
+    let truth = statistics(4.0, 0.3, 8.0);
+    let parameters = ModulatedParameters { periodic: false, ..ModulatedParameters::default() };
+    let heights = synthesise(&truth, [768, 768], &parameters, &Streams::for_seed(1, "modulated-fit")).unwrap();
+    let mut residual = Grid::new(Geometry::square(768, 768, 0.5), heights);
+    residual.values[..30_000].fill(f64::NAN);
+    let found = crate::synth::statistics::measure(&residual, [40, 40]).unwrap();
+    let modulation = &found.modulation;
+    assert!((0.06..0.6).contains(&modulation.log_variance), "{modulation:?}");
+    assert!((0.5 * 3.0..0.5 * 20.0).contains(&modulation.range_m), "{modulation:?}");
+    assert_eq!(modulation.lags, [1, 2, 4, 8, 16, 32]);
+    assert!(found.check().is_ok());
+}
+
+/// The same bytes on one and three threads; a periodic texture is its torus, any other is cut from a larger one; streams by name.
+#[test]
+fn prop_threads_change_no_bit() {
+    let statistics = statistics(3.0, 0.5, 5.0);
+    for periodic in [true, false] {
+        let parameters = ModulatedParameters { periodic, ..ModulatedParameters::default() };
+        let on = |threads: usize| {
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+            pool.install(|| synthesise(&statistics, [70, 90], &parameters, &Streams::for_seed(2, "texture")).unwrap())
+        };
+        let (one, three) = (on(1), on(3));
+        assert_eq!(one.len(), 70 * 90);
+        assert!(one.iter().zip(&three).all(|(a, b)| a.to_bits() == b.to_bits() && a.is_finite()));
+        let other = synthesise(&statistics, [70, 90], &parameters, &Streams::for_seed(3, "texture")).unwrap();
+        assert_ne!(one, other);
+    }
+}
+
+#[test]
+fn val_refusals() {
+    let statistics = statistics(3.0, 0.5, 5.0);
+    let key = |parameters: ModulatedParameters, shape: [usize; 2]| {
+        Modulated::new(&statistics, shape, &parameters).err().map(|e| e.key)
+    };
+    let plain = ModulatedParameters::default;
+    assert_eq!(key(plain(), [64, 64]), None);
+    for (expected, parameters) in [
+        ("log_variance", ModulatedParameters { log_variance: Some(2.1), ..plain() }),
+        ("log_variance", ModulatedParameters { log_variance: Some(f64::NAN), ..plain() }),
+        ("range_m", ModulatedParameters { range_m: Some(-1.0), ..plain() }),
+        // Cells are 0.5 m.
+        ("range_m", ModulatedParameters { range_m: Some(0.5), ..plain() }),
+        ("range_m", ModulatedParameters { range_m: Some(10.0), ..plain() }),
+        ("range_m", ModulatedParameters { range_m: Some(1e9), periodic: false, ..plain() }),
+    ] {
+        assert_eq!(key(parameters, [64, 64]).as_deref(), Some(expected));
+    }
+    let flat = Statistics { heights_m: vec![0.0; statistics.heights_m.len()], ..statistics.clone() };
+    let refused = |s: &Statistics| Modulated::new(s, [64, 64], &plain()).err().map(|e| e.key);
+    assert_eq!(refused(&flat).as_deref(), Some("statistics.heights_m"));
+    assert_eq!(refused(&Statistics { version: 9, ..statistics.clone() }).as_deref(), Some("statistics.version"));
+    assert!(serde_json::from_str::<ModulatedParameters>("{ \"ranges\": 1 }").is_err());
+}

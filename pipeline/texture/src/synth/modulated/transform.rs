@@ -1,0 +1,186 @@
+//! Heights from a normal field times a log-normal amplitude, and the covariance that follows.
+//!
+//! `z = T(A G)`, `A = exp(s W - s^2)`, G and W independent unit normal fields, so that `<A^2> = 1`. `T = Q(F)`, F the distribution of `A G` and
+//! Q the quantile function of the heights. With `T(A(w) g) = sum d_kj h_k(g) h_j(w)` in normalised Hermite polynomials,
+//!
+//! `C_z(r, rho) = sum over (k, j) != (0, 0) of d_kj^2 r^k rho^j`
+//!
+//! at a correlation r of G and rho of W (Mehler 1866, twice). [`Transform::normal_correlation`] solves it for r.
+
+use crate::synth::statistics::tails;
+use sastrugi_statistics::normal;
+
+/// Degrees of the series in G and in W; the variance beyond them is counted as that of the highest degree.
+const DEGREES: [usize; 2] = [48, 16];
+/// Points of the quadrature over G and over W, between plus and minus [`BOUND`].
+const POINTS: [usize; 2] = [320, 64];
+const BOUND: f64 = 7.0;
+/// Tabulated heights on each side of 0, and the largest product, in standard deviations.
+const HALF_NODES: usize = 2048;
+const PRODUCT_MAX: f64 = 40.0;
+/// Tabulated correlations of the heights, and of W.
+const CORRELATIONS: [usize; 2] = [257, 33];
+/// Bisections of a correlation.
+const BISECTIONS: usize = 24;
+
+/// Heights as a function of the product, and their covariance as a function of correlations.
+#[derive(Clone)]
+pub struct Transform {
+    /// Heights at equally spaced products from `-PRODUCT_MAX` to `PRODUCT_MAX`, mean 0, m.
+    heights_m: Vec<f64>,
+    /// Variance of the heights, m2.
+    variance_m2: f64,
+    /// `d_kj^2`, m2; `squares[j][k]`.
+    squares: Vec<Vec<f64>>,
+}
+
+impl Transform {
+    /// Heights with the quantiles `quantiles_m` at `probabilities`, shifted to mean 0 and scaled to `variance_m2`, for an amplitude whose
+    /// logarithm has the variance `log_variance`. At least two of the quantiles must differ.
+    pub fn new(probabilities: &[f64], quantiles_m: &[f64], variance_m2: f64, log_variance: f64) -> Self {
+        let amplitudes: Vec<(f64, f64)> =
+            points(POINTS[1]).map(|(w, weight)| (amplitude(log_variance, w), weight)).collect();
+        let below =
+            |product: f64| -> f64 { amplitudes.iter().map(|(a, weight)| weight * normal::cdf(product / a)).sum() };
+        let half: Vec<f64> = (0..=HALF_NODES).map(|k| below(-PRODUCT_MAX * k as f64 / HALF_NODES as f64)).collect();
+        let shares = half.iter().rev().copied().chain(half[1..].iter().map(|share| 1.0 - share));
+        let heights_m = shares.map(|share| tails::interpolated(probabilities, quantiles_m, share)).collect();
+        let mut own = Self { heights_m, variance_m2: 0.0, squares: Vec::new() };
+        let (mean_m, raw_m2) = own.moments(&amplitudes);
+        let scale = (variance_m2 / raw_m2).sqrt();
+        own.heights_m.iter_mut().for_each(|z| *z = (*z - mean_m) * scale);
+        own.squares = own.expanded(&amplitudes);
+        own.squares[0][0] = 0.0;
+        let found_m2: f64 = own.squares.iter().flatten().sum();
+        let last = &mut own.squares[DEGREES[1] - 1][DEGREES[0] - 1];
+        *last += (variance_m2 - found_m2).max(0.0);
+        own.variance_m2 = own.squares.iter().flatten().sum();
+        own
+    }
+
+    /// The height of a product, m.
+    pub fn height_m(&self, product: f64) -> f64 {
+        let place = ((product / PRODUCT_MAX + 1.0) * HALF_NODES as f64).clamp(0.0, (2 * HALF_NODES) as f64);
+        let low = (place as usize).min(2 * HALF_NODES - 1);
+        self.heights_m[low] + (self.heights_m[low + 1] - self.heights_m[low]) * (place - low as f64)
+    }
+
+    /// Covariance of the heights at a correlation `r` of G and `rho` of W, m2.
+    #[cfg(test)]
+    pub fn covariance_m2(&self, r: f64, rho: f64) -> f64 {
+        polynomial(&self.at_amplitude_correlation(rho), r)
+    }
+
+    /// Coefficients of the covariance as a polynomial in r.
+    fn at_amplitude_correlation(&self, rho: f64) -> Vec<f64> {
+        (0..DEGREES[0]).map(|k| self.squares.iter().rev().fold(0.0, |sum, of_j| sum * rho + of_j[k])).collect()
+    }
+
+    /// The inverse as a table: the correlation of G that gives the heights a correlation.
+    pub fn normal_correlation(&self) -> NormalCorrelation {
+        let [nodes, rows] = CORRELATIONS;
+        let row = |i: usize| {
+            let coefficients = self.at_amplitude_correlation(i as f64 / (rows - 1) as f64);
+            let solved = move |k: usize| {
+                let wanted_m2 = (2.0 * k as f64 / (nodes - 1) as f64 - 1.0) * self.variance_m2;
+                solve(&coefficients, wanted_m2)
+            };
+            (0..nodes).map(solved).collect::<Vec<f64>>()
+        };
+        NormalCorrelation { rows: (0..rows).map(row).collect() }
+    }
+
+    /// Mean and variance of the heights.
+    fn moments(&self, amplitudes: &[(f64, f64)]) -> (f64, f64) {
+        let mut sums = [0.0; 2];
+        for (a, of_w) in amplitudes {
+            for (g, of_g) in points(POINTS[0]) {
+                let height = self.height_m(a * g);
+                sums[0] += of_w * of_g * height;
+                sums[1] += of_w * of_g * height * height;
+            }
+        }
+        (sums[0], sums[1] - sums[0] * sums[0])
+    }
+
+    /// `d_kj^2` by the midpoint rule.
+    fn expanded(&self, amplitudes: &[(f64, f64)]) -> Vec<Vec<f64>> {
+        let mut coefficients = vec![vec![0.0; DEGREES[0]]; DEGREES[1]];
+        for ((a, of_w), (w, _)) in amplitudes.iter().zip(points(POINTS[1])) {
+            let mut of_g = vec![0.0; DEGREES[0]];
+            for (g, weight) in points(POINTS[0]) {
+                let height = weight * self.height_m(a * g);
+                hermite(g, DEGREES[0], |k, h| of_g[k] += height * h);
+            }
+            hermite(w, DEGREES[1], |j, h| {
+                coefficients[j].iter_mut().zip(&of_g).for_each(|(sum, c)| *sum += of_w * h * c);
+            });
+        }
+        coefficients.iter_mut().flatten().for_each(|d| *d *= *d);
+        coefficients
+    }
+}
+
+/// The amplitude at a standard normal `w`; its mean square is 1.
+pub fn amplitude(log_variance: f64, w: f64) -> f64 {
+    libm::exp(log_variance.sqrt() * w - log_variance)
+}
+
+/// Points of a quadrature over a standard normal variable, and their weights.
+fn points(count: usize) -> impl Iterator<Item = (f64, f64)> {
+    let step = 2.0 * BOUND / count as f64;
+    (0..count).map(move |k| {
+        let x = -BOUND + (k as f64 + 0.5) * step;
+        (x, normal::pdf(x) * step)
+    })
+}
+
+/// Calls `each` with the degree and value of the first `count` normalised Hermite polynomials at `x`.
+fn hermite(x: f64, count: usize, mut each: impl FnMut(usize, f64)) {
+    let (mut before, mut now) = (0.0, 1.0);
+    for degree in 0..count {
+        each(degree, now);
+        let n = degree as f64;
+        (before, now) = (now, (x * now - n.sqrt() * before) / (n + 1.0).sqrt());
+    }
+}
+
+fn polynomial(coefficients: &[f64], r: f64) -> f64 {
+    coefficients.iter().rev().fold(0.0, |sum, c| sum * r + c)
+}
+
+/// The argument in [-1, 1] at which an increasing polynomial has a value; the nearer end if it has it nowhere.
+fn solve(coefficients: &[f64], wanted: f64) -> f64 {
+    let (mut low, mut high) = (-1.0, 1.0);
+    if polynomial(coefficients, high) <= wanted {
+        return high;
+    }
+    for _ in 0..BISECTIONS {
+        let middle = 0.5 * (low + high);
+        if polynomial(coefficients, middle) < wanted { low = middle } else { high = middle }
+    }
+    0.5 * (low + high)
+}
+
+/// The correlation of G by the correlation of the heights and that of W.
+pub struct NormalCorrelation {
+    /// For correlations of W from 0 to 1, values at correlations of the heights from -1 to 1.
+    rows: Vec<Vec<f64>>,
+}
+
+impl NormalCorrelation {
+    /// The correlation of G at a correlation `c` of the heights and `rho` of W, bilinear in the table.
+    pub fn at(&self, c: f64, rho: f64) -> f64 {
+        let [nodes, rows] = CORRELATIONS;
+        let split = |place: f64, last: usize| {
+            let place = place.clamp(0.0, last as f64);
+            let low = (place as usize).min(last - 1);
+            (low, place - low as f64)
+        };
+        let (k, along) = split(0.5 * (c + 1.0) * (nodes - 1) as f64, nodes - 1);
+        let (i, down) = split(rho * (rows - 1) as f64, rows - 1);
+        let mix = |row: &[f64]| row[k] + (row[k + 1] - row[k]) * along;
+        let (above, below) = (mix(&self.rows[i]), mix(&self.rows[i + 1]));
+        above + (below - above) * down
+    }
+}
