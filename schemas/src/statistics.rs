@@ -8,8 +8,10 @@ use serde::{Deserialize, Serialize};
 
 /// Version of the section.
 pub const VERSION: u32 = 1;
-/// Most lags of the covariance along one axis.
+/// Most lags of a covariance along one axis.
 pub const LAGS_MAX: usize = 96;
+/// Largest lag of a covariance, cells.
+pub const LAG_MAX: u32 = 256;
 
 /// Statistics of a residual: heights minus their moving average, m.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
@@ -42,8 +44,9 @@ pub struct LagCovariances {
     pub rows: Vec<u32>,
     /// Lags eastwards (and westwards), cells, likewise.
     pub cols: Vec<u32>,
-    /// Covariance, m2, for each lag southwards (outer) and for lags from the farthest west through 0 to the farthest east (inner).
-    pub covariance_m2: Vec<f64>,
+    /// Covariance for each lag southwards (outer) and for lags from the farthest west through 0 to the farthest east (inner): m2, or 1 for
+    /// logarithms.
+    pub values: Vec<f64>,
 }
 
 /// Parameters of the amplitude field of a residual that is rough in patches.
@@ -75,6 +78,9 @@ pub struct Wavelets {
     pub mean_log: Vec<f64>,
     /// Covariance of these logarithms between bands, row by row.
     pub covariance_log: Vec<f64>,
+    /// Covariance by lag of the mean of all bands' logarithms about their means: how rough and smooth places lie; absent without bands.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub patches: Option<LagCovariances>,
 }
 
 /// A weighted difference between neighbouring cells and its distribution.
@@ -172,15 +178,17 @@ impl LagCovariances {
     pub fn check(&self) -> Result<(), ParameterError> {
         for (key, lags) in [("rows", &self.rows), ("cols", &self.cols)] {
             let ascend = lags.windows(2).all(|pair| pair[0] < pair[1]);
-            if lags.first() != Some(&0) || !ascend || lags.len() > LAGS_MAX {
-                return Err(ParameterError::new(key, format!("must be at most {LAGS_MAX} lags that ascend from 0")));
+            let fit = lags.len() <= LAGS_MAX && lags.last().is_some_and(|lag| *lag <= LAG_MAX);
+            if lags.first() != Some(&0) || !ascend || !fit {
+                let message = format!("must be at most {LAGS_MAX} lags that ascend from 0 to at most {LAG_MAX} cells");
+                return Err(ParameterError::new(key, message));
             }
         }
         let needed = self.rows.len() * self.inner();
-        if self.covariance_m2.len() != needed || self.covariance_m2.iter().any(|c| !c.is_finite()) {
-            return Err(ParameterError::new("covariance_m2", format!("must be {needed} finite values")));
+        if self.values.len() != needed || self.values.iter().any(|c| !c.is_finite()) {
+            return Err(ParameterError::new("values", format!("must be {needed} finite values")));
         }
-        ParameterError::positive("covariance_m2", self.variance_m2()).map(drop)
+        ParameterError::positive("values", self.variance()).map(drop)
     }
 
     /// Values of a lag southwards.
@@ -188,9 +196,9 @@ impl LagCovariances {
         2 * self.cols.len() - 1
     }
 
-    /// Covariance at lag 0, m2.
-    pub fn variance_m2(&self) -> f64 {
-        self.covariance_m2[self.cols.len() - 1]
+    /// Covariance at lag 0.
+    pub fn variance(&self) -> f64 {
+        self.values[self.cols.len() - 1]
     }
 }
 
@@ -217,6 +225,9 @@ impl Wavelets {
         for band in 0..bands {
             ParameterError::positive("covariance_log", self.covariance_log[band * bands + band])?;
         }
+        if let Some(patches) = &self.patches {
+            patches.check().map_err(|e| e.within("patches"))?;
+        }
         ParameterError::positive("floor_m", self.floor_m).map(drop)
     }
 }
@@ -235,9 +246,9 @@ mod tests {
             covariance: LagCovariances {
                 rows: vec![0, 1],
                 cols: vec![0, 1],
-                covariance_m2: vec![0.5, 1.0, 0.5, 0.1, 0.4, 0.1],
+                values: vec![0.5, 1.0, 0.5, 0.1, 0.4, 0.1],
             },
-            laplacian: LagCovariances { rows: vec![0], cols: vec![0], covariance_m2: vec![0.2] },
+            laplacian: LagCovariances { rows: vec![0], cols: vec![0], values: vec![0.2] },
             modulation: Modulation { log_variance: 0.3, range_m: 2.0, ..Modulation::default() },
             wavelets: Wavelets {
                 differences: vec![Difference {
@@ -248,6 +259,7 @@ mod tests {
                 floor_m: 1e-6,
                 mean_log: vec![0.0; 4],
                 covariance_log: (0..16).map(|k| if k % 5 == 0 { 1.0 } else { 0.0 }).collect(),
+                patches: Some(LagCovariances { rows: vec![0], cols: vec![0], values: vec![0.3] }),
             },
         }
     }
@@ -258,7 +270,7 @@ mod tests {
         let again: Statistics = serde_json::from_str(&text).unwrap();
         assert_eq!(again, small());
         assert!(again.check().is_ok());
-        assert_eq!((again.covariance.variance_m2(), again.covariance.inner()), (1.0, 3));
+        assert_eq!((again.covariance.variance(), again.covariance.inner()), (1.0, 3));
     }
 
     /// Each kind of damage is refused with the key of the damaged table.
@@ -266,7 +278,7 @@ mod tests {
     fn val_damaged_sections_are_refused() {
         /// A damaged table, and what damages it.
         type Damage = (&'static str, fn(&mut Statistics));
-        let damages: [Damage; 15] = [
+        let damages: [Damage; 17] = [
             ("statistics.version", |s| s.version = 2),
             ("statistics.cell_m", |s| s.cell_m[1] = 0.0),
             ("statistics.probabilities", |s| s.probabilities[0] = 0.1),
@@ -275,12 +287,14 @@ mod tests {
             ("statistics.heights_m", |s| s.heights_m[0] = 1.0),
             ("statistics.covariance.rows", |s| s.covariance.rows = vec![0, 0]),
             ("statistics.covariance.cols", |s| s.covariance.cols = Vec::new()),
-            ("statistics.covariance.covariance_m2", |s| s.covariance.covariance_m2[1] = -1.0),
-            ("statistics.laplacian.covariance_m2", |s| s.laplacian.covariance_m2.clear()),
+            ("statistics.covariance.cols", |s| s.covariance.cols = vec![0, 257]),
+            ("statistics.covariance.values", |s| s.covariance.values[1] = -1.0),
+            ("statistics.laplacian.values", |s| s.laplacian.values.clear()),
             ("statistics.modulation.range_m", |s| s.modulation.range_m = 0.0),
             ("statistics.wavelets.differences.quantiles_m", |s| s.wavelets.differences[0].quantiles_m[2] = f64::NAN),
             ("statistics.wavelets.differences.stencil", |s| s.wavelets.differences[0].stencil.clear()),
             ("statistics.wavelets.mean_log", |s| s.wavelets.octaves = 2),
+            ("statistics.wavelets.patches.rows", |s| s.wavelets.patches = Some(LagCovariances::default())),
             ("statistics.wavelets.covariance_log", |s| s.wavelets.covariance_log[5] = 0.0),
         ];
         for (key, damage) in damages {

@@ -111,7 +111,7 @@ impl Search<'_> {
 
     fn tables(&self, log_variance: f64) -> Tables {
         let s = self.statistics;
-        let transform = Transform::new(&s.probabilities, &s.heights_m, s.covariance.variance_m2(), log_variance);
+        let transform = Transform::new(&s.probabilities, &s.heights_m, s.covariance.variance(), log_variance);
         Tables { log_variance, correlation: transform.normal_correlation(), transform }
     }
 

@@ -154,7 +154,7 @@ impl Modulated {
         let range_cells = [range_m / dy, range_m / dx];
         let torus = torus(statistics, shape, range_cells, parameters.periodic);
         check_range(range_m, range_cells, torus, statistics.cell_m)?;
-        let variance_m2 = statistics.covariance.variance_m2();
+        let variance_m2 = statistics.covariance.variance();
         let transform = Transform::new(&statistics.probabilities, &statistics.heights_m, variance_m2, log_variance);
         let table = transform.normal_correlation();
         let covariance_m2 = spectrum::covariance_on_torus(statistics, torus);

@@ -34,9 +34,9 @@ fn statistics(range: f64, log_variance: f64, patches: f64) -> Statistics {
     let fourth = |row: f64, col: f64| second(&|r, c| second(&at, r, c), row, col);
     let table = |last: i32, f: &dyn Fn(f64, f64) -> f64| {
         let lags: Vec<u32> = (0..=last as u32).collect();
-        let covariance_m2 = (0..=last).flat_map(|r| (-last..=last).map(move |c| (r, c)));
-        let covariance_m2 = covariance_m2.map(|(r, c)| f(f64::from(r), f64::from(c))).collect();
-        LagCovariances { rows: lags.clone(), cols: lags, covariance_m2 }
+        let values = (0..=last).flat_map(|r| (-last..=last).map(move |c| (r, c)));
+        let values = values.map(|(r, c)| f(f64::from(r), f64::from(c))).collect();
+        LagCovariances { rows: lags.clone(), cols: lags, values }
     };
     Statistics {
         version: VERSION,

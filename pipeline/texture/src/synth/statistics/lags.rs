@@ -7,12 +7,12 @@
 use crate::covariance::masked_covariance;
 use rayon::prelude::*;
 use sastrugi_numeric::Grid;
-use sastrugi_schemas::statistics::LagCovariances;
+use sastrugi_schemas::statistics::{self, LagCovariances};
 
 /// Lags stored one by one; each later octave has half as many.
 const DENSE: usize = 32;
 /// Largest lag, cells, that a table may hold.
-pub const LAG_MAX: usize = 256;
+pub const LAG_MAX: usize = statistics::LAG_MAX as usize;
 
 /// The covariance of a residual at lags of up to `lag_max` cells, rows and columns.
 pub fn measure(residual: &Grid, lag_max: [usize; 2]) -> LagCovariances {
@@ -21,8 +21,8 @@ pub fn measure(residual: &Grid, lag_max: [usize; 2]) -> LagCovariances {
     let across: Vec<isize> = mirrored(&cols);
     // Far lags without any pair carry no covariance.
     let at = |row: u32, col: isize| found.covariance(row as isize, col).unwrap_or(0.0);
-    let covariance_m2 = rows.iter().flat_map(|&row| across.iter().map(move |&col| at(row, col))).collect();
-    LagCovariances { rows, cols, covariance_m2 }
+    let values = rows.iter().flat_map(|&row| across.iter().map(move |&col| at(row, col))).collect();
+    LagCovariances { rows, cols, values }
 }
 
 /// Lags from 0 to `last`, each octave half as dense as the one before.
@@ -64,7 +64,7 @@ fn dense(table: &LagCovariances) -> Vec<Vec<f64>> {
     (0..=last_row as isize)
         .map(|lag| {
             let (r0, r1, down) = place(&rows, lag);
-            let line = |r: usize| &table.covariance_m2[r * cols.len()..(r + 1) * cols.len()];
+            let line = |r: usize| &table.values[r * cols.len()..(r + 1) * cols.len()];
             let (above, below) = (line(r0), line(r1));
             let mix = |a: f64, b: f64, share: f64| a + (b - a) * share;
             columns
@@ -173,8 +173,8 @@ mod tests {
         let lags = vec![0, 1, 2, 4, 8];
         let f = |row: isize, col: isize| 10.0 - 0.5 * row as f64 - 0.25 * (col - 1).abs() as f64;
         let across = mirrored(&lags);
-        let covariance_m2 = lags.iter().flat_map(|&r| across.iter().map(move |&c| f(r as isize, c))).collect();
-        let table = LagCovariances { rows: lags.clone(), cols: lags, covariance_m2 };
+        let values = lags.iter().flat_map(|&r| across.iter().map(move |&c| f(r as isize, c))).collect();
+        let table = LagCovariances { rows: lags.clone(), cols: lags, values };
         let torus = on_torus(&table, [40, 40], |_| 1.0);
         for (row, col) in [(3_isize, 6_isize), (5, -7), (7, 3), (1, -3), (8, 8), (6, 1)] {
             let found = torus[row as usize * 40 + col.rem_euclid(40) as usize];
@@ -185,7 +185,7 @@ mod tests {
     /// On a torus narrower than the table, lags that coincide are added.
     #[test]
     fn val_narrow_tori_wrap() {
-        let table = LagCovariances { rows: vec![0], cols: vec![0, 1, 2], covariance_m2: vec![0.1, 0.5, 1.0, 0.5, 0.1] };
+        let table = LagCovariances { rows: vec![0], cols: vec![0, 1, 2], values: vec![0.1, 0.5, 1.0, 0.5, 0.1] };
         let torus = on_torus(&table, [1, 3], |_| 1.0);
         assert!((0..3).all(|k| (torus[k] - [1.0, 0.6, 0.6][k]).abs() < 1e-15), "{torus:?}");
     }

@@ -70,23 +70,23 @@ impl Modes {
     }
 }
 
-/// The spectra of a residual and of its Laplacian on a torus, tapered, in the order of a half spectrum, m2; negative values are 0.
-pub fn both(statistics: &Statistics, fft: &RealFft2, torus: [usize; 2], taper: lags::Taper) -> [Vec<f64>; 2] {
+/// The spectra of a residual and of its Laplacian on a torus, in the order of a half spectrum, m2; negative values are 0.
+fn both(statistics: &Statistics, fft: &RealFft2, torus: [usize; 2]) -> [Vec<f64>; 2] {
     [&statistics.covariance, &statistics.laplacian].map(|table| {
-        let half = fft.forward(&lags::on_torus(table, torus, taper));
+        let half = fft.forward(&lags::on_torus(table, torus, lags::flat));
         half.values.iter().map(|v| v.re.max(0.0)).collect()
     })
 }
 
 /// The spectrum of a residual on a torus, m2, scaled to its variance.
 pub fn of_residual(statistics: &Statistics, fft: &RealFft2, torus: [usize; 2], modes: &Modes) -> Vec<f64> {
-    let [direct, curved] = both(statistics, fft, torus, lags::flat);
+    let [direct, curved] = both(statistics, fft, torus);
     let parts = direct.iter().zip(&curved).zip(modes.share.iter().zip(&modes.power));
     let mut values: Vec<f64> =
         parts.map(|((d, l), (w, power))| if *w == 0.0 { *d } else { (1.0 - w) * d + w * l / power }).collect();
     let half = HalfSpectrum { rows: torus[0], cols: torus[1], values: Vec::new() };
     let weighted: Vec<f64> = values.iter().enumerate().map(|(k, v)| half.multiplicity(k / torus[0]) * v).collect();
-    let scale = (torus[0] * torus[1]) as f64 * statistics.covariance.variance_m2() / sums::sum(&weighted);
+    let scale = (torus[0] * torus[1]) as f64 * statistics.covariance.variance() / sums::sum(&weighted);
     values.iter_mut().for_each(|v| *v *= scale);
     values
 }
@@ -150,9 +150,9 @@ mod tests {
         assert_eq!((modes.share[0], modes.share[4 * rows + 3]), (0.0, 1.0));
     }
 
-    /// A smooth field: the power of its shortest waves, a millionth of the largest, is found; in the covariance of the heights alone it is 20 times
-    /// as large. Null: the spectrum of the field's own filter. The mean over some 16 000 modes of an estimate from 16 lags has a standard error
-    /// of 2 %: 25 % is twelve (below 1e-9) and leaves room for leakage; an independent program found 1.02 and 24.
+    /// A smooth field: the power of its shortest waves, a millionth of the largest, is found; the covariance of the heights alone gives 20
+    /// times as much. Null: the spectrum of the field's own filter. The mean over some 16 000 modes of an estimate from 16 lags has a standard
+    /// error of 2 %: 25 % is twelve (below 1e-9) and leaves room for leakage; an independent program found 1.02 and 24.
     #[test]
     fn stat_short_waves_of_a_smooth_field_are_found() {
         let (side, geometry) = (256, Geometry::square(256, 256, 1.0));
@@ -174,7 +174,7 @@ mod tests {
             ..Statistics::default()
         };
         let found = of_residual(&statistics, &fft, [side, side], &Modes::new([side, side], [1.0; 2]));
-        let [direct, _] = both(&statistics, &fft, [side, side], lags::flat);
+        let [direct, _] = both(&statistics, &fft, [side, side]);
         let short: Vec<usize> = (0..found.len()).filter(|k| k / side > side / 4 && k / side < side / 2).collect();
         let mean = |of: &dyn Fn(usize) -> f64| short.iter().map(|k| of(*k)).sum::<f64>() / short.len() as f64;
         let truth = mean(&|k| gain(k) * gain(k));
@@ -195,7 +195,7 @@ mod tests {
             laplacian: lags::measure(&laplacian(&residual), [LAG_MAX; 2]),
             ..Statistics::default()
         };
-        let variance = statistics.covariance.variance_m2();
+        let variance = statistics.covariance.variance();
         let torus = covariance_on_torus(&statistics, [120, 150]);
         let table = lags::on_torus(&statistics.covariance, [120, 150], |_| 1.0);
         for at in [0, 1, 2, 4, 150, 300, 151, 119 * 150, 149] {

@@ -7,15 +7,18 @@
 use super::bands::{Bands, ORIENTATIONS};
 use super::differences;
 use super::symmetric::Symmetric;
+use crate::synth::statistics::lags;
 use rayon::prelude::*;
 use sastrugi_numeric::fft::smooth_length;
 use sastrugi_numeric::{Grid, sums};
-use sastrugi_schemas::statistics::Wavelets;
+use sastrugi_schemas::statistics::{LagCovariances, Wavelets};
 
 /// Most octaves.
 pub const OCTAVES_MAX: usize = 5;
 /// Fewest cells of an octave far enough from any hole, in units of the area of its wavelets.
 const WAVELETS_MIN: usize = 64;
+/// Largest lag of the covariance of the patches, cells.
+const PATCH_LAG_MAX: usize = 128;
 /// The floor of magnitudes, relative to the root mean square height.
 const FLOOR: f64 = 1e-6;
 /// Smallest eigenvalue of the covariance of the logarithms over the largest.
@@ -47,13 +50,28 @@ pub fn measure(residual: &Grid, probabilities: &[f64], lag_max: usize) -> Wavele
         .collect();
     let values =
         (0..count * count).map(|at| upper[(at / count).min(at % count) * count + (at / count).max(at % count)]);
+    let mean_log: Vec<f64> = own.iter().map(|[mean, _]| *mean).collect();
+    let patches = masks.last().map(|mask| patches(residual, &logarithms, &mean_log, mask));
     Wavelets {
         differences,
         octaves: masks.len() as u32,
         floor_m,
-        mean_log: own.iter().map(|[mean, _]| *mean).collect(),
+        mean_log,
         covariance_log: positive(Symmetric { size: count, values: values.collect() }),
+        patches,
     }
+}
+
+/// Covariance by lag of the mean of all bands' logarithms about their means, on the cells of a mask.
+fn patches(residual: &Grid, logarithms: &[Vec<f64>], mean_log: &[f64], mask: &[bool]) -> LagCovariances {
+    let at = |k: usize| match mask[k] {
+        true => logarithms.iter().zip(mean_log).map(|(l, mean)| l[k] - mean).sum::<f64>() / mean_log.len() as f64,
+        false => f64::NAN,
+    };
+    let common = Grid::new(residual.geometry, (0..mask.len()).into_par_iter().map(at).collect());
+    let centre = sums::mean(&sums::finite(&common.values));
+    let lag_max = [residual.rows(), residual.cols()].map(|n| (n / 3).min(PATCH_LAG_MAX));
+    lags::measure(&common.map(|v| v - centre), lag_max)
 }
 
 /// For each octave that has enough of them, the cells whose wavelets touch no hole.
