@@ -36,7 +36,7 @@ mod transform;
 pub use fit::{flatness, flatness_at, measure};
 
 use super::statistics::{lags, spectrum};
-use super::tile;
+use super::{Cost, tile};
 use crate::synth::fft_ma::{Phase, random_column};
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, RealFft2, smooth_length};
@@ -59,6 +59,8 @@ pub const RANGE_CELLS_MIN: f64 = 1.5;
 const RANGE_SHARE_MAX: f64 = 0.25;
 /// Ranges of the amplitude that a torus is wider than a texture that is not periodic.
 const MARGIN_RANGES: f64 = 3.0;
+/// Bytes per torus cell at the peak.
+const BYTES_PER_CELL: u64 = 40;
 /// Square root of the smallest eigenvalue of W, relative to the largest, that is synthesised.
 const NEGLIGIBLE: f64 = 1e-9;
 
@@ -172,6 +174,15 @@ impl Modulated {
     ) -> Self {
         let (magnitudes, clip_share) = magnitudes(covariance_m2, torus, table, range_cells);
         Self { shape, torus, transform, log_variance, magnitudes, range_cells, clip_share }
+    }
+
+    /// Cost of [`Self::make`], with the spectrum.
+    pub fn cost(&self) -> Cost {
+        /// Operations for phases, exponential and tables of a cell.
+        const PER_CELL: f64 = 90.0;
+        let [cells, shown] = [self.torus, self.shape].map(|[rows, cols]| (rows * cols) as u64);
+        let operations = cells as f64 * (7.5 * libm::log2(cells as f64) + PER_CELL);
+        Cost { memory_bytes: BYTES_PER_CELL * cells + 8 * shown, operations }
     }
 
     /// Share of the spectrum of G that was negative and set to 0; the covariance is off by no more than this share of the variance of G.

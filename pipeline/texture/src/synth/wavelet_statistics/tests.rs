@@ -199,5 +199,6 @@ fn val_refusals() {
     headless.wavelets.differences.pop();
     assert_eq!(key(&headless, 1, [32, 32]).as_deref(), Some("statistics.wavelets.differences"));
     assert!(serde_json::from_str::<WaveletStatisticsParameters>("{ \"round\": 1 }").is_err());
-    assert_eq!(WaveletStatisticsParameters::default().memory_bytes([1024, 1024], [40, 40], 4), 168 << 20);
+    let cost = WaveletStatisticsParameters::default().cost([1024, 1024], [40, 40], 4);
+    assert_eq!(cost.memory_bytes, 168 << 20);
 }
