@@ -74,7 +74,7 @@ use target::Target;
 /// Name in the registry.
 pub const NAME: &str = "wavelet_statistics";
 
-/// Rounds with which the distances no longer fall.
+/// Rounds after which slopes, curvatures and increments no longer come nearer.
 const ROUNDS: u32 = 10;
 /// Most rounds.
 const ROUNDS_MAX: u32 = 200;
