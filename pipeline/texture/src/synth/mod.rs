@@ -15,7 +15,9 @@ pub mod fft_ma;
 pub mod gaussians;
 pub mod marginal;
 pub mod modulated;
+pub mod measured;
 pub mod quasi_wavelets;
+pub mod quilting;
 pub mod reach;
 pub mod scoreboard;
 pub mod statistics;
@@ -168,6 +170,69 @@ pub enum SynthesisError {
         limit: f64,
         /// A sufficient size, m.
         needed_m: f64,
+    },
+    /// A method that copies cells needs those of the site.
+    #[error(
+        "`{method}` copies cells of the site, which are {} m x {} m, but those of the texture are {} m x {} m; set `cell_m` to the site's, \
+         or resample the DEM",
+        to_micrometres(.site_m[0]), to_micrometres(.site_m[1]), to_micrometres(.tile_m[0]), to_micrometres(.tile_m[1])
+    )]
+    OtherCells {
+        /// Name of the method.
+        method: &'static str,
+        /// Cells of the site, east-west and north-south, m.
+        site_m: [f64; 2],
+        /// Cells of the texture, m.
+        tile_m: [f64; 2],
+    },
+    /// The site has no data.
+    #[error(
+        "the measured residual has no cell with data for `{method}` to copy; check the mask and the outer scale of the fit"
+    )]
+    NoResidual {
+        /// Name of the method.
+        method: &'static str,
+    },
+    /// Too little of the site is free of gaps.
+    #[error(
+        "the measured residual has {places} places of {side} m x {side} m without gaps, and `{method}` needs at least {least} to choose from; \
+         give a larger DEM or one with fewer gaps, or set `find_objects = false` if the objects are part of the texture",
+        side = to_micrometres(*.side_m)
+    )]
+    FewPlaces {
+        /// Name of the method.
+        method: &'static str,
+        /// Places without gaps.
+        places: usize,
+        /// Fewest that are accepted.
+        least: usize,
+        /// Side of a place, m.
+        side_m: f64,
+    },
+    /// Patches do not fit on a periodic tile.
+    #[error(
+        "a patch of {patch} m is wider than half of the periodic tile, {limit} m; set a smaller `patch_m`, enlarge the tile, or set \
+         periodic = false",
+        patch = to_micrometres(*.patch_m),
+        limit = to_micrometres(*.limit_m)
+    )]
+    PatchTooWide {
+        /// Side of a patch, m.
+        patch_m: f64,
+        /// Half of the tile's shorter side, m.
+        limit_m: f64,
+    },
+    /// Patches without room for an overlap.
+    #[error(
+        "`patch_m` is {patch}, too narrow for an overlap that can be cut; it must be at least {least} m",
+        patch = to_micrometres(*.patch_m),
+        least = to_micrometres(*.least_m)
+    )]
+    PatchTooNarrow {
+        /// Side of a patch, m.
+        patch_m: f64,
+        /// Least side, m.
+        least_m: f64,
     },
 }
 

@@ -1,0 +1,250 @@
+//! A measured residual to copy from, and how much of it a texture repeats.
+//!
+//! [`super::quilting`] and [`super::exemplar`] make a texture of cells of the site itself, so they need the residual (the DEM less its
+//! background), not its statistics. The texture is then derived from the DEM: the DEM licence extends to it, and it cannot be published
+//! where the DEM cannot.
+//!
+//! Both methods know the source of each cell. [`Copies`] summarises it: how long the copied runs are, how much of the site occurs, and
+//! how often one cell is repeated.
+
+use super::SynthesisError;
+use rayon::prelude::*;
+use sastrugi_numeric::{Geometry, Grid, sums};
+use std::f64::consts::E;
+
+/// Relative difference of cell sizes that counts as rounding.
+const CELL_TOLERANCE: f64 = 1e-6;
+/// Lags of the correlation reach this share of a side of the site.
+const LAG_SHARE: usize = 4;
+
+/// The residual of a measured site.
+#[derive(Clone, Debug)]
+pub struct Measured {
+    /// Heights minus background, m; NaN where there is no data or an object was left out. Cells as in the site.
+    pub residual: Grid,
+}
+
+/// A texture of copied cells.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Collage {
+    /// Heights, row-major, m.
+    pub heights_m: Vec<f64>,
+    /// What they repeat of the site.
+    pub copies: Copies,
+}
+
+/// How much of a site a texture repeats.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Copies {
+    /// Longest run of cells that follow each other in the site as they do in the texture, along a column and along a row, cells.
+    pub longest_run: [usize; 2],
+    /// Mean of these runs, each cell counted once, along columns and along rows, cells.
+    pub mean_run: [f64; 2],
+    /// Share of the site's cells with data that occur in the texture.
+    pub site_share: f64,
+    /// Most times that one cell of the site occurs.
+    pub uses_max: u32,
+}
+
+impl Measured {
+    /// Refuses a texture whose cells are not those of the site.
+    ///
+    /// # Errors
+    /// [`SynthesisError::OtherCells`]; [`SynthesisError::NoResidual`] if no cell of the site has data.
+    pub(super) fn check(&self, tile: &Geometry, method: &'static str) -> Result<(), SynthesisError> {
+        let (site_m, tile_m) = (self.residual.geometry.cell, tile.cell);
+        if (0..2).any(|k| (tile_m[k] - site_m[k]).abs() > CELL_TOLERANCE * site_m[k]) {
+            return Err(SynthesisError::OtherCells { method, site_m, tile_m });
+        }
+        if self.residual.values.iter().all(|z| !z.is_finite()) {
+            return Err(SynthesisError::NoResidual { method });
+        }
+        Ok(())
+    }
+
+    /// Smallest lag at which the correlation has fallen below 1/e, north-south and east-west, cells: at least 1, at most a quarter of
+    /// the side.
+    pub(super) fn correlation_cells(&self) -> [usize; 2] {
+        let variance_m2 = self.covariance_m2([0, 0]);
+        let sides = [self.residual.rows(), self.residual.cols()];
+        [0, 1].map(|axis| {
+            let limit = (sides[axis] / LAG_SHARE).max(1);
+            let at = |lag: usize| self.covariance_m2(if axis == 0 { [lag, 0] } else { [0, lag] });
+            (1..limit).find(|&lag| at(lag) * E < variance_m2).unwrap_or(limit)
+        })
+    }
+
+    /// Mean product of the pairs of cells at a lag of cells south and east; the mean of a residual is 0. NaN without pairs.
+    fn covariance_m2(&self, [south, east]: [usize; 2]) -> f64 {
+        let z = &self.residual;
+        let of_row = |r: usize| {
+            let pairs = z.row(r).iter().zip(&z.row(r + south)[east.min(z.cols())..]);
+            let products = pairs.map(|(a, b)| a * b).filter(|product| product.is_finite());
+            products.fold((0.0, 0_usize), |(sum, count), product| (sum + product, count + 1))
+        };
+        let rows: Vec<(f64, usize)> = (0..z.rows().saturating_sub(south)).into_par_iter().map(of_row).collect();
+        let count: usize = rows.iter().map(|(_, count)| count).sum();
+        sums::sum(&rows.iter().map(|(sum, _)| *sum).collect::<Vec<_>>()) / count as f64
+    }
+}
+
+/// Counts of cells without data, by window.
+pub(super) struct Holes {
+    cols: usize,
+    /// Cells without data north-west of each corner of a cell, row-major.
+    counts: Vec<u32>,
+}
+
+impl Holes {
+    /// The holes of a grid.
+    pub(super) fn of(grid: &Grid) -> Self {
+        let (rows, cols) = (grid.rows(), grid.cols() + 1);
+        let mut counts = vec![0; (rows + 1) * cols];
+        for r in 0..rows {
+            let mut in_row = 0;
+            for (c, z) in grid.row(r).iter().enumerate() {
+                in_row += u32::from(!z.is_finite());
+                counts[(r + 1) * cols + c + 1] = counts[r * cols + c + 1] + in_row;
+            }
+        }
+        Self { cols, counts }
+    }
+
+    /// Whether all cells of a window have data. The window lies within the grid.
+    pub(super) fn is_complete(&self, [row, col]: [usize; 2], [rows, cols]: [usize; 2]) -> bool {
+        let at = |r: usize, c: usize| self.counts[r * self.cols + c];
+        at(row + rows, col + cols) + at(row, col) == at(row, col + cols) + at(row + rows, col)
+    }
+
+    /// First cells of the complete windows of a shape, every `step` cells each way, row by row.
+    pub(super) fn complete_windows(&self, shape: [usize; 2], step: usize) -> Vec<[usize; 2]> {
+        let sides = [self.counts.len() / self.cols - 1, self.cols - 1];
+        let starts = |axis: usize| (0..(sides[axis] + 1).saturating_sub(shape[axis])).step_by(step);
+        let all = starts(0).flat_map(|row| starts(1).map(move |col| [row, col]));
+        all.filter(|&at| self.is_complete(at, shape)).collect()
+    }
+}
+
+impl Copies {
+    /// The copies in a texture of `rows` by `cols` cells, of which cell k is cell `sources[k]` of the site.
+    pub(super) fn of(sources: &[u32], [rows, cols]: [usize; 2], site: &Grid) -> Self {
+        let site_cols = site.cols() as u32;
+        let follows_south = |a: u32, b: u32| b == a + site_cols;
+        let follows_east = |a: u32, b: u32| b == a + 1 && !b.is_multiple_of(site_cols);
+        let (south, south_mean) = runs(sources, cols, [cols, 1], rows, follows_south);
+        let (east, east_mean) = runs(sources, rows, [1, cols], cols, follows_east);
+        let mut uses = vec![0_u32; site.values.len()];
+        sources.iter().for_each(|&source| uses[source as usize] += 1);
+        let used = uses.iter().filter(|n| **n > 0).count();
+        Self {
+            longest_run: [south, east],
+            mean_run: [south_mean, east_mean],
+            site_share: used as f64 / site.finite_count() as f64,
+            uses_max: uses.iter().copied().max().unwrap_or(0),
+        }
+    }
+}
+
+/// Longest and mean length of the runs along `lines` lines of `length` cells; `[step, stride]` leads to the next cell and the next line.
+fn runs(
+    sources: &[u32],
+    lines: usize,
+    [step, stride]: [usize; 2],
+    length: usize,
+    follows: impl Fn(u32, u32) -> bool,
+) -> (usize, f64) {
+    let (mut longest, mut squares) = (0, 0_u64);
+    for line in 0..lines {
+        let mut run = 0;
+        for k in 0..length {
+            run += 1;
+            let here = line * stride + k * step;
+            if k + 1 == length || !follows(sources[here], sources[here + step]) {
+                longest = longest.max(run);
+                squares += (run * run) as u64;
+                run = 0;
+            }
+        }
+    }
+    // A run of n cells counts n times, once for each cell.
+    (longest, squares as f64 / (lines * length) as f64)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::Streams;
+
+    fn grid(rows: usize, cols: usize, f: impl Fn(usize, usize) -> f64) -> Grid {
+        Grid::new(Geometry::square(rows, cols, 0.5), (0..rows * cols).map(|k| f(k / cols, k % cols)).collect())
+    }
+
+    /// By hand: two rows of the site under each other, of which the second is cut after two cells; then a row that continues around the
+    /// end of a row of the site, which is no run.
+    #[test]
+    fn val_runs_by_hand() {
+        let site = grid(4, 4, |_, _| 1.0);
+        let sources = [0, 1, 2, 3, 4, 5, 10, 11, 2, 3, 4, 5];
+        let copies = Copies::of(&sources, [3, 4], &site);
+        assert_eq!(copies.longest_run, [2, 4]);
+        // Along rows: 4; 2 and 2; 2 and 2. Along columns: (0, 4) and (1, 5) are runs of 2, everything else is alone.
+        assert!((copies.mean_run[1] - (16.0 + 4.0 * 4.0) / 12.0).abs() < 1e-15);
+        assert!((copies.mean_run[0] - (2.0 * 4.0 + 8.0) / 12.0).abs() < 1e-15);
+        assert_eq!((copies.site_share, copies.uses_max), (0.5, 2));
+    }
+
+    /// Windows without holes, against a count of their cells.
+    #[test]
+    fn prop_complete_windows_have_no_hole() {
+        let mut stream = Streams::for_seed(1, "measured-test").stream("holes");
+        let values: Vec<f64> = (0..23 * 31).map(|_| if stream.uniform() < 0.06 { f64::NAN } else { 1.0 }).collect();
+        let site = Grid::new(Geometry::square(23, 31, 1.0), values);
+        let holes = Holes::of(&site);
+        for (shape, step) in [([1, 1], 1), ([3, 4], 1), ([5, 2], 2), ([23, 1], 1), ([24, 1], 1), ([2, 31], 3)] {
+            let mut expected = Vec::new();
+            for row in (0..23).step_by(step).filter(|r| r + shape[0] <= 23) {
+                for col in (0..31).step_by(step).filter(|c| c + shape[1] <= 31) {
+                    if site.window(row, col, shape[0], shape[1]).finite_count() == shape[0] * shape[1] {
+                        expected.push([row, col]);
+                    }
+                }
+            }
+            assert_eq!(holes.complete_windows(shape, step), expected, "{shape:?} {step}");
+        }
+    }
+
+    /// Two waves along the two axes, each with half of the variance: along one axis the other wave stays fully correlated, so the
+    /// correlation falls below 1/e where `cos(2 pi lag / period) = 2 / e - 1`, after 0.2925 of the period: 11.7 of 40 cells, 5.9 of 20.
+    #[test]
+    fn val_correlation_of_waves() {
+        let wave = |at: usize, period: f64| libm::cos(std::f64::consts::TAU * at as f64 / period);
+        let site = grid(200, 200, |r, c| wave(r, 40.0) + wave(c, 20.0));
+        let share = libm::acos(2.0 / E - 1.0) / std::f64::consts::TAU;
+        let expected = [40.0, 20.0].map(|period| (share * period).ceil() as usize);
+        assert_eq!(Measured { residual: site }.correlation_cells(), expected);
+    }
+
+    /// Without data at any lag, the longest lag is taken.
+    #[test]
+    fn val_correlation_of_one_cell() {
+        let site = grid(9, 40, |r, c| if (r, c) == (4, 4) { 1.0 } else { f64::NAN });
+        assert_eq!(Measured { residual: site }.correlation_cells(), [2, 10]);
+    }
+
+    #[test]
+    fn val_refusals() {
+        let measured = Measured { residual: grid(4, 4, |_, _| 0.0) };
+        let tile = Geometry::square(4, 4, 0.1);
+        assert_eq!(
+            measured.check(&tile, "quilting").unwrap_err().to_string(),
+            "`quilting` copies cells of the site, which are 0.5 m x 0.5 m, but those of the texture are 0.1 m x 0.1 m; set `cell_m` to \
+             the site's, or resample the DEM"
+        );
+        assert!(measured.check(&Geometry::square(9, 9, 0.5 + 1e-9), "quilting").is_ok());
+        let empty = Measured { residual: grid(4, 4, |_, _| f64::NAN) };
+        assert_eq!(
+            empty.check(&Geometry::square(4, 4, 0.5), "exemplar").unwrap_err().to_string(),
+            "the measured residual has no cell with data for `exemplar` to copy; check the mask and the outer scale of the fit"
+        );
+    }
+}
