@@ -14,6 +14,8 @@ use std::f64::consts::E;
 
 /// Relative difference of cell sizes that counts as rounding.
 const CELL_TOLERANCE: f64 = 1e-6;
+/// Heights this close are the same, m.
+const COPY_TOLERANCE_M: f64 = 1e-9;
 /// Lags of the correlation reach this share of a side of the site.
 const LAG_SHARE: usize = 4;
 
@@ -44,6 +46,18 @@ pub struct Copies {
     pub site_share: f64,
     /// Most times that one cell of the site occurs.
     pub uses_max: u32,
+    /// Share of the texture's cells that have the height of their source; the others are blended or shifted.
+    pub verbatim_share: f64,
+}
+
+impl Collage {
+    /// A texture of `rows` by `cols` cells, of which cell k comes from cell `sources[k]` of the site.
+    pub(super) fn new(heights_m: Vec<f64>, sources: &[u32], shape: [usize; 2], site: &Grid) -> Self {
+        let is_copy = |(z, &k): (&f64, &u32)| (z - site.values[k as usize]).abs() <= COPY_TOLERANCE_M;
+        let copied = heights_m.iter().zip(sources).filter(|&pair| is_copy(pair)).count();
+        let verbatim_share = copied as f64 / heights_m.len() as f64;
+        Self { copies: Copies { verbatim_share, ..Copies::of(sources, shape, site) }, heights_m }
+    }
 }
 
 impl Measured {
@@ -110,10 +124,15 @@ impl Holes {
         Self { cols, counts }
     }
 
-    /// Whether all cells of a window have data. The window lies within the grid.
-    pub(super) fn is_complete(&self, [row, col]: [usize; 2], [rows, cols]: [usize; 2]) -> bool {
+    /// Number of cells without data in a window, which lies within the grid.
+    pub(super) fn missing(&self, [row, col]: [usize; 2], [rows, cols]: [usize; 2]) -> u32 {
         let at = |r: usize, c: usize| self.counts[r * self.cols + c];
-        at(row + rows, col + cols) + at(row, col) == at(row, col + cols) + at(row + rows, col)
+        at(row + rows, col + cols) + at(row, col) - at(row, col + cols) - at(row + rows, col)
+    }
+
+    /// Whether all cells of a window have data.
+    pub(super) fn is_complete(&self, at: [usize; 2], shape: [usize; 2]) -> bool {
+        self.missing(at, shape) == 0
     }
 
     /// First cells of the complete windows of a shape, every `step` cells each way, row by row.
@@ -126,8 +145,8 @@ impl Holes {
 }
 
 impl Copies {
-    /// The copies in a texture of `rows` by `cols` cells, of which cell k is cell `sources[k]` of the site.
-    pub(super) fn of(sources: &[u32], [rows, cols]: [usize; 2], site: &Grid) -> Self {
+    /// The copies in a texture of `rows` by `cols` cells, of which cell k comes from cell `sources[k]` of the site.
+    fn of(sources: &[u32], [rows, cols]: [usize; 2], site: &Grid) -> Self {
         let site_cols = site.cols() as u32;
         let follows_south = |a: u32, b: u32| b == a + site_cols;
         let follows_east = |a: u32, b: u32| b == a + 1 && !b.is_multiple_of(site_cols);
@@ -141,6 +160,7 @@ impl Copies {
             mean_run: [south_mean, east_mean],
             site_share: used as f64 / site.finite_count() as f64,
             uses_max: uses.iter().copied().max().unwrap_or(0),
+            verbatim_share: 1.0,
         }
     }
 }
@@ -191,6 +211,10 @@ mod tests {
         assert!((copies.mean_run[1] - (16.0 + 4.0 * 4.0) / 12.0).abs() < 1e-15);
         assert!((copies.mean_run[0] - (2.0 * 4.0 + 8.0) / 12.0).abs() < 1e-15);
         assert_eq!((copies.site_share, copies.uses_max), (0.5, 2));
+        // Three of the heights are those of their sources.
+        let heights_m = [1.0, 1.0 + 1e-12, 1.0, 2.0, 0.0, 1.5, 3.0, -1.0, 1.001, 7.0, 8.0, 9.0].to_vec();
+        let collage = Collage::new(heights_m, &sources, [3, 4], &site);
+        assert_eq!(collage.copies, Copies { verbatim_share: 0.25, ..copies });
     }
 
     /// Windows without holes, against a count of their cells.

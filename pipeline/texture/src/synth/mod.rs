@@ -11,6 +11,7 @@
 pub mod bumps;
 pub mod cholesky;
 pub mod conditional;
+pub mod exemplar;
 pub mod fft_ma;
 pub mod gaussians;
 pub mod marginal;

@@ -24,18 +24,20 @@
 //! # Limits
 //! * Features wider than a patch are lost; a single striking feature (a boulder, a rut) comes back as often as its patch is chosen.
 //! * On a site that is not stationary (half gullies, half plain) gullies start and end at cuts: cut the site to one kind of ground.
-//! * Patches with a gap are not used. A site with scattered gaps gets smaller patches; below [`PATCH_MIN`] cells it is refused.
+//! * Gaps of less than about 13 cells are closed first, by direct sampling from the site itself ([`super::exemplar`]). Patches with a wider gap are not
+//!   used: a site with many gets smaller patches; below [`PATCH_MIN`] cells it is refused.
 //! * No statistic is beyond the site's: a texture from one boulder never shows two kinds. The DEM licence extends to it.
 //!
 //! # Cost
 //! Per patch three transforms of at most 65 536 blocks, and 64 exact comparisons for each cell of a block: 1024 x 1024 cells take some 250
-//! patches of 96. Memory: 32 bytes per cell of the site, 24 per cell of the texture, and 8 MB.
+//! patches of 96. Memory: 48 bytes per cell of the site, 24 per cell of the texture, and 8 MB.
 
 pub mod cut;
 mod search;
 
 use super::SynthesisError;
-use super::measured::{Collage, Copies, Holes, Measured};
+use super::exemplar::sampling::{self, Field};
+use super::measured::{Collage, Holes, Measured};
 use super::tile::{self, Tile};
 use cut::Strips;
 use sastrugi_numeric::{Grid, Streams};
@@ -47,13 +49,15 @@ use serde::{Deserialize, Serialize};
 /// Name of the method.
 const NAME: &str = "quilting";
 /// Width of a patch in correlation lengths (lag at which the correlation is 1/e), if not stated.
-const PATCH_LENGTHS: usize = 12;
+const PATCH_LENGTHS: usize = 6;
 /// Widest patch that is chosen, share of the site's shorter side.
 const PATCH_SHARE: f64 = 0.25;
 /// Narrowest patch, cells: three overlaps of four cells.
 pub const PATCH_MIN: usize = 12;
 /// A patch is narrowed until the complete patches of a site cover this share of its cells with data.
 const COVERED_SHARE: f64 = 0.8;
+/// Gaps are closed where at least half of a window of this many cells has data.
+const GAP: usize = 13;
 /// Fewest complete patches to choose from.
 const PLACES_MIN: usize = 100;
 
@@ -61,7 +65,7 @@ const PLACES_MIN: usize = 100;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct QuiltingParameters {
-    /// Side of a patch, m. Default: 12 times the lag at which the residual's correlation is 1/e, at most a quarter of the site and (periodic)
+    /// Side of a patch, m. Default: 6 times the lag at which the residual's correlation is 1/e, at most a quarter of the site and (periodic)
     /// half of the tile, and as narrow as the gaps of the site require.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub patch_m: Option<f64>,
@@ -305,14 +309,13 @@ impl Canvas {
         }
     }
 
-    /// The part of the canvas that a tile of `rows` by `cols` fills.
-    fn tile(&self, [rows, cols]: [usize; 2], site: &Grid) -> Collage {
+    /// The part of the canvas that a tile of `rows` by `cols` fills, whose sources are cells of a closed site.
+    fn tile(&self, [rows, cols]: [usize; 2], closed: &Field, site: &Grid) -> Collage {
         let lines = || (0..rows).map(move |r| r * self.shape[1]..r * self.shape[1] + cols);
-        let sources: Vec<u32> = lines().flat_map(|line| &self.sources[line]).copied().collect();
-        Collage {
-            heights_m: lines().flat_map(|line| &self.heights_m[line]).copied().collect(),
-            copies: Copies::of(&sources, [rows, cols], site),
-        }
+        let sources: Vec<u32> =
+            lines().flat_map(|line| &self.sources[line]).map(|&k| closed.sources[k as usize]).collect();
+        let heights_m = lines().flat_map(|line| &self.heights_m[line]).copied().collect();
+        Collage::new(heights_m, &sources, [rows, cols], site)
     }
 }
 
@@ -332,7 +335,7 @@ fn weights(replaced: &[bool], [rows, cols]: [usize; 2]) -> Vec<f64> {
     [0, 1, 0, 1].into_iter().fold(mask, |values, axis| smoothed(&values, axis))
 }
 
-/// A texture of patches of a measured residual. Streams: `patches`.
+/// A texture of patches of a measured residual. Streams: `patches`, `gaps`.
 ///
 /// # Errors
 /// Cells that are not the site's; a site without data; a patch too wide for the tile, too narrow, or with too few complete places in the site.
@@ -343,7 +346,9 @@ pub fn synthesise(
     streams: &Streams,
 ) -> Result<Collage, SynthesisError> {
     measured.check(&tile.geometry, NAME)?;
-    let (site, holes) = (&measured.residual, Holes::of(&measured.residual));
+    let closed = sampling::closed(&measured.residual, GAP, streams);
+    let site = &closed.grid(measured.residual.geometry);
+    let holes = Holes::of(site);
     let layout = Layout::new(parameters.patch(measured, &holes, tile)?, parameters.overlap, tile);
     let [down, across] = [0, 1].map(|axis| layout.starts[axis].len());
     let QuiltingParameters { tolerance, reuse, .. } = *parameters;
@@ -364,7 +369,7 @@ pub fn synthesise(
         canvas.lay(&cells, site, from, layout.patch, &layout.strips(place));
         laid[k] = Some(from);
     }
-    Ok(canvas.tile([tile.geometry.rows, tile.geometry.cols], site))
+    Ok(canvas.tile([tile.geometry.rows, tile.geometry.cols], &closed, &measured.residual))
 }
 
 #[cfg(test)]

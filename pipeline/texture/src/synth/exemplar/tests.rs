@@ -1,0 +1,136 @@
+use super::*;
+use crate::synth::tile::TileParameters;
+use sastrugi_numeric::filters::gaussian_low_pass;
+use sastrugi_numeric::{Geometry, Grid, sums};
+
+fn noise(rows: usize, cols: usize, purpose: &str) -> Grid {
+    let mut stream = Streams::for_seed(12, "exemplar-test").stream(purpose);
+    Grid::new(Geometry::square(rows, cols, 0.1), (0..rows * cols).map(|_| stream.normal()).collect())
+}
+
+/// Ground whose roughness comes in patches.
+fn intermittent(rows: usize, cols: usize) -> Grid {
+    let (ground, amplitude) = (noise(rows, cols, "ground"), noise(rows, cols, "amplitude"));
+    let (ground, amplitude) = (gaussian_low_pass(&ground, 1.5), gaussian_low_pass(&amplitude, 6.0));
+    let height = |k: usize| ground.values[k] * libm::exp(8.0 * amplitude.values[k]);
+    Grid::new(ground.geometry, (0..rows * cols).map(height).collect())
+}
+
+fn tile(rows: u32, cols: u32, periodic: bool) -> Tile {
+    let cell_m = tile::Cell::Square(0.1);
+    Tile::check(TileParameters { size_px: Some([cols, rows]), cell_m, ..TileParameters::default() }, periodic).unwrap()
+}
+
+fn made(site: &Grid, tile: &Tile, seed: u64) -> Collage {
+    let measured = Measured { residual: site.clone() };
+    synthesise(&measured, tile, &ExemplarParameters::default(), &Streams::for_seed(seed, "texture")).unwrap()
+}
+
+fn mean_square(values: impl Iterator<Item = f64>) -> f64 {
+    sums::mean(&values.map(|v| v * v).collect::<Vec<_>>())
+}
+
+/// Increments along rows.
+fn east(heights: &[f64], cols: usize) -> impl Iterator<Item = f64> {
+    heights.chunks(cols).flat_map(|row| row.windows(2)).map(|pair| pair[1] - pair[0])
+}
+
+/// Increments along columns.
+fn south(heights: &[f64], cols: usize) -> impl Iterator<Item = f64> {
+    heights.iter().zip(&heights[cols..]).map(|(a, b)| b - a)
+}
+
+/// Standard deviation and increments are the site's to 20 %, and their flatness, about 5 rather than the 3 of any Gaussian field, to a
+/// factor of 1.8.
+#[test]
+fn val_statistics_of_an_intermittent_site() {
+    let site = intermittent(256, 256);
+    let heights = made(&site, &tile(256, 256, true), 4).heights_m;
+    let ratio = |of: &dyn Fn(&[f64]) -> f64| of(&heights) / of(&site.values);
+    let rms = ratio(&|z| mean_square(z.iter().copied())).sqrt();
+    let increment = ratio(&|z| mean_square(east(z, 256))).sqrt();
+    let flatness = |z: &[f64]| {
+        let square = mean_square(east(z, 256));
+        mean_square(east(z, 256).map(|d| d * d)) / (square * square)
+    };
+    assert!((rms - 1.0).abs() < 0.2 && (increment - 1.0).abs() < 0.2, "{rms} {increment}");
+    assert!(flatness(&site.values) > 4.0 && (0.55..1.8).contains(&ratio(&flatness)), "{}", ratio(&flatness));
+}
+
+/// Across the border of a periodic tile, heights differ no more than within it; without `periodic` they do. The sizes are no multiples of
+/// the spacing.
+#[test]
+fn prop_periodic_tiles_have_no_seam() {
+    let site = gaussian_low_pass(&noise(150, 150, "smooth"), 2.5);
+    for periodic in [true, false] {
+        let z = made(&site, &tile(101, 90, periodic), 3).heights_m;
+        let across = mean_square(z.chunks(90).map(|row| row[0] - row[89])) / mean_square(east(&z, 90));
+        let around = mean_square((0..90).map(|c| z[c] - z[100 * 90 + c])) / mean_square(south(&z, 90));
+        assert!([across, around].iter().all(|ratio| (ratio.sqrt() < 1.8) == periodic), "{periodic}: {across} {around}");
+    }
+}
+
+/// Waves across one axis stay so: the ratio of the increments along the two axes is the site's to 25 %.
+#[test]
+fn prop_anisotropy_is_kept() {
+    let round = gaussian_low_pass(&noise(160, 480, "ridges"), 1.5);
+    let geometry = Geometry::square(160, 160, 0.1);
+    let site = Grid::new(geometry, (0..160 * 160).map(|k| round.at(k / 160, 3 * (k % 160))).collect());
+    let ratio = |z: &[f64], cols: usize| (mean_square(east(z, cols)) / mean_square(south(z, cols))).sqrt();
+    let (found, expected) = (ratio(&made(&site, &tile(128, 128, true), 2).heights_m, 128), ratio(&site.values, 160));
+    assert!(expected > 2.0 && (found / expected - 1.0).abs() < 0.25, "{found} {expected}");
+}
+
+/// A third of the site is missing, in gaps of all sizes; the texture is complete.
+#[test]
+fn prop_sites_may_have_gaps() {
+    let mut site = intermittent(120, 130);
+    let gaps = gaussian_low_pass(&noise(120, 130, "gaps"), 2.0);
+    site.values.iter_mut().zip(&gaps.values).filter(|(_, gap)| **gap > 0.06).for_each(|(z, _)| *z = f64::NAN);
+    assert!(site.finite_count() < 120 * 130 * 3 / 4);
+    let collage = made(&site, &tile(70, 90, false), 1);
+    assert!(collage.heights_m.iter().all(|z| z.is_finite()));
+    let copies = collage.copies;
+    assert!(copies.longest_run.iter().all(|run| (2..60).contains(run)), "{copies:?}");
+    assert!(copies.site_share > 0.1 && copies.verbatim_share < 1.0, "{copies:?}");
+}
+
+#[test]
+fn prop_threads_change_no_bit() {
+    let site = intermittent(100, 110);
+    let pool = |threads| rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+    let run = |threads| pool(threads).install(|| made(&site, &tile(90, 100, true), 7));
+    let bits = |collage: &Collage| collage.heights_m.iter().map(|z| z.to_bits()).collect::<Vec<u64>>();
+    let (alone, three) = (run(1), run(3));
+    assert_eq!((bits(&alone), &alone.copies), (bits(&three), &three.copies));
+    assert_ne!(bits(&alone), bits(&made(&site, &tile(90, 100, true), 8)));
+}
+
+/// By hand: a correlation length of 5 cells gives 10, rounded up to 16; a stated spacing replaces it; a small tile halves it.
+#[test]
+fn val_spacing_by_hand() {
+    let measured = Measured { residual: gaussian_low_pass(&noise(300, 300, "smooth"), 2.4) };
+    let base = ExemplarParameters::default();
+    assert_eq!(base.spacing(&measured, &tile(300, 300, true)), 16);
+    assert_eq!(base.spacing(&measured, &tile(20, 300, true)), 8);
+    assert_eq!(base.spacing(&measured, &tile(1, 300, true)), 2);
+    let wide = ExemplarParameters { spacing_m: Some(1.7), ..base };
+    assert_eq!(wide.spacing(&measured, &tile(300, 300, true)), 32);
+}
+
+#[test]
+fn val_refusals() {
+    let key = |parameters: ExemplarParameters| parameters.check().err().map(|e| e.key);
+    let base = ExemplarParameters::default;
+    assert_eq!(key(base()), None);
+    assert_eq!(key(ExemplarParameters { spacing_m: Some(-1.0), ..base() }).as_deref(), Some("spacing_m"));
+    assert_eq!(key(ExemplarParameters { neighbours: 3, ..base() }).as_deref(), Some("neighbours"));
+    assert_eq!(key(ExemplarParameters { scan: 100_001, ..base() }).as_deref(), Some("scan"));
+    let measured = Measured { residual: noise(30, 30, "small") };
+    let error = synthesise(&measured, &tile(50, 50, true), &base(), &Streams::for_seed(1, "texture")).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "the measured residual has 900 places of 0.1 m x 0.1 m without gaps, and `exemplar` needs at least 1000 to choose from; give a \
+         larger DEM or one with fewer gaps, or set `find_objects = false` if the objects are part of the texture"
+    );
+}
