@@ -70,7 +70,7 @@ fn prop_periodic_tiles_have_no_seam() {
     }
 }
 
-/// Waves across one axis stay so: the ratio of the increments along the two axes is the site's to 25 %.
+/// Ridges keep their direction: the ratio of the increments across and along them is the site's to 35 % (the module header says why it falls).
 #[test]
 fn prop_anisotropy_is_kept() {
     let round = gaussian_low_pass(&noise(160, 480, "ridges"), 1.5);
@@ -78,7 +78,7 @@ fn prop_anisotropy_is_kept() {
     let site = Grid::new(geometry, (0..160 * 160).map(|k| round.at(k / 160, 3 * (k % 160))).collect());
     let ratio = |z: &[f64], cols: usize| (mean_square(east(z, cols)) / mean_square(south(z, cols))).sqrt();
     let (found, expected) = (ratio(&made(&site, &tile(128, 128, true), 2).heights_m, 128), ratio(&site.values, 160));
-    assert!(expected > 2.0 && (found / expected - 1.0).abs() < 0.25, "{found} {expected}");
+    assert!(expected > 2.0 && (found / expected - 1.0).abs() < 0.35, "{found} {expected}");
 }
 
 /// A third of the site is missing, in gaps of all sizes; the texture is complete.

@@ -225,7 +225,7 @@ fn prop_threads_change_no_bit() {
     assert_ne!(bits(&alone), bits(&made(&site, &tile(128, 128, true), &parameters(2.5), 8)));
 }
 
-/// The side that is chosen: 6 correlation lengths, a quarter of the site, half of the tile, or what the gaps leave.
+/// The side that is chosen: 6 correlation lengths, a third of the site, half of the tile, or what the gaps leave.
 #[test]
 fn val_the_patch_follows_site_tile_and_gaps() {
     let side = |site: &Grid, tile: &Tile| {
@@ -236,7 +236,7 @@ fn val_the_patch_follows_site_tile_and_gaps() {
     let site = gaussian_low_pass(&noise(400, 400, "smooth"), 2.4);
     let wide = tile(400, 400, false);
     assert_eq!(side(&site, &wide), 30);
-    assert_eq!(side(&site.window(0, 0, 400, 100), &wide), 25);
+    assert_eq!(side(&site.window(0, 0, 400, 75), &wide), 25);
     assert_eq!(side(&site, &tile(48, 400, true)), 24);
     let mut gaps = site.clone();
     (0..400 * 400).filter(|k| k % 400 % 22 == 0).for_each(|k| gaps.values[k] = f64::NAN);
