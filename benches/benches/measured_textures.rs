@@ -1,7 +1,7 @@
 //! Textures copied from a measured residual, 1024 x 1024 cells from 1024 x 1024 cells.
 //!
 //! Targets on one core: `quilting` within 2 s, `exemplar` within 30 s. The site is a Gaussian field with an exponential covariance of 8
-//! cells times the exponential of a smoother one: rough in patches. Floor: an FFT-MA texture of the same size (`fft_ma`).
+//! cells times the exponential of a smoother one: rough in patches. Floor: an FFT-MA texture of the same size (`fft_ma_1024`).
 //! Run one-threaded: `RAYON_NUM_THREADS=1 cargo bench -p sastrugi-benches --bench measured_textures`.
 
 use divan::Bencher;
@@ -49,19 +49,19 @@ fn tile() -> Tile {
 }
 
 #[divan::bench(sample_count = 20)]
-fn fft_ma(bencher: Bencher) {
+fn fft_ma_1024(bencher: Bencher) {
     let texture = gaussian(0.05, 0.8);
     bencher.counter(ItemsCount::new(CELLS)).bench(|| texture.generate(&streams()));
 }
 
 #[divan::bench(sample_count = 3)]
-fn quilting(bencher: Bencher) {
+fn quilting_1024(bencher: Bencher) {
     let (site, tile, parameters) = (site(), tile(), QuiltingParameters::default());
     bencher.counter(ItemsCount::new(CELLS)).bench(|| quilting::synthesise(&site, &tile, &parameters, &streams()));
 }
 
 #[divan::bench(sample_count = 3)]
-fn exemplar(bencher: Bencher) {
+fn exemplar_1024(bencher: Bencher) {
     let (site, tile, parameters) = (site(), tile(), ExemplarParameters::default());
     bencher.counter(ItemsCount::new(CELLS)).bench(|| exemplar::synthesise(&site, &tile, &parameters, &streams()));
 }

@@ -12,7 +12,8 @@
 //!
 //! # Copies
 //! Places that continue a neighbour copy runs of the site, as long as they fit best; the first cells, drawn alone, end each run after about one
-//! spacing. [`super::measured::Copies`] reports the runs and the share of cells that have the very height of their source.
+//! spacing. A run keeps the level it began with, so it copies details: hardly a cell has the very height of its source.
+//! [`super::measured::Copies`] reports both.
 //!
 //! # Sources
 //! * Mariethoz, Renard and Straubhaar 2010, The direct sampling method to perform multiple-point geostatistical simulations, Water

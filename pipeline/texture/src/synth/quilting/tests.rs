@@ -143,7 +143,7 @@ fn prop_copied_runs_are_no_longer_than_a_patch() {
     let collage = made(&site, &tile(140, 150, false), &QuiltingParameters { tolerance: 0.0, ..parameters(3.0) }, 1);
     let copies = &collage.copies;
     assert!(copies.longest_run.into_iter().all(|run| (15..=30).contains(&run)), "{copies:?}");
-    // 49 patches on a site of less than 30 that do not overlap: at most 6 start within half a patch of each place, and four such places
+    // 42 patches on a site with room for 26 that do not overlap: at most 5 start within half a patch of each place, and four such places
     // around a cell reach it.
     assert!(copies.site_share > 0.3 && copies.uses_max <= 24, "{copies:?}");
 }
