@@ -1,7 +1,7 @@
-//! Statistics that a fitted covariance does not prescribe, for judging a synthetic texture against the measured surface.
+//! Statistics for judging a synthetic texture against the measured surface, most of which a fitted covariance does not prescribe.
 //!
 //! # What
-//! For a residual (heights minus background), over cells with data:
+//! For a residual (heights minus background), over cells with data ([`unfitted_statistics`]):
 //! * `slope_distribution`: quantiles of the slope magnitude (central differences), m/m;
 //! * `curvature_distribution`: quantiles of the Laplacian (five points), 1/m;
 //! * `increment_flatness`: `ln (<d^4> / <d^2>^2)` of the increments d over lags of 1, 2, 4 ... cells, both axes together; ln 3 for
@@ -12,6 +12,13 @@
 //! * `directional_psd`: `ln` of the mean power in sectors of 30 degrees over the mean of all, between the longest increment and half
 //!   the Nyquist frequency.
 //!
+//! [`surface_statistics`] adds what a fit may set, and the shape of the sets above a level:
+//! * `covariance`: mean product of the residuals, m²: at lag 0, then at 1, 2, 3 ... cells east-west, then north-south;
+//! * `height_distribution`: 99 quantiles over their root mean square, so that unit and sigma do not count; it is also the area above a level,
+//!   the first Minkowski functional;
+//! * `boundary_by_level` and `euler_by_level`: boundary length (1/m) and Euler characteristic (1/m²), per area, of the sets of the highest 10,
+//!   20 ... 90 % of the cells ([`crate::minkowski()`]). Levels are shares of area, so that the height distribution does not count again.
+//!
 //! # Sources
 //! Flatness and third-order structure function: Frisch, Turbulence (1995), sections 6.2 and 8.2. Density of extrema: Longuet-Higgins (1957).
 //!
@@ -19,12 +26,18 @@
 //! Some 20 passes, two sorts and one transform of the raster; 80 bytes per cell. Compare statistics only between surfaces with
 //! the same mask: holes leak into the spectrum.
 
+use crate::lags::LagSums;
+use crate::minkowski::{Minkowski, minkowski};
 use sastrugi_numeric::fft::{RealFft2, smooth_length};
 use sastrugi_numeric::{Grid, sums};
 use std::f64::consts::{PI, TAU};
 
 /// Number of quantiles of slopes and curvatures, at `(k + 1/2) / 19`.
 const QUANTILES: usize = 19;
+/// Number of quantiles of heights, at `(k + 1/2) / 99`.
+const HEIGHTS: usize = 99;
+/// Number of levels of the Minkowski functionals, at shares of `k / 10` of the area.
+const LEVELS: usize = 9;
 /// Sectors in half a turn.
 const SECTORS: usize = 6;
 
@@ -35,30 +48,103 @@ pub struct Statistic {
     pub name: &'static str,
     /// Values; NaN where there is no data.
     pub values: Vec<f64>,
-    /// Whether the values have a unit, in which case differences are taken relative to their size.
-    pub has_unit: bool,
+    /// How two sets of values are compared.
+    pub scale: Scale,
 }
 
-/// All statistics of a residual, with increments over lags of up to `lag_max` cells.
+/// How the distance of two sets of values is expressed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Scale {
+    /// Root mean square difference, for values without a unit.
+    Absolute,
+    /// Root mean square difference over the root mean square of reference values, for values with a unit.
+    Relative,
+    /// Largest difference over the first of the reference values: for a covariance, the variance.
+    First,
+}
+
+impl Scale {
+    /// Distance of `a` from `b`, without a unit; all slices have the same length.
+    ///
+    /// ```
+    /// use sastrugi_roughness::Scale;
+    ///
+    /// let (a, b, reference) = ([3.0, 1.0], [2.0, 4.0], [5.0, 5.0]);
+    /// assert_eq!(Scale::Absolute.distance(&a, &b, &reference), 5.0f64.sqrt());
+    /// assert_eq!(Scale::Relative.distance(&a, &b, &reference), 5.0f64.sqrt() / 5.0);
+    /// assert_eq!(Scale::First.distance(&a, &b, &reference), 0.6);
+    /// ```
+    pub fn distance(self, a: &[f64], b: &[f64], reference: &[f64]) -> f64 {
+        let differences: Vec<f64> = a.iter().zip(b).map(|(a, b)| a - b).collect();
+        match self {
+            Self::Absolute => root_mean_square(&differences),
+            Self::Relative => root_mean_square(&differences) / root_mean_square(reference),
+            Self::First => {
+                let largest = differences.iter().fold(0.0, |most, d| f64::max(most, d.abs()));
+                reference.first().map_or(f64::NAN, |first| largest / first)
+            }
+        }
+    }
+}
+
+fn root_mean_square(values: &[f64]) -> f64 {
+    sums::mean(&values.iter().map(|v| v * v).collect::<Vec<_>>()).sqrt()
+}
+
+/// The statistics of a residual that a covariance does not prescribe, with increments over lags of up to `lag_max` cells.
 pub fn unfitted_statistics(residual: &Grid, lag_max: usize) -> Vec<Statistic> {
     let lags: Vec<usize> =
         std::iter::successors(Some(1), |l| Some(2 * l)).take_while(|l| *l <= lag_max.max(1)).collect();
     let (slope, curvature) = derivatives(residual);
     let increments = increments(residual, &lags);
-    let with = |name, has_unit, values| Statistic { name, values, has_unit };
+    let with = |name, scale, values| Statistic { name, values, scale };
     vec![
-        with("slope_distribution", true, quantiles(slope)),
-        with("curvature_distribution", true, quantiles(curvature)),
-        with("increment_flatness", false, increments.iter().map(Moments::log_flatness).collect()),
-        with("third_order_structure", false, increments.iter().flat_map(Moments::skewness).collect()),
-        with("extrema_density", false, extrema(residual).map(libm::log).to_vec()),
-        with("directional_psd", false, directional_power(residual, lag_max)),
+        with("slope_distribution", Scale::Relative, quantiles(slope)),
+        with("curvature_distribution", Scale::Relative, quantiles(curvature)),
+        with("increment_flatness", Scale::Absolute, increments.iter().map(Moments::log_flatness).collect()),
+        with("third_order_structure", Scale::Absolute, increments.iter().flat_map(Moments::skewness).collect()),
+        with("extrema_density", Scale::Absolute, extrema(residual).map(libm::log).to_vec()),
+        with("directional_psd", Scale::Absolute, directional_power(residual, lag_max)),
     ]
+}
+
+/// All statistics of a residual: those of [`unfitted_statistics`], then covariance up to `lag_max` cells, heights and Minkowski functionals.
+pub fn surface_statistics(residual: &Grid, lag_max: usize) -> Vec<Statistic> {
+    let mut heights = sums::finite(&residual.values);
+    heights.sort_by(f64::total_cmp);
+    let levels: Vec<f64> =
+        (1..=LEVELS).map(|k| sums::quantile_sorted(&heights, k as f64 / (LEVELS + 1) as f64)).collect();
+    let Minkowski { boundary_per_m, euler_per_m2 } = minkowski(residual, &levels);
+    let with = |name, scale, values| Statistic { name, values, scale };
+    let mut all = unfitted_statistics(residual, lag_max);
+    all.extend([
+        with("covariance", Scale::First, covariance(residual, lag_max)),
+        with("height_distribution", Scale::Absolute, standardised(&heights)),
+        with("boundary_by_level", Scale::Relative, boundary_per_m),
+        with("euler_by_level", Scale::Relative, euler_per_m2),
+    ]);
+    all
 }
 
 fn quantiles(mut values: Vec<f64>) -> Vec<f64> {
     values.sort_by(f64::total_cmp);
     (0..QUANTILES).map(|k| sums::quantile_sorted(&values, (k as f64 + 0.5) / QUANTILES as f64)).collect()
+}
+
+/// Quantiles of sorted heights over their root mean square.
+fn standardised(sorted: &[f64]) -> Vec<f64> {
+    let quantiles: Vec<f64> =
+        (0..HEIGHTS).map(|k| sums::quantile_sorted(sorted, (k as f64 + 0.5) / HEIGHTS as f64)).collect();
+    let size = root_mean_square(&quantiles);
+    quantiles.into_iter().map(|q| q / size).collect()
+}
+
+/// Covariance at lag 0, then east-west, then north-south.
+fn covariance(z: &Grid, lag_max: usize) -> Vec<f64> {
+    let sums = LagSums::of(z, [lag_max; 2]);
+    let lags = || 1..=lag_max as isize;
+    let all = std::iter::once([0, 0]).chain(lags().map(|l| [0, l])).chain(lags().map(|l| [l, 0]));
+    all.map(|[north, east]| sums.at(north, east).covariance()).collect()
 }
 
 /// Slope magnitudes and Laplacians of the cells whose four neighbours have data.
@@ -224,6 +310,43 @@ mod tests {
         assert_eq!(found.len(), 19);
         for (k, slope) in found.iter().enumerate() {
             assert!((slope - (1.5 + 18.0 * (k as f64 + 0.5) / 19.0)).abs() < 1e-12, "{k}: {slope}");
+        }
+    }
+
+    /// A chessboard of cells of -1 and 1, 8 rows and 12 columns: the covariance alternates between 1 and -1, all pairs of neighbours are
+    /// crossed at every level between, and 49 of the quantiles are opposite to 49 others. Corners cancel: as many squares of one as of three.
+    #[test]
+    fn val_a_chessboard() {
+        let z =
+            grid(8, 12, [0.5, 0.25], |x, y| if ((x / 0.5) as i32 + (y / 0.25) as i32) % 2 == 0 { 1.0 } else { -1.0 });
+        let all = surface_statistics(&z, 3);
+        assert_eq!(all.len(), 10);
+        let covariance = values(&all, "covariance");
+        let expected = [1.0, -1.0, 1.0, -1.0, -1.0, 1.0, -1.0];
+        assert!(covariance.iter().zip(expected).all(|(c, e)| (c - e).abs() < 1e-12), "{covariance:?}");
+        let heights = values(&all, "height_distribution");
+        assert!(heights.len() == 99 && heights[..49].iter().all(|q| *q == -heights[98]), "{heights:?}");
+        // Levels of -1 (10 to 40 %) are exceeded by half of the cells, those of 1 by none.
+        let boundary = values(&all, "boundary_by_level");
+        let all_crossed = 0.25 * PI * (1.0 / 0.5 + 1.0 / 0.25);
+        assert!((boundary[0] - all_crossed).abs() < 1e-12 && boundary[8] == 0.0, "{boundary:?}");
+        assert!(values(&all, "euler_by_level").iter().all(|v| *v == 0.0));
+    }
+
+    /// The unit of the heights changes covariance, slopes and curvatures, and nothing else.
+    #[test]
+    fn prop_statistics_without_unit_keep_their_values() {
+        let mut s = Streams::for_seed(2, "agreement-test").stream("noise");
+        let z = Grid::new(Geometry::square(40, 50, 0.5), (0..2000).map(|_| s.normal()).collect());
+        let (one, other) = (surface_statistics(&z, 4), surface_statistics(&z.map(|v| 8.0 * v), 4));
+        for (a, b) in one.iter().zip(&other) {
+            let factor = match a.name {
+                "covariance" => 64.0,
+                "slope_distribution" | "curvature_distribution" => 8.0,
+                _ => 1.0,
+            };
+            let near = |(a, b): (&f64, &f64)| (factor * a - b).abs() < 1e-9 * (1.0 + b.abs());
+            assert!(a.values.iter().zip(&b.values).all(near), "{}", a.name);
         }
     }
 

@@ -12,6 +12,7 @@
 //!   [`hurst()`].
 //! * All areal parameters: [`areal_figures`]; a row of the tables, with classes and spectrum: [`describe`].
 //! * For vehicles: [`Ride`] (a [`WaveBand`], a [`Detrender`], ISO 8608, [`iri()`]).
+//! * For textures against their sites: [`surface_statistics`] and [`copies()`].
 //! * For wind: [`aerodynamic_roughness`].
 //!
 //! # Example
@@ -43,12 +44,14 @@ pub mod background;
 mod band;
 mod classes;
 mod closing;
+mod copies;
 mod detrend;
 mod gradient;
 mod heights;
 mod hurst;
 mod iri;
 mod lags;
+mod minkowski;
 pub mod multifractality;
 mod plane;
 mod power_law;
@@ -63,18 +66,20 @@ pub use aerodynamic::{
     AerodynamicRoughness, ObstacleHeight, WindDirection, WindError, WindEstimate, WindMeasures, WindSettings,
     aerodynamic_roughness, lettau_z0_m, macdonald_displacement, macdonald_z0_m, munro_z0_m,
 };
-pub use agreement::{Statistic, unfitted_statistics};
+pub use agreement::{Scale, Statistic, surface_statistics, unfitted_statistics};
 pub use areal::{ArealFigures, areal_figures};
 pub use background::odd_cells;
 pub use band::band_rms;
 pub use classes::{ClassThresholds, HIGH, LOW, NO_CLASS, SEMI, Shares, ThresholdError, classify, shares};
 pub use closing::close_disk;
+pub use copies::{COPY_SIDE, COPY_TOLERANCE, Copies, copies, repeats};
 pub use detrend::{BandError, Detrended, Detrender, WaveBand};
 pub use gradient::{moore_gradient, rms_slope, rms_slopes};
 pub use heights::{HeightStatistics, HistogramBin, height_statistics, histogram};
 pub use hurst::{Hurst, hurst};
 pub use iri::{Iri, iri, iri_of_profile};
 pub use lags::{LagSums, PairSum};
+pub use minkowski::{Minkowski, minkowski};
 pub use plane::level;
 pub use power_law::{PowerLaw, iso_8608_class};
 pub use profiles::{ProfileBin, profile_spectra};
