@@ -73,6 +73,28 @@ fn prop_dems_are_compared_whatever_the_threads() {
     let names: Vec<&str> = halves["quantities"].as_array().unwrap().iter().filter_map(|q| q["name"].as_str()).collect();
     assert!(names.contains(&"third_order_structure") && !names.contains(&"sigma_m"), "{names:?}");
     assert_eq!((halves["what"].as_str(), halves["b"].is_null()), (Some("halves"), true));
+    assert!(halves["quantities"][0]["site"]["halves"].as_f64() > Some(0.0), "{halves}");
+    // 60 cells hold no two blocks of four windows.
+    assert!(halves["interleaved"].is_null() && halves["notes"].to_string().contains("four blocks"), "{halves}");
+    let judge = ["compare", "a.tif", "b.tif", "--statistics", "--outer-scale", "0.9", "--seed", "7"];
+    let judged = json(path, &[&judge[..], &["--threads", "1"]].concat(), 0);
+    assert_eq!(judged, json(path, &[&judge[..], &["--threads", "2"]].concat(), 0));
+    assert_eq!((judged["what"].as_str(), judged["quantities"].as_array().unwrap().len()), (Some("statistics"), 11));
+    assert_eq!(
+        (&judged["blocks"]["shape_cells"], &judged["blocks"]["site"]),
+        (&serde_json::json!([18, 18]), &9.into())
+    );
+    assert_eq!(judged["quantities"][6]["bound"].as_f64(), Some(0.05));
+    assert_eq!(judged["blocks"]["copies"]["of_site"]["share"].as_f64(), Some(0.0));
+    let own = json(path, &["compare", "a.tif", "a.tif", "--statistics", "--outer-scale", "0.9"], 0);
+    assert_eq!(own["blocks"]["copies"]["of_site"]["share"].as_f64(), Some(1.0));
+    let text = sastrugi_in(path, &judge).stdout;
+    for word in ["site: halves", "interleaved", "euler_by_level", "spread_of_blocks", "verbatim copies of 7 x 7 cells"]
+    {
+        assert!(text.contains(word), "{word} is not in {text}");
+    }
+    let set = json(path, &[&judge[..], &["--set", "equivalence_covariance=0.2"]].concat(), 0);
+    assert_eq!(set["quantities"][6]["bound"].as_f64(), Some(0.2));
     // A fit and its own DEM agree by construction.
     let call = sastrugi_in(path, &["fit", "a.tif", "--outer-scale", "0.9", "--bootstrap", "0", "-o", "own.json"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
@@ -86,9 +108,13 @@ fn val_what_cannot_be_compared_is_refused() {
     let path = folder.path();
     fit_file(path, "a.json", 0.1);
     std::fs::create_dir(path.join("release")).unwrap();
-    let cases: [(&[&str], i32, &str); 12] = [
+    let cases: [(&[&str], i32, &str); 16] = [
         (&["compare", "a.json"], 2, "<B>"),
         (&["compare", "a.json", "--split-half"], 2, "requires a DEM"),
+        (&["compare", "a.json", "a.json", "--statistics"], 2, "compares two DEMs"),
+        (&["compare", "a.json", "--statistics"], 2, "<B>"),
+        (&["compare", "a.json", "--statistics", "--split-half"], 2, "cannot be used with"),
+        (&["compare", "release", "release", "--statistics"], 2, "applies to DEMs"),
         (&["compare", "release", "a.json"], 2, "with another release"),
         (&["compare", "release", "release"], 65, "not a sastrugi release"),
         (&["compare", "release", "missing"], 65, "not a sastrugi release"),

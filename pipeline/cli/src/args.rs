@@ -169,9 +169,12 @@ pub enum Verb {
         terrains, group by group, with terrains as the independent units. `--fail-on-difference` exits\n\
         with code 4 when a metric is different or, for releases of the same study by the same version,\n\
         when a file is missing or any byte differs.\n\n\
+        With --split-half and --statistics, the distance between parts of the site stands beside every\n\
+        distance of the texture.\n\n\
         Examples:\n  \
         sastrugi compare release other-release --margin 0.1\n  \
         sastrugi compare site.tif synthetic.tif --outer-scale 2\n  \
+        sastrugi compare site.tif texture.tif --statistics --outer-scale 2\n  \
         sastrugi compare site.json synthetic.json --equivalence-sigma 0.05 --fail-on-difference")]
     Compare(Compare),
     /// Convert between DEM formats by file extension (.tif .asc .hgt .png .npy, meshes .obj .glb .usda), grid point clouds (.las
@@ -937,8 +940,12 @@ pub struct Compare {
     #[arg(required_unless_present = "split_half")]
     pub b: Option<PathBuf>,
     /// Fit one half of A, and compare textures of that fit with the other half in statistics that were not fitted.
-    #[arg(long, conflicts_with_all = ["b", "window_b"])]
+    #[arg(long, conflicts_with_all = ["b", "window_b", "statistics"])]
     pub split_half: bool,
+    /// Judge B, a texture of any origin, against the site A by statistics of their blocks: what blocks of the site give against each
+    /// other is the reference.
+    #[arg(long)]
+    pub statistics: bool,
     /// Exit with code 4 when any quantity is different (for releases of the same study and version: any byte).
     #[arg(long)]
     pub fail_on_difference: bool,
@@ -979,7 +986,7 @@ pub struct Compare {
     /// Cell size for files that state none, m: one number, or east-west,north-south.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<String>,
-    /// Set any other parameter: trim, alpha, equivalence_shape, equivalence_agreement; `name=value`.
+    /// Set any other parameter: trim, alpha, equivalence_shape, equivalence_agreement, equivalence_covariance; `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
 }

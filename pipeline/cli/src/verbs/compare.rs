@@ -5,7 +5,7 @@ use crate::Verdict;
 use crate::args::{Common, Compare};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
-use sastrugi_stages::verbs::compare::{self, Comparison, Quantity, Request, Side};
+use sastrugi_stages::verbs::compare::{self, BlockEvidence, COPY_SIDE, Comparison, Copies, Quantity, Request, Side};
 use sastrugi_stages::verbs::releases::{self, Files};
 use sastrugi_stages::verbs::{numbers, parameters};
 use serde_json::{Value, json};
@@ -38,7 +38,8 @@ pub fn compare(args: &Compare, common: &Common) -> Verdict {
         Some(path) => Some(Side { path, window: window("--window-b", &args.window_b)? }),
         None => None,
     };
-    let request = Request { a, b, parameters: params, seed: args.seed, cell_m: cell(args.cell.as_deref())? };
+    let (by_statistics, cell_m) = (args.statistics, cell(args.cell.as_deref())?);
+    let request = Request { a, b, by_statistics, parameters: params, seed: args.seed, cell_m };
     let (comparison, record) = compare::compare(&request)?;
     print(common.json, &record, &text(&comparison))?;
     Ok(if args.fail_on_difference && comparison.differs() { Code::Difference } else { Code::Done })
@@ -55,6 +56,9 @@ fn of_releases(args: &Compare, b: &Path, parameters: &Value, common: &Common) ->
         return Err(Failure::usage(
             "--window-a, --window-b and --cell apply to DEMs only; releases are compared in full",
         ));
+    }
+    if args.statistics {
+        return Err(Failure::usage("--statistics applies to DEMs; releases are compared by their files and metrics"));
     }
     let comparison = releases::compare(&args.a, b, parameters, args.seed)?;
     let record = serde_json::to_value(&comparison).map_err(Failure::failed)?;
@@ -113,28 +117,57 @@ fn row_of_releases(q: &releases::Quantity) -> Vec<String> {
 }
 
 fn text(comparison: &Comparison) -> String {
-    let head = ["quantity", "A", "B", "difference", "interval", "same within", "p (Holm)", "verdict"];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
-    rows.extend(comparison.quantities.iter().map(row));
-    let mut text = columns(&rows);
+    let mut text = table(&comparison.quantities);
+    if let Some(interleaved) = &comparison.interleaved {
+        text.push_str(&format!("\ninterleaved blocks in place of halves:\n{}", table(interleaved)));
+    }
     text.push_str(&format!("\n{}: {}", comparison.answer.name(), comparison.sentence));
     for q in &comparison.quantities {
         text.push_str(&format!("\n  {}: {}", q.name, q.why));
     }
+    comparison.blocks.iter().for_each(|blocks| text.push_str(&format!("\n  {}", text_of_copies(blocks))));
     comparison.notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     text
 }
 
-fn row(q: &Quantity) -> Vec<String> {
+/// The quantities; distances between parts of a site only where they are known.
+fn table(quantities: &[Quantity]) -> String {
+    let of_a_site = quantities.iter().any(|q| q.site.is_some());
+    let site: &[&str] = if of_a_site { &["site: halves", "interleaved"] } else { &[] };
+    let before = ["quantity", "A", "B", "difference"];
+    let after = ["interval", "same within", "p (Holm)", "verdict"];
+    let head = before.iter().chain(site).chain(&after).map(|&name| name.to_owned()).collect();
+    let rows = quantities.iter().map(|q| row(q, of_a_site));
+    columns(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
+}
+
+fn row(q: &Quantity, of_a_site: bool) -> Vec<String> {
     let number = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
-    vec![
-        q.name.clone(),
-        number(q.a),
-        number(q.b),
-        q.difference.map_or_else(|| "-".to_owned(), |d| q.shown(d)),
+    let shown = |d: Option<f64>| d.map_or_else(|| "-".to_owned(), |d| q.shown(d));
+    let mut cells = vec![q.name.clone(), number(q.a), number(q.b), shown(q.difference)];
+    if of_a_site {
+        cells.extend([q.site.and_then(|s| s.halves), q.site.and_then(|s| s.interleaved)].map(shown));
+    }
+    cells.extend([
         q.interval.map_or_else(|| "-".to_owned(), |[low, high]| format!("{} to {}", q.shown(low), q.shown(high))),
         q.bounds_shown(),
         q.p_adjusted.map_or_else(|| "-".to_owned(), |p| format!("{p:.3}")),
         q.answer.name().to_owned(),
-    ]
+    ]);
+    cells
+}
+
+fn text_of_copies(blocks: &BlockEvidence) -> String {
+    let found = |copies: &Copies| match copies.examined {
+        0 => "- (no data)".to_owned(),
+        _ => format!("{:.1} % (longest run {} cells)", 100.0 * copies.share, copies.longest_run_cells),
+    };
+    let copies = &blocks.copies;
+    format!(
+        "verbatim copies of {COPY_SIDE} x {COPY_SIDE} cells: in the texture from the site {}, from elsewhere in itself {}; in one half of the \
+         site from the other {}",
+        found(&copies.of_site),
+        found(&copies.of_itself),
+        found(&copies.between_halves)
+    )
 }

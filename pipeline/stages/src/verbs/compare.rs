@@ -5,11 +5,12 @@ use super::texture::read_fit;
 use crate::error::Error;
 use crate::verbs::Reading;
 use sastrugi_numeric::{Grid, Streams};
+pub use sastrugi_roughness::{COPY_SIDE, Copies};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_store::digest;
-use sastrugi_texture::compare::{CompareError, CompareParameters, CompareSettings, fits, halves, surfaces};
-pub use sastrugi_texture::compare::{Comparison, Quantity};
+pub use sastrugi_texture::compare::{BlockEvidence, Comparison, Quantity};
+use sastrugi_texture::compare::{CompareError, CompareParameters, CompareSettings, blocks, fits, halves, surfaces};
 use sastrugi_texture::{FitParameters, FitSettings};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -31,6 +32,8 @@ pub struct Request<'a> {
     pub a: Side<'a>,
     /// B; if absent, textures fitted to one half of A are compared with its other half.
     pub b: Option<Side<'a>>,
+    /// Judge B, a DEM of any origin, by the statistics of its blocks against those of A.
+    pub by_statistics: bool,
     /// Parameters of the comparison.
     pub parameters: Value,
     /// Seed of the random streams.
@@ -44,8 +47,8 @@ enum Content {
     Fit(Box<FitFile>),
 }
 
-/// Compares two DEMs, two fits, a DEM (fitted with the settings of the fit) and a fit, or textures of one half of a DEM with its other half.
-/// Returns the comparison and its full record.
+/// Compares two DEMs (by their fits, or by statistics of their blocks), two fits, a DEM (fitted with the settings of the fit) and a fit, or
+/// textures of one half of a DEM with its other half. Returns the comparison and its full record.
 ///
 /// # Errors
 /// Unknown parameters, a release, files that cannot be read or fitted, a fit and the DEM that it was made from.
@@ -58,6 +61,13 @@ pub fn compare(request: &Request<'_>) -> Result<(Comparison, Value), Error> {
     let b = request.b.as_ref().map(|side| read(side, request)).transpose()?;
     let mut comparison = match (&a.content, b.as_ref().map(|b| &b.content)) {
         (Content::Dem(site), None) => halves(site, &settings, &streams).map_err(refused)?,
+        (Content::Dem(site), Some(Content::Dem(texture))) if request.by_statistics => {
+            blocks(site, texture, &settings, &streams).map_err(refused)?
+        }
+        (Content::Fit(_), _) | (_, Some(Content::Fit(_))) if request.by_statistics => {
+            let message = "`--statistics` compares two DEMs; a fit file contains no heights";
+            return Err(Error::Usage(message.to_owned()));
+        }
         (Content::Dem(one), Some(Content::Dem(other))) => surfaces(one, other, &settings, &streams).map_err(refused)?,
         (Content::Fit(one), Some(Content::Fit(other))) => fits(one, other, &settings, &streams)?,
         (Content::Dem(dem), Some(Content::Fit(fit))) => {

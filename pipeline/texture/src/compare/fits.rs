@@ -44,6 +44,8 @@ pub fn fits(
     Ok(Comparison {
         what: "fits",
         quantities,
+        interleaved: None,
+        blocks: None,
         answer,
         sentence,
         alpha: parameters.alpha,

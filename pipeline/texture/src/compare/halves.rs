@@ -8,11 +8,16 @@
 //! share of members at least as far from the mean is an exact p-value whatever the statistic's distribution. Sigma and b are not
 //! reported, since the texture was given them.
 //!
-//! Cost: one fit, and per simulation a refit and two surfaces of half a site of at most two million cells.
+//! Halves of a site differ from each other. Beside every distance therefore stands that of the two halves, and the same test with
+//! the site split into interleaved blocks instead, black and white like a chessboard: what differs from half to half is in both. It is
+//! shown beside the answers and is no part of them; bounds and p-values of the halves do not depend on it.
+//!
+//! Cost: one fit, and per simulation a refit and two surfaces of half a site of at most two million cells; for the interleaved blocks the
+//! same again, with surfaces of the complete site.
 
 use super::surfaces::{Side, case};
 use super::verdict::{Finding, Null, decide, overall};
-use super::{CompareError, CompareSettings, Comparison, Measure};
+use super::{CompareError, CompareSettings, Comparison, Measure, Quantity, SiteDistances};
 use crate::covariance::Covariance;
 use crate::covariance::bins::Layout;
 use crate::fit::case::Case;
@@ -20,7 +25,13 @@ use crate::fit::null_surfaces::NullSurfaces;
 use crate::fit::resampling::{self, CELLS_MAX};
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, Streams, sums};
-use sastrugi_roughness::{Statistic, unfitted_statistics};
+use sastrugi_roughness::background::BoxWindow;
+use sastrugi_roughness::{Scale, Statistic, unfitted_statistics};
+
+/// Least width of an interleaved block, windows: the residual of half of its cells then has a complete window.
+const INTERLEAVED_WINDOWS: usize = 4;
+/// Most interleaved blocks along one side.
+const INTERLEAVED_ALONG: usize = 8;
 
 /// Compares the textures fitted to one half of a site with its other half.
 ///
@@ -29,9 +40,62 @@ use sastrugi_roughness::{Statistic, unfitted_statistics};
 pub fn halves(site: &Grid, settings: &CompareSettings, streams: &Streams) -> Result<Comparison, CompareError> {
     let examined = middle(site);
     let (one, other) = cut(&examined);
-    let (fitted, judged) = (case("the fitted half", &one, settings)?, case("the other half", &other, settings)?);
+    let Judged { mut quantities, apart, model } =
+        judge([&one, &other], ["the fitted half", "the other half"], settings, streams)?;
+    let interleaved = interleave(&examined, settings).and_then(|[black, white]| {
+        let names = ["the fitted blocks", "the other blocks"];
+        judge([&black, &white], names, settings, &streams.child("interleaved")).map_err(|error| error.to_string())
+    });
+    let (answer, sentence) = overall(&quantities);
+    let mut notes = vec![format!(
+        "A denotes textures of the first half's {model} model, B the second half; sigma and b are not compared, since the textures were \
+         given them"
+    )];
+    if examined.values.len() < site.values.len() {
+        notes.push(format!("only the middle {} x {} cells were compared", examined.rows(), examined.cols()));
+    }
+    if let Err(reason) = &interleaved {
+        notes.push(format!("interleaved blocks were not judged: {reason}"));
+    }
+    let interleaved = interleaved.ok();
+    for (k, quantity) in quantities.iter_mut().enumerate() {
+        let interleaved = interleaved.as_ref().and_then(|judged| judged.apart[k]);
+        quantity.site = Some(SiteDistances { halves: apart[k], interleaved });
+    }
+    Ok(Comparison {
+        what: "halves",
+        quantities,
+        interleaved: interleaved.map(|judged| judged.quantities),
+        blocks: None,
+        answer,
+        sentence,
+        alpha: settings.parameters().alpha,
+        model,
+        simulations: settings.parameters().simulations as usize,
+        streams: streams.label(),
+        notes,
+    })
+}
+
+/// Textures fitted to one part of a site, judged on another.
+struct Judged {
+    quantities: Vec<Quantity>,
+    /// Distance of the fitted part from the other, by statistic.
+    apart: Vec<Option<f64>>,
+    /// Covariance model.
+    model: String,
+}
+
+/// Fits one part, and compares its textures with the other.
+fn judge(
+    [fitted, judged]: [&Grid; 2],
+    names: [&'static str; 2],
+    settings: &CompareSettings,
+    streams: &Streams,
+) -> Result<Judged, CompareError> {
+    let (fitted, judged) = (case(names[0], fitted, settings)?, case(names[1], judged, settings)?);
     let bins = fitted.bins_of(Layout::DIRECTIONAL);
-    let side = Side::new("the fitted half", &fitted, &bins, &settings.form)?;
+    let side = Side::new(names[0], &fitted, &bins, &settings.form)?;
     let parameters = settings.parameters();
     let count = parameters.simulations as usize;
     let fits = resampling::parametric(&side.directions, &side.long, count, &streams.child("fits")).at;
@@ -42,30 +106,57 @@ pub fn halves(site: &Grid, settings: &CompareSettings, streams: &Streams) -> Res
         .enumerate()
         .map(|(k, at)| texture_statistics(&judged, &coordinates.decode(at), &surfaces.child(&k.to_string())))
         .collect();
-    let residual = judged.residual().map_err(|error| CompareError::Side { side: "the other half", error })?;
-    members.push(statistics(&judged, residual));
-    let findings = (0..members[0].len()).map(|k| finding(&members, k, parameters.equivalence_agreement)).collect();
-    let quantities = decide(findings, parameters.alpha);
-    let (answer, sentence) = overall(&quantities);
-    let mut notes = vec![format!(
-        "A denotes textures of the first half's {} model, B the second half; sigma and b are not compared, since the textures were \
-         given them",
-        side.long.form.name()
-    )];
-    if examined.values.len() < site.values.len() {
-        notes.push(format!("only the middle {} x {} cells were compared", examined.rows(), examined.cols()));
-    }
-    Ok(Comparison {
-        what: "halves",
-        quantities,
-        answer,
-        sentence,
-        alpha: parameters.alpha,
+    let [own, site] = [(&fitted, names[0]), (&judged, names[1])].map(|(case, side)| {
+        case.residual().map(|residual| statistics(case, residual)).map_err(|error| CompareError::Side { side, error })
+    });
+    let own = own?;
+    members.push(site?);
+    let ensembles: Vec<Option<Ensemble>> = (0..own.len()).map(|k| Ensemble::of(&members, k)).collect();
+    let finding = |(k, ensemble): (usize, &Option<Ensemble>)| {
+        finding(own[k].name, ensemble.as_ref(), &members, k, parameters.equivalence_agreement)
+    };
+    let findings = ensembles.iter().enumerate().map(finding).collect();
+    let apart = |(k, ensemble): (usize, &Option<Ensemble>)| {
+        ensemble.as_ref()?.between(&own[k].values, &members.last()?[k].values)
+    };
+    Ok(Judged {
+        quantities: decide(findings, parameters.alpha),
+        apart: ensembles.iter().enumerate().map(apart).collect(),
         model: side.long.form.name().to_owned(),
-        simulations: count,
-        streams: streams.label(),
-        notes,
     })
+}
+
+/// One statistic over all members: what they have in common.
+struct Ensemble {
+    scale: Scale,
+    /// Values that every member has; a value that any member lacks (an empty class) is left out.
+    common: Vec<usize>,
+    mean: Vec<f64>,
+}
+
+impl Ensemble {
+    /// `None` if the members have no value in common.
+    fn of(members: &[Vec<Statistic>], k: usize) -> Option<Self> {
+        let all: Vec<&[f64]> = members.iter().map(|m| m[k].values.as_slice()).collect();
+        let common: Vec<usize> = (0..all[0].len()).filter(|&i| all.iter().all(|v| v[i].is_finite())).collect();
+        let mean = common.iter().map(|&i| sums::mean(&all.iter().map(|v| v[i]).collect::<Vec<_>>())).collect();
+        (!common.is_empty()).then_some(Self { scale: members[0][k].scale, common, mean })
+    }
+
+    fn picked(&self, values: &[f64]) -> Vec<f64> {
+        self.common.iter().map(|&i| values[i]).collect()
+    }
+
+    /// Distance from the mean.
+    fn distance(&self, values: &[f64]) -> f64 {
+        self.scale.distance(&self.picked(values), &self.mean, &self.mean)
+    }
+
+    /// Distance of two sets of values, on the same scale; `None` if one lacks a value that the members have.
+    fn between(&self, a: &[f64], b: &[f64]) -> Option<f64> {
+        let distance = self.scale.distance(&self.picked(a), &self.picked(b), &self.mean);
+        distance.is_finite().then_some(distance)
+    }
 }
 
 /// The complete site, or its middle.
@@ -79,13 +170,36 @@ fn middle(site: &Grid) -> Grid {
 }
 
 /// Splits a site across its longer side: west and east, or north and south.
-fn cut(site: &Grid) -> (Grid, Grid) {
+pub(super) fn cut(site: &Grid) -> (Grid, Grid) {
     let (rows, cols) = (site.rows(), site.cols());
     let [width, height] = site.geometry.size();
     match width >= height {
         true => (site.window(0, 0, rows, cols / 2), site.window(0, cols / 2, rows, cols - cols / 2)),
         false => (site.window(0, 0, rows / 2, cols), site.window(rows / 2, 0, rows - rows / 2, cols)),
     }
+}
+
+/// The site with its white blocks masked, and with its black ones: a chessboard of at least four blocks, each at least
+/// [`INTERLEAVED_WINDOWS`] wide. The reason, if the site is too small.
+fn interleave(site: &Grid, settings: &CompareSettings) -> Result<[Grid; 2], String> {
+    let window = BoxWindow::nearest(settings.parameters().outer_scale_m, site.geometry.cell).cells();
+    let shape = [site.rows(), site.cols()];
+    let along = [0, 1].map(|k| (shape[k] / (INTERLEAVED_WINDOWS * window[k])).clamp(1, INTERLEAVED_ALONG));
+    if along[0] * along[1] < 4 {
+        return Err(format!(
+            "the site is smaller than four blocks of {INTERLEAVED_WINDOWS} windows ({} x {} cells) each",
+            INTERLEAVED_WINDOWS * window[0],
+            INTERLEAVED_WINDOWS * window[1]
+        ));
+    }
+    let colour = |k: usize| {
+        let [row, col] = [k / shape[1] * along[0] / shape[0], k % shape[1] * along[1] / shape[1]];
+        (row + col) % 2
+    };
+    Ok([0, 1].map(|own| {
+        let values = site.values.iter().enumerate().map(|(k, &z)| if colour(k) == own { z } else { f64::NAN });
+        Grid::new(site.geometry, values.collect())
+    }))
 }
 
 /// Statistics of a texture on the grid and mask of a case.
@@ -101,24 +215,12 @@ fn statistics(case: &Case, residual: Vec<f64>) -> Vec<Statistic> {
 }
 
 /// One statistic over all members, the last of which is the site.
-fn finding(members: &[Vec<Statistic>], k: usize, bound: f64) -> Finding {
-    let Statistic { name, has_unit, .. } = members[0][k];
-    let all: Vec<&[f64]> = members.iter().map(|m| m[k].values.as_slice()).collect();
-    // Values that any member lacks (an empty class) are left out.
-    let common: Vec<usize> = (0..all[0].len()).filter(|&i| all.iter().all(|v| v[i].is_finite())).collect();
-    let known = if common.is_empty() {
-        Err(format!("too little data for {name}"))
-    } else {
-        let means: Vec<f64> =
-            common.iter().map(|&i| sums::mean(&all.iter().map(|v| v[i]).collect::<Vec<_>>())).collect();
-        let size = if has_unit { root_mean_square(&means) } else { 1.0 };
-        let mut distances: Vec<f64> = all
-            .iter()
-            .map(|v| root_mean_square(&common.iter().zip(&means).map(|(&i, m)| (v[i] - m) / size).collect::<Vec<_>>()))
-            .collect();
+fn finding(name: &str, ensemble: Option<&Ensemble>, members: &[Vec<Statistic>], k: usize, bound: f64) -> Finding {
+    let known = ensemble.ok_or_else(|| format!("too little data for {name}")).map(|ensemble| {
+        let mut distances: Vec<f64> = members.iter().map(|m| ensemble.distance(&m[k].values)).collect();
         let site = distances.pop().unwrap_or(f64::NAN);
-        Ok((site, Null::distances(distances, 1.0)))
-    };
+        (site, Null::distances(distances, 1.0))
+    });
     Finding {
         name: name.to_owned(),
         values: [None, None],
@@ -127,10 +229,6 @@ fn finding(members: &[Vec<Statistic>], k: usize, bound: f64) -> Finding {
         known,
         words: format!("the distance of {name} from that of the textures"),
     }
-}
-
-fn root_mean_square(values: &[f64]) -> f64 {
-    sums::mean(&values.iter().map(|v| v * v).collect::<Vec<_>>()).sqrt()
 }
 
 #[cfg(test)]
@@ -151,5 +249,22 @@ mod tests {
         let (north, south) = cut(&numbered(2, 5, [1.0, 4.0]));
         assert_eq!((north.values[4], south.values[0], north.rows(), south.rows()), (4.0, 5.0, 1, 1));
         assert_eq!((north.geometry.origin, south.geometry.origin), ([0.0, 4.0], [0.0, 0.0]));
+    }
+
+    /// A window of 3 cells: blocks of at least 12 cells, so that 24 x 50 cells are 2 x 4 blocks. The two grids have every cell once, by the colours
+    /// of a chessboard; 20 x 30 cells would be 1 x 2 blocks.
+    #[test]
+    fn val_interleaved_blocks_are_a_chessboard() {
+        let parameters = super::super::CompareParameters { outer_scale_m: 3.0, ..Default::default() };
+        let settings = CompareSettings::try_from(parameters).unwrap();
+        let site = Grid::filled(Geometry::square(24, 50, 1.0), 1.0);
+        let [black, white] = interleave(&site, &settings).unwrap();
+        assert!(black.values.iter().zip(&white.values).all(|(a, b)| a.is_finite() != b.is_finite()));
+        let at = |r: usize, c: usize| black.at(r, c).is_finite();
+        assert!(
+            at(0, 0) && at(11, 12) && !at(0, 13) && !at(12, 12) && at(12, 13) && at(0, 25) && !at(0, 49) && at(23, 49)
+        );
+        let small = Grid::filled(Geometry::square(20, 30, 1.0), 1.0);
+        assert!(interleave(&small, &settings).unwrap_err().contains("12 x 12 cells"));
     }
 }

@@ -23,9 +23,10 @@
 //! Intervals come from the same simulations, as differences minus quantiles of the null; they hold near
 //! equality, which is where equivalence is decided, and are approximate for surfaces far apart.
 //!
-//! # Split halves
+//! # Split halves, and any texture
 //! A texture has its site's sigma and b by construction: comparing those would be circular, and is not done here. A texture is
-//! instead judged by statistics that were not fitted, on ground that was not fitted ([`halves`]).
+//! instead judged by statistics that were not fitted, on ground that was not fitted ([`halves`]). A texture of any origin, whose generator is
+//! not known, is judged by what blocks of its site give against each other ([`blocks`]).
 //!
 //! # Error rates
 //! Equality: Holm's (1979) adjustment, so that the probability of any wrong `different` is at most alpha (0.05) over all
@@ -35,6 +36,7 @@
 //! # Cost
 //! One fit of each side, and per simulation a surface of at most a million cells and two searches for each side.
 
+mod blocks;
 mod fits;
 mod halves;
 mod heights;
@@ -42,6 +44,7 @@ mod params;
 mod surfaces;
 mod verdict;
 
+pub use blocks::{BlockEvidence, FoundCopies, blocks};
 pub use fits::fits;
 pub use halves::halves;
 pub use params::{CompareParameters, CompareSettings};
@@ -85,6 +88,9 @@ pub struct Quantity {
     pub p_adjusted: Option<f64>,
     /// Null distribution.
     pub null: Option<NullSummary>,
+    /// For a texture against its site: the same distance between parts of the site.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub site: Option<SiteDistances>,
     /// Answer.
     pub answer: Answer,
     /// Reason for the answer, in a sentence.
@@ -109,10 +115,19 @@ impl Quantity {
     }
 }
 
+/// Distance between two parts of a site.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
+pub struct SiteDistances {
+    /// Between its halves: those across its longer side if these are split, else the larger of west to east and north to south.
+    pub halves: Option<f64>,
+    /// Between its black and white blocks, interleaved like a chessboard.
+    pub interleaved: Option<f64>,
+}
+
 /// Summary of a null distribution.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct NullSummary {
-    /// `simulated surfaces`, or `intervals of the fits`.
+    /// `simulated surfaces`, `intervals of the fits`, or `arrangements of blocks`.
     pub kind: &'static str,
     /// Number of draws.
     pub draws: usize,
@@ -120,26 +135,33 @@ pub struct NullSummary {
     pub mean: f64,
     /// Its standard deviation.
     pub standard_deviation: f64,
-    /// Factor by which it was widened because blocks of the sites scatter more than surfaces of the model do.
+    /// Factor by which it was widened because blocks of the sites scatter more than surfaces of the model do, or halves of a site differ
+    /// more than its blocks in any order.
     pub widened: f64,
 }
 
 /// A comparison of two textures.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Comparison {
-    /// What was compared: `surfaces`, `fits` or `halves`.
+    /// What was compared: `surfaces`, `fits`, `halves` or `statistics`.
     pub what: &'static str,
     /// Every quantity.
     pub quantities: Vec<Quantity>,
+    /// For halves: the same quantities with interleaved blocks in place of the halves. They are no part of the answer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interleaved: Option<Vec<Quantity>>,
+    /// For statistics: the blocks that were compared, and copies found.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub blocks: Option<BlockEvidence>,
     /// `different` if any quantity is, `same` if all are.
     pub answer: Answer,
     /// The answer in a sentence.
     pub sentence: String,
     /// Largest probability of any wrong `different`, and of each wrong `same`.
     pub alpha: f64,
-    /// Covariance model.
+    /// Covariance model; empty where none was fitted.
     pub model: String,
-    /// Simulated surfaces of each side.
+    /// Simulated surfaces of each side; 0 where none were needed.
     pub simulations: usize,
     /// Name of the random streams.
     pub streams: String,
@@ -168,6 +190,34 @@ pub enum CompareError {
     NoLikelihood {
         /// `A` or `B`.
         side: &'static str,
+    },
+    /// One side has too few blocks.
+    #[error(
+        "the site has {site} blocks of {} x {} cells (two windows or more) with data, the texture {texture}: at least {needed} of each are needed; \
+         use a smaller outer scale or larger rasters",
+        .shape[0], .shape[1]
+    )]
+    TooFewBlocks {
+        /// Rows and columns of a block.
+        shape: [usize; 2],
+        /// Blocks of the site.
+        site: usize,
+        /// Blocks of the texture.
+        texture: usize,
+        /// Fewest of each.
+        needed: usize,
+    },
+    /// The cells differ in size.
+    #[error(
+        "the site has cells of {} x {} m, the texture of {} x {} m: slopes, increments and spectra depend on the cell; make the texture with \
+         the site's cells",
+        .site_m[0], .site_m[1], .texture_m[0], .texture_m[1]
+    )]
+    Cells {
+        /// Cell size of the site, east-west and north-south, m.
+        site_m: [f64; 2],
+        /// Cell size of the texture.
+        texture_m: [f64; 2],
     },
 }
 

@@ -32,9 +32,12 @@ pub struct CompareParameters {
     /// Root mean square distance of the quantiles of standardised heights that still counts as the same, in standard deviations.
     /// Default 0.1.
     pub equivalence_heights: f64,
-    /// Root mean square relative difference of a statistic that was not fitted (split halves) that still counts as the same.
+    /// Root mean square relative difference of a statistic (split halves, and `--statistics`) that still counts as the same.
     /// Default 0.25.
     pub equivalence_agreement: f64,
+    /// Largest difference of the covariances at any lag up to half a window (`--statistics`) that still counts as the same, as a share of the
+    /// site's variance. Default 0.05.
+    pub equivalence_covariance: f64,
     /// Simulated surfaces of each side, at least 6 / alpha - 1. Default 199.
     pub simulations: u32,
     /// Largest probability of any wrong `different`, and of each wrong `same`. Default 0.05.
@@ -54,6 +57,7 @@ impl Default for CompareParameters {
             equivalence_anisotropy: 0.25,
             equivalence_heights: 0.1,
             equivalence_agreement: 0.25,
+            equivalence_covariance: 0.05,
             simulations: 199,
             alpha: 0.05,
         }
@@ -80,6 +84,7 @@ impl TryFrom<CompareParameters> for CompareSettings {
             ("equivalence_anisotropy", p.equivalence_anisotropy),
             ("equivalence_heights", p.equivalence_heights),
             ("equivalence_agreement", p.equivalence_agreement),
+            ("equivalence_covariance", p.equivalence_covariance),
         ] {
             ParameterError::positive(name, bound)?;
         }

@@ -65,6 +65,8 @@ pub fn surfaces(a: &Grid, b: &Grid, settings: &CompareSettings, streams: &Stream
     Ok(Comparison {
         what: "surfaces",
         quantities,
+        interleaved: None,
+        blocks: None,
         answer,
         sentence,
         alpha,

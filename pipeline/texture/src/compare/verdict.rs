@@ -25,6 +25,11 @@ impl Null {
         Self { kind: "simulated surfaces", draws: draws.into_iter().map(|d| widened * d).collect(), widened }
     }
 
+    /// Distances between blocks in any order, widened.
+    pub fn arrangements(draws: Vec<f64>, widened: f64) -> Self {
+        Self { kind: "arrangements of blocks", ..Self::distances(draws, widened) }
+    }
+
     fn quantile(&self, q: f64) -> f64 {
         let mut sorted = self.draws.clone();
         sorted.sort_by(f64::total_cmp);
@@ -95,6 +100,7 @@ fn answer(finding: Finding, p: f64, adjusted: f64, alpha: f64) -> Quantity {
         p: None,
         p_adjusted: None,
         null: None,
+        site: None,
         answer: Answer::CannotTell,
         why: String::new(),
     };
