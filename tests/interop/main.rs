@@ -537,6 +537,48 @@ fn val_gstools_blocks_are_the_fitted_models() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
+/// A random forest of scikit-learn, which shares no code with our statistics, tells normal textures of a fit from the measured ground (AUC above
+/// 0.9, beyond what halves of the site give), and cannot tell two of them from each other.
+///
+/// Null of the second: both rasters are draws of one field. Some 200 patches of each give the mean of five AUCs a standard error below 0.04, so
+/// that 0.2 from 0.5 is beyond 5 of them (1e-6). `compare --statistics` agrees in both; its wrong `different` has a probability of at most 0.05,
+/// once for the seeds written here.
+#[test]
+fn stat_a_classifier_tells_normal_textures_from_measured_ground() {
+    let Some(python) = python() else { return };
+    let folder = area();
+    let path = folder.path();
+    let site = shipped("pozo_blanca.tif");
+    let dem = site.to_str().unwrap();
+    let run = |arguments: &[&str]| {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{arguments:?}: {}", call.stderr);
+        call.stdout
+    };
+    run(&["fit", dem, "--outer-scale", "25", "--bootstrap", "0", "-o", "fit.json"]);
+    for (name, seed) in [("a.tif", "1"), ("b.tif", "2")] {
+        let shape = ["texture", "fit.json", "--size", "271x281", "--cell", "1", "--set", "periodic=false"];
+        run(&[&shape[..], &["--phase", "gaussian", "--seed", seed, "-o", name]].concat());
+    }
+    let [a, b] = ["a.tif", "b.tif"].map(|name| path.join(name));
+    let judged = |site: &Path, texture: &Path| -> Value {
+        let call = check(&python, "check_textures.py", &[Path::new("25"), site, texture]);
+        assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+        println!("{}", call.stdout);
+        serde_json::from_str(&call.stdout).unwrap()
+    };
+    let (told, blind) = (judged(&site, &a), judged(&a, &b));
+    let auc = |judged: &Value| judged["textures"][0]["auc"].as_f64().unwrap();
+    assert!(auc(&told) > 0.9 && told["textures"][0]["passes"] == false, "{told}");
+    assert!((auc(&blind) - 0.5).abs() < 0.2, "{blind}");
+    let answer = |one: &str, other: &str| -> Value {
+        let text = run(&["compare", one, other, "--statistics", "--outer-scale", "25", "--json", "--quiet"]);
+        serde_json::from_str::<Value>(&text).unwrap()["answer"].clone()
+    };
+    assert_eq!(answer(dem, "a.tif"), "different");
+    assert_ne!(answer("a.tif", "b.tif"), "different");
+}
+
 /// Runs `check_fits.py` to the given extent and prints its table.
 fn fits_of_numpy_fields(extent: &str) {
     let Some(python) = python() else { return };

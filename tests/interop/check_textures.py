@@ -1,0 +1,150 @@
+"""An outside judge of textures: can a classifier of patches tell a texture from its site?
+
+    check_textures.py WINDOW_CELLS SITE TEXTURE...
+
+Rasters are detrended by scipy's moving average of WINDOW_CELLS cells, the texture with the site's holes, and cut into patches of half a
+window. A random forest (scikit-learn) sees of each patch the features of `features`, none of which needs the place. It is cross-validated by
+place: both rasters are cut across their longer side into strips, and each strip is judged by a forest that saw the other strips, so that
+neighbours of a patch are never in both.
+
+AUC: probability that the forest ranks a patch of the texture above one of the site, the mean over strips; 0.5 is blind, 1 is certain. Printed as
+JSON for each texture, with
+* `band`: 5 and 95 % of the AUC when the blocks of the site itself (two windows wide) are dealt out at random as `real` and `synthetic`: what the
+  method gives where there is nothing to tell;
+* `halves`: the AUC of one half of the site against the other, and `interleaved`: of the black against the white blocks of a chessboard.
+A texture passes if its AUC lies below the larger of the band's end and that of the halves. AUCs below 0.5 are blind too.
+
+Importable: `judge(site, texture, window)` with arrays, NaN where there is no data.
+"""
+
+import json
+import sys
+
+import numpy as np
+import rasterio
+from scipy.ndimage import uniform_filter
+from scipy.stats import kurtosis, skew
+from sklearn.ensemble import RandomForestClassifier
+from sklearn.metrics import roc_auc_score
+
+STRIPS = 5
+TREES = 100
+DEALS = 40
+DATA_SHARE = 0.9
+
+
+def residual(heights, window):
+    """Heights less their moving average over the cells with data; NaN where fewer than half of a window's have."""
+    data = np.isfinite(heights)
+    share = uniform_filter(data.astype(float), window, mode="constant")
+    mean = uniform_filter(np.where(data, heights, 0.0), window, mode="constant") / np.maximum(share, 1e-9)
+    return np.where(data & (share > 0.5), heights - mean, np.nan)
+
+
+def with_holes(texture, site):
+    """The texture without the cells that the site lacks, repeated where it is larger."""
+    rows, cols = (np.arange(n) % m for n, m in zip(texture.shape, site.shape))
+    return np.where(np.isfinite(site[np.ix_(rows, cols)]), texture, np.nan)
+
+
+def moments(values):
+    """Logarithm of the root mean square, skewness, and logarithm of the flatness."""
+    return [0.5 * np.log(np.mean(values**2)), skew(values), np.log(kurtosis(values, fisher=False))]
+
+
+def features(patch):
+    """Of heights, slopes, curvatures and increments over 1, 2 and 4 cells: sizes, skewness and flatness; anisotropy; spectrum by octave."""
+    patch = np.where(np.isfinite(patch), patch, np.nanmean(patch))
+    north, east = np.gradient(patch)
+    bend = (patch[1:-1, 2:] + patch[1:-1, :-2] + patch[2:, 1:-1] + patch[:-2, 1:-1] - 4.0 * patch[1:-1, 1:-1]).ravel()
+    slope = np.hypot(north, east).ravel()
+    found = moments(patch.ravel() - patch.mean()) + moments(slope) + moments(bend)
+    found += list(np.quantile(slope, [0.1, 0.5, 0.9]) / np.sqrt(np.mean(slope**2)))
+    found.append(np.log(np.mean(north**2) / np.mean(east**2)))
+    for lag in (1, 2, 4):
+        steps = np.concatenate([(patch[lag:] - patch[:-lag]).ravel(), (patch[:, lag:] - patch[:, :-lag]).ravel()])
+        found.append(np.log(kurtosis(steps, fisher=False)))
+    taper = np.hanning(patch.shape[0] + 2)[1:-1, None] * np.hanning(patch.shape[1] + 2)[1:-1]
+    power = np.abs(np.fft.fft2((patch - patch.mean()) * taper)) ** 2
+    frequency = np.hypot(*np.meshgrid(*(np.fft.fftfreq(n) for n in patch.shape), indexing="ij"))
+    octaves = [(frequency >= f) & (frequency < 2.0 * f) for f in (0.0625, 0.125, 0.25)]
+    return found + list(np.diff(np.log([power[octave].mean() for octave in octaves if octave.any()])))
+
+
+def patches(heights, side):
+    """Features and places (row and column of the middle, cells) of the patches with enough data and relief."""
+    found, places = [], []
+    for row in range(0, heights.shape[0] - side + 1, side):
+        for col in range(0, heights.shape[1] - side + 1, side):
+            patch = heights[row : row + side, col : col + side]
+            if np.isfinite(patch).mean() >= DATA_SHARE and np.nanstd(patch) > 0.0:
+                found.append(features(patch))
+                places.append([row + side / 2, col + side / 2])
+    values = np.nan_to_num(np.array(found), posinf=50.0, neginf=-50.0)
+    return values, np.array(places)
+
+
+def strips(places):
+    """Number of the strip of each place, with as many places in each strip, across the longer side."""
+    along = places[:, np.argmax(np.ptp(places, axis=0))]
+    return np.argsort(np.argsort(along, kind="stable"), kind="stable") * STRIPS // len(along)
+
+
+def auc(values, labels, groups):
+    """Mean AUC over strips of forests that saw the others; NaN if no strip has both labels."""
+    found = []
+    for group in range(STRIPS):
+        test = groups == group
+        if len(set(labels[test])) < 2 or len(set(labels[~test])) < 2:
+            continue
+        forest = RandomForestClassifier(TREES, min_samples_leaf=2, class_weight="balanced", random_state=0, n_jobs=1)
+        forest.fit(values[~test], labels[~test])
+        found.append(roc_auc_score(labels[test], forest.predict_proba(values[test])[:, 1]))
+    return float(np.mean(found)) if found else float("nan")
+
+
+def against(one, other):
+    """AUC of one set of patches against another; each has strips of its own."""
+    values = np.concatenate([one[0], other[0]])
+    labels = np.repeat([0, 1], [len(one[0]), len(other[0])])
+    return auc(values, labels, np.concatenate([strips(one[1]), strips(other[1])]))
+
+
+def within(site, window):
+    """What the site gives against itself: halves, interleaved blocks, and the band of blocks dealt out at random."""
+    values, places = site
+    along = places[:, np.argmax(np.ptp(places, axis=0))]
+    half = (along > np.median(along)).astype(int)
+    halves = against((values[half == 0], places[half == 0]), (values[half == 1], places[half == 1]))
+    cells = (places // (2 * window)).astype(int)
+    colour = cells.sum(axis=1) % 2
+    interleaved = auc(values, colour, strips(places))
+    blocks, block = np.unique(cells, axis=0, return_inverse=True)
+    random = np.random.default_rng(0)
+    deals = [auc(values, random.permutation(np.arange(len(blocks)) % 2)[block.ravel()], strips(places)) for _ in range(DEALS)]
+    return {"halves": halves, "interleaved": interleaved, "band": [float(q) for q in np.nanquantile(deals, [0.05, 0.95])]}
+
+
+def judge(site, textures, window):
+    """AUC of each texture against the site, and what the site gives against itself."""
+    side = window // 2
+    real = patches(residual(site, window), side)
+    own = within(real, window)
+    limit = max(own["band"][1], own["halves"])
+    found = []
+    for texture in textures:
+        synthetic = patches(residual(with_holes(texture, site), window), side)
+        value = against(real, synthetic)
+        found.append({"auc": value, "patches": [len(real[0]), len(synthetic[0])], "passes": value <= limit})
+    return {"textures": found, "site": own}
+
+
+def read(path):
+    with rasterio.open(path) as raster:
+        return raster.read(1, masked=True).astype(float).filled(np.nan)
+
+
+if __name__ == "__main__":
+    window, (site, *textures) = int(sys.argv[1]), map(read, sys.argv[2:])
+    json.dump(judge(site, textures, window), sys.stdout, indent=1)
+    print()
