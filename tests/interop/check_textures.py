@@ -28,8 +28,8 @@ from sklearn.ensemble import RandomForestClassifier
 from sklearn.metrics import roc_auc_score
 
 STRIPS = 5
-TREES = 100
-DEALS = 40
+TREES = 50
+DEALS = 20
 DATA_SHARE = 0.9
 
 
