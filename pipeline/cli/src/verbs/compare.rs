@@ -136,7 +136,7 @@ fn table(quantities: &[Quantity]) -> String {
     let site: &[&str] = if of_a_site { &["site: halves", "interleaved"] } else { &[] };
     let before = ["quantity", "A", "B", "difference"];
     let after = ["interval", "same within", "p (Holm)", "verdict"];
-    let head = before.iter().chain(site).chain(&after).map(|&name| name.to_owned()).collect();
+    let head: Vec<String> = before.iter().chain(site).chain(&after).map(|&name| name.to_owned()).collect();
     let rows = quantities.iter().map(|q| row(q, of_a_site));
     columns(&std::iter::once(head).chain(rows).collect::<Vec<_>>())
 }
