@@ -8,7 +8,7 @@
 //! 1. [`coregister::coregister`] subtracts one DEM from another where the texture is that of a difference (snow depth);
 //!    [`noise::of_reference`] estimates the noise from a smooth part; [`synth::conditional::fill`] fills holes.
 //! 2. [`fit()`] turns a DEM ([`Heights`]) into a fit file: model, parameters, intervals, verdict and warnings.
-//! 3. [`prepare`] binds a method and its parameters to a fit, real or stated; [`Synthesis::generate`] makes a texture.
+//! 3. [`prepare`], or [`prepare_from`] with the [`residual()`] of the site, binds a method and its parameters to a fit, real or stated; [`Synthesis::generate`] makes a texture.
 //! 4. [`onto()`], or [`modulated_onto`] with a factor for each cell, adds the texture to a base.
 //! 5. [`mod@compare`] tests whether two DEMs, two fits or two halves of a site have the same texture.
 //!
@@ -67,7 +67,9 @@ pub mod synth;
 #[cfg(test)]
 mod gstools_tests;
 
-pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, LocalMaps, Profiles, fit};
+pub use fit::{FitError, FitOutcome, FitParameters, FitSettings, Heights, LocalMaps, Profiles, fit, residual};
 pub use onto::{OntoError, SlopeFactors, amplitude, check_cells, modulated_onto, onto};
-pub use registry::{kinds, method, prepare};
+pub use registry::{check_keys, kinds, method, needs, prepare, prepare_from};
+pub use synth::measured::Measured;
+pub use synth::residual::Needs;
 pub use synth::{Cost, Method, Prospect, Synthesis, SynthesisError, TextureOutcome, fit_notes};

@@ -41,6 +41,8 @@ const DIRECTIONAL: f64 = 2.0;
 const RINGS_MAX: f64 = 32.0;
 /// Per cell in `paper` mode, s.
 const PAPER_CELL_S: f64 = 4e-7;
+/// For the statistics of a residual, s: fixed and per cell. An estimate, not calibrated.
+const STATISTICS_S: [f64; 2] = [3.0, 6e-6];
 /// Windows assumed across a surface of unknown cell size.
 const WINDOWS_ACROSS: f64 = 10.0;
 /// Windows along the torus of a non-periodic texture: sixteen ranges of an exponential, each assumed as long as the window. A fit may find a
@@ -48,9 +50,16 @@ const WINDOWS_ACROSS: f64 = 10.0;
 const TORUS_WINDOWS: f64 = 16.0;
 
 impl FitSettings {
-    /// What is known before the fit of a surface with these cells, for planning.
-    pub fn prospect(&self, cell_m: Option<[f64; 2]>) -> Prospect {
-        Prospect { torus_m: TORUS_WINDOWS * self.outer_scale_m(), cell_m, is_measured: self.is_empirical() }
+    /// What is known before the fit of a surface with this number of cells, for planning.
+    pub fn prospect(&self, cell_m: Option<[f64; 2]>, cells: u64) -> Prospect {
+        Prospect {
+            torus_m: TORUS_WINDOWS * self.outer_scale_m(),
+            cell_m,
+            cells: Some(cells),
+            window_m: self.outer_scale_m(),
+            is_measured: self.is_empirical(),
+            has_statistics: self.has_statistics(),
+        }
     }
 
     /// Approximate time of a fit of `cells` cells on one core, s. If shape and cell size are unknown, a square ten windows wide is assumed.
@@ -67,6 +76,7 @@ impl FitSettings {
             + CELL_S * n
             + k * WINDOW_CELL_S * self.windows(place) * window[0] * window[1] * searches
             + self.bootstrap() as f64 * self.replicate_seconds(n, window, of_replicate)
+            + if self.has_statistics() { STATISTICS_S[0] + STATISTICS_S[1] * n.min(CELLS_MAX as f64) } else { 0.0 }
     }
 
     fn replicate_seconds(&self, cells: f64, window: [f64; 2], k: f64) -> f64 {

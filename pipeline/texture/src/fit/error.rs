@@ -1,5 +1,6 @@
 //! Errors of a fit.
 
+use crate::synth::statistics::StatisticsError;
 use sastrugi_schemas::ParameterError;
 
 /// Why a DEM cannot be fitted, or with which parameters.
@@ -8,6 +9,9 @@ pub enum FitError {
     /// A parameter is out of its range.
     #[error(transparent)]
     Parameter(#[from] ParameterError),
+    /// The statistics of the residual cannot be measured.
+    #[error(transparent)]
+    Statistics(#[from] StatisticsError),
     /// A part of the raster could not be read.
     #[error("{0}")]
     Unreadable(String),

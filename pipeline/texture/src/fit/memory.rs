@@ -8,6 +8,8 @@ use super::survey::STRIP_CELLS;
 const STRIP_CELL_BYTES: u64 = 100;
 /// Bytes per cell of a replicate in progress: a surface on a torus of four times as many cells, its transforms, its residual.
 const REPLICATE_CELL_BYTES: u64 = 300;
+/// Bytes per cell of the part whose statistics are measured.
+const STATISTICS_CELL_BYTES: u64 = 200;
 /// Weights of partial windows, for two estimators: for each of up to 49 bins, 8 bytes per lag (one of each opposite pair) within
 /// the largest lag plus two half windows (1.5 windows).
 const WEIGHTS_BYTES: u64 = 2 * 49 * 8 * 9 / 2;
@@ -29,6 +31,8 @@ impl FitSettings {
         let replicate = cells.min(CELLS_MAX as u64 + 9 * window).saturating_mul(REPLICATE_CELL_BYTES);
         let at_work = threads.min(self.bootstrap() as u64);
         let models = window.saturating_mul(WEIGHTS_BYTES + (1 + at_work) * MODEL_BYTES);
+        let statistics = if self.has_statistics() { STATISTICS_CELL_BYTES } else { 0 };
+        let examined = examined.max(cells.min(CELLS_MAX as u64 + 49 * window).saturating_mul(statistics));
         (64 << 20) + cells / 4 + models + strip.max(examined).max(replicate.saturating_mul(at_work))
     }
 }

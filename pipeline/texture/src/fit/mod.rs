@@ -15,6 +15,9 @@
 //! as `paper`: on surfaces that are exactly exponential it gives sigma 19 % and b 42 % too small at b = 0.14 windows,
 //! 43 % and 76 % at half a window (`docs/papers/vecherin.md`).
 //!
+//! 7. On request, statistics of the residual for textures that repeat more than its covariance ([`crate::synth::statistics`]): of the middle
+//!    of the DEM, at most a million cells or seven windows a side.
+//!
 //! Cost without intervals: dominated by the moving averages of the object search and four real transforms of the raster.
 //! A replicate costs one surface of four times as many cells (at most a million) and another such fit. Memory: the
 //! strips of `survey.rs`, which grow with the raster's width only, plus two bits per cell, plus 300 bytes for each of up to a
@@ -49,13 +52,15 @@ pub use params::{FitParameters, FitSettings, Mode};
 
 use crate::covariance::bins::Layout;
 use crate::covariance::{Form, LagBins};
-use crate::synth::EMPIRICAL;
 use crate::synth::marginal::quantiles_m;
+use crate::synth::{EMPIRICAL, statistics};
 use case::Case;
 use estimator::{Estimate, Estimator, best, ordinary};
 use report::Findings;
 use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::statistics::Statistics;
 use std::ops::Range;
 use survey::Survey;
 use verdicts::Windows;
@@ -120,16 +125,38 @@ impl FitOutcome {
 pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> Result<FitOutcome, FitError> {
     let settings = &if heights.are_profiles() { settings.of_transects() } else { settings.clone() };
     let case = Case::new(heights, settings)?;
+    let (rows, cols) = middle(&case);
+    // The height distribution and the statistics are those of the residual before trimming.
+    let geometry = case.geometry.window(rows.start, cols.start, rows.len(), cols.len());
+    let residual = Grid::new(geometry, case.survey.residual(heights, settings, rows, cols)?);
+    let statistics = settings.has_statistics().then(|| statistics_of(&case, &residual).map(Box::new)).transpose()?;
     let naive = ordinary(&case, &Form::parse("exponential")?);
     let fit = match settings.mode() {
         Mode::Paper => paper(&case, &naive)?,
         Mode::Corrected => corrected(&case, &naive, streams)?,
     };
-    let (rows, cols) = middle(&case);
-    // The height distribution is that of the residual before trimming.
-    let residual = case.survey.residual(heights, settings, rows, cols)?;
-    let fit = FitFile { height_quantiles_m: quantiles_m(&residual), ..fit };
+    let fit = FitFile { height_quantiles_m: quantiles_m(&residual.values), statistics, ..fit };
     Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey, bins: case.bins, cell_m: case.geometry.cell })
+}
+
+/// The residual of a DEM, heights minus background, as a fit with these settings computes it, before trimming, m; NaN where there is no data,
+/// an object was left out, or a window has too little data.
+///
+/// # Errors
+/// As [`fit()`], as far as the residual is concerned.
+pub fn residual(heights: &dyn Heights, settings: &FitSettings) -> Result<Grid, FitError> {
+    // The search for objects depends on how the raster is cut into strips, and that on the lags of the fit.
+    let case = Case::new(heights, settings)?;
+    Ok(Grid::new(case.geometry, case.residual()?))
+}
+
+/// The statistics of a residual, for lags of up to one and a half windows.
+fn statistics_of(case: &Case, residual: &Grid) -> Result<Statistics, FitError> {
+    if case.heights.are_profiles() {
+        let message = "is true, but transects have only one direction; statistics need a raster";
+        return Err(ParameterError::new("statistics", message).into());
+    }
+    Ok(statistics::measure(residual, case.window.cells().map(|cells| (3 * cells).div_ceil(2)))?)
 }
 
 fn paper(case: &Case, naive: &Estimate) -> Result<FitFile, FitError> {

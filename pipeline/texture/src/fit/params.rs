@@ -7,6 +7,8 @@ use crate::synth::EMPIRICAL;
 use sastrugi_numeric::Geometry;
 use sastrugi_roughness::background::{AtPartial, BoxWindow};
 use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::kind::read_parameters;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -73,6 +75,10 @@ pub struct FitParameters {
     /// Range of the correlated noise, m: 0.6 times the width of the matched patches if each cell has its own patch. Must be
     /// below the outer scale; 0 without correlated noise.
     pub correlated_noise_range_m: f64,
+    /// Whether the statistics of the residual are stored, from which the texture methods `modulated` and `wavelet_statistics` work without
+    /// the DEM. Default false. Not in `paper` mode.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub statistics: bool,
 }
 
 /// Models that `auto` tries.
@@ -117,6 +123,7 @@ impl Default for FitParameters {
             noise_sigma_m: 0.0,
             correlated_noise_sigma_m: 0.0,
             correlated_noise_range_m: 0.0,
+            statistics: false,
         }
     }
 }
@@ -181,6 +188,11 @@ impl TryFrom<FitParameters> for FitSettings {
             let message = "is `paper`, which supports neither an inner scale nor noise; remove them or use `corrected`";
             return Err(ParameterError::new("mode", message));
         }
+        if parameters.mode == Mode::Paper && parameters.statistics {
+            let message =
+                "is `paper`, whose residual is offset and trimmed by its own rules; use `corrected` for statistics";
+            return Err(ParameterError::new("mode", message));
+        }
         let auto = parameters.model.split(',').any(|name| name.trim() == "auto");
         Ok(Self { parameters, forms, empirical, auto, noise, min_valid_share: share })
     }
@@ -216,6 +228,23 @@ impl FitSettings {
     /// The parameters with every default written out.
     pub fn parameters(&self) -> FitParameters {
         FitParameters { min_valid_share: Some(self.min_valid_share), ..self.parameters.clone() }
+    }
+
+    /// The settings of a fit file.
+    ///
+    /// # Errors
+    /// A file without settings, such as a stated fit; settings that this program does not know.
+    pub fn of_fit(fit: &FitFile) -> Result<Self, ParameterError> {
+        if fit.settings.as_object().is_none_or(serde_json::Map::is_empty) {
+            let message = "are missing from the fit file, so its residual cannot be computed again; fit the DEM again";
+            return Err(ParameterError::new("settings", message));
+        }
+        read_parameters::<FitParameters>(&fit.settings).and_then(Self::try_from).map_err(|e| e.within("settings"))
+    }
+
+    /// Whether the fit stores the statistics of the residual.
+    pub fn has_statistics(&self) -> bool {
+        self.parameters.statistics
     }
 
     /// Whether the fit stores the measured covariance, for textures.

@@ -8,8 +8,12 @@
 //! how often one cell is repeated.
 
 use super::SynthesisError;
+use super::to_micrometres;
+use crate::fit::{FitError, FitSettings, Heights, residual};
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, sums};
+use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::fit::FitFile;
 use std::f64::consts::E;
 
 /// Relative difference of cell sizes that counts as rounding.
@@ -61,6 +65,22 @@ impl Collage {
 }
 
 impl Measured {
+    /// The residual of the DEM of a fit, computed as the fit did.
+    ///
+    /// # Errors
+    /// A fit without settings; a DEM with other cells than the fit's, or without a residual.
+    pub fn of_fit(heights: &dyn Heights, fit: &FitFile) -> Result<Self, FitError> {
+        let own_m = heights.geometry().cell;
+        if let Some(cell_m) = fit.cell_m.filter(|m| (0..2).any(|k| (m[k] - own_m[k]).abs() > CELL_TOLERANCE * m[k])) {
+            let [[x, y], [fit_x, fit_y]] = [own_m, cell_m].map(|sides| sides.map(to_micrometres));
+            let message = format!(
+                "has cells of {x} m x {y} m, but the fit was made on cells of {fit_x} m x {fit_y} m; give the DEM of the fit"
+            );
+            return Err(ParameterError::new("exemplar", message).into());
+        }
+        Ok(Self { residual: residual(heights, &FitSettings::of_fit(fit)?)? })
+    }
+
     /// Refuses a texture whose cells are not those of the site.
     ///
     /// # Errors
@@ -141,6 +161,20 @@ impl Holes {
         let starts = |axis: usize| (0..(sides[axis] + 1).saturating_sub(shape[axis])).step_by(step);
         let all = starts(0).flat_map(|row| starts(1).map(move |col| [row, col]));
         all.filter(|&at| self.is_complete(at, shape)).collect()
+    }
+}
+
+impl std::fmt::Display for Copies {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        let Self { longest_run: [south, east], mean_run: [mean_south, mean_east], .. } = self;
+        write!(
+            f,
+            "copied runs: {mean_south:.1} cells on average along columns and {mean_east:.1} along rows, at most {south} and {east}; \
+             {:.0} % of the cells have the height of their source; {:.0} % of the site occurs, one of its cells {} times",
+            100.0 * self.verbatim_share,
+            100.0 * self.site_share,
+            self.uses_max
+        )
     }
 }
 

@@ -1,8 +1,9 @@
 //! Synthetic texture: random fields with a given covariance. One folder per method.
 //!
-//! A method ([`Method`], and its [`Kernel`] once the fit is bound) synthesises one tile of a normal field (bumps: nearly normal).
-//! Everything common to all methods is implemented once, in [`Texture`]: size and cells, anisotropy, height distribution, tiling, and the
-//! comparison of the method's mean covariance with the target.
+//! There are two families. A method of the first ([`Method`], and its [`Kernel`] once the fit is bound) synthesises one tile of a normal field
+//! (bumps: nearly normal) with a covariance. What these have in common is implemented once, in [`Texture`]: size and cells, anisotropy,
+//! height distribution, tiling, and the comparison of the method's mean covariance with the target. A method of the second repeats the
+//! measured residual, or its statistics; see [`residual`].
 //!
 //! Drawing all cells from one multivariate normal distribution by Latin hypercube sampling (`lhsnorm` in Vecherin et al.
 //! 2022, section 3.2) is not offered: it needs the same matrix as [`cholesky`], and stratifying each cell's values over
@@ -20,6 +21,7 @@ pub mod modulated;
 pub mod quasi_wavelets;
 pub mod quilting;
 pub mod reach;
+pub mod residual;
 pub mod scoreboard;
 pub mod statistics;
 pub mod tile;
@@ -27,6 +29,7 @@ pub mod wavelet_statistics;
 
 use crate::covariance::Covariance;
 use marginal::Marginal;
+use measured::Measured;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::{CovarianceMap, FitFile};
@@ -34,6 +37,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use std::sync::Arc;
 use tile::Tile;
 
 /// A method with checked parameters, before the fit is known.
@@ -50,18 +54,17 @@ pub trait Method: Send + Sync {
     /// The same, with the most memory that any result of a fit may need.
     fn cost_of(&self, prospect: &Prospect) -> Cost;
 
-    /// Refuses what [`Self::bind`] would refuse for a fit with a covariance measured on cells of size `measured_m`, east-west and
-    /// north-south, m.
+    /// Refuses what [`Self::bind`] would refuse for such a fit, as far as it is known in advance.
     ///
     /// # Errors
-    /// A method that supports model covariances only; cells that are not whole multiples of the measured ones.
-    fn check_measured(&self, measured_m: [f64; 2]) -> Result<(), ParameterError>;
+    /// A measured covariance for a method that supports models only; cells that do not match the site's; missing statistics.
+    fn check_prospect(&self, prospect: &Prospect) -> Result<(), ParameterError>;
 
-    /// The texture that matches a fit.
+    /// The texture that matches a fit; `measured` is the residual of the fit's DEM, for methods that copy from it.
     ///
     /// # Errors
-    /// A fit without a covariance, or with one that the method cannot reproduce on this tile.
-    fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError>;
+    /// A fit without a covariance, or with one that the method cannot reproduce on this tile; missing statistics, a missing residual.
+    fn bind(&self, fit: &FitFile, measured: Option<&Arc<Measured>>) -> Result<Box<dyn Synthesis>, ParameterError>;
 }
 
 /// What is known about a fit in advance, for planning.
@@ -71,8 +74,14 @@ pub struct Prospect {
     pub torus_m: f64,
     /// Cells of the fitted surface, east-west and north-south, m.
     pub cell_m: Option<[f64; 2]>,
+    /// Number of these cells.
+    pub cells: Option<u64>,
+    /// Window of the fit, m.
+    pub window_m: f64,
     /// Whether the measured covariance is stored.
     pub is_measured: bool,
+    /// Whether the statistics of the residual are stored.
+    pub has_statistics: bool,
 }
 
 /// Cost of a texture.
@@ -99,10 +108,11 @@ pub trait Synthesis: Send + Sync {
     fn notes(&self) -> Vec<String>;
 
     /// Mean covariance of an ensemble of these textures and its target, at lags along rows, columns and diagonals: up to half the
-    /// width of a periodic tile, or the full width of any other.
+    /// width of a periodic tile, or the full width of any other. A method whose mean covariance is unknown states only lags along rows,
+    /// with NaN as what it achieves.
     fn covariance(&self) -> Vec<LagCovariance>;
 
-    /// Target ratio of the range across the long axis to the range along it.
+    /// Target ratio of the range across the long axis to the range along it; NaN if the method has none.
     fn ratio(&self) -> f64;
 
     /// Whether the texture repeats without seams.
@@ -138,10 +148,12 @@ pub struct TextureOutcome {
     /// Heights, m.
     pub grid: Grid,
     /// Largest absolute difference between the achieved and the target covariance over all lags of the torus (for inexact methods and
-    /// given height distributions: over the lags of [`Synthesis::covariance`]), m2.
+    /// given height distributions: over the lags of [`Synthesis::covariance`]), m2; NaN if unknown.
     pub covariance_error_max_m2: f64,
     /// Share of the spectrum that was negative and set to 0.
     pub clip_share: f64,
+    /// Notes on this realisation.
+    pub notes: Vec<String>,
 }
 
 /// A length for a message, m, rounded to hide computed digits.
@@ -405,15 +417,18 @@ impl<P: MethodParameters> Method for Checked<P> {
         self.tile.repeated_cost(self.own.cost_of(&self.tile, prospect))
     }
 
-    fn check_measured(&self, measured_m: [f64; 2]) -> Result<(), ParameterError> {
-        self.own.check_measured(&self.tile, measured_m)
+    fn check_prospect(&self, prospect: &Prospect) -> Result<(), ParameterError> {
+        match prospect.cell_m.filter(|_| prospect.is_measured) {
+            Some(measured_m) => self.own.check_measured(&self.tile, measured_m),
+            None => Ok(()),
+        }
     }
 
-    fn bind(&self, fit: &FitFile) -> Result<Box<dyn Synthesis>, ParameterError> {
+    fn bind(&self, fit: &FitFile, _: Option<&Arc<Measured>>) -> Result<Box<dyn Synthesis>, ParameterError> {
         let wanted = Wanted::of_fit(fit)?;
         if wanted.map.is_some() {
             // Missing cells are reported where they are needed.
-            self.check_measured(wanted.cell_m.unwrap_or(self.tile.geometry.cell))?;
+            self.own.check_measured(&self.tile, wanted.cell_m.unwrap_or(self.tile.geometry.cell))?;
         }
         Ok(Box::new(Texture::new(&self.tile, &self.own, wanted)?))
     }
@@ -546,6 +561,6 @@ impl<K: Kernel> Synthesis for Texture<K> {
             None => covariance_error_max_m2.unwrap_or_else(over_lags),
             Some(_) => over_lags(),
         };
-        Ok(TextureOutcome { grid: self.shaped(heights_m), covariance_error_max_m2, clip_share })
+        Ok(TextureOutcome { grid: self.shaped(heights_m), covariance_error_max_m2, clip_share, notes: Vec::new() })
     }
 }

@@ -27,15 +27,15 @@ const DENSE_LAGS: usize = 40;
 /// Results of a method on one fit.
 #[derive(Clone, Debug)]
 pub struct Score {
-    /// Largest error of the mean covariance, share of the variance.
+    /// Largest error of the mean covariance, share of the variance; NaN if the method does not know its mean covariance.
     pub error_max: f64,
-    /// Root mean square error of the mean covariance, share of the variance.
+    /// Root mean square error of the mean covariance, share of the variance; NaN likewise.
     pub error_rms: f64,
     /// Mean of the realisations' variances over the target variance.
     pub variance_mean: f64,
     /// Standard deviation of the realisations' variances over the target variance.
     pub variance_spread: f64,
-    /// Target ratio of range across to range along.
+    /// Target ratio of range across to range along; NaN if the method has none.
     pub ratio_wanted: f64,
     /// The ratio measured on the realisations; NaN if the contour extends beyond half a tile.
     pub ratio_found: f64,
@@ -54,7 +54,7 @@ pub struct CurvePoint {
     pub lag_m: f64,
     /// Target.
     pub wanted_m2: f64,
-    /// Mean of the method.
+    /// Mean of the method; NaN if unknown.
     pub achieved_m2: f64,
     /// Mean over the realisations.
     pub measured_m2: f64,
@@ -82,7 +82,11 @@ pub fn score(synthesis: &dyn Synthesis, streams: &Streams, realisations: u32) ->
         measured_m2: sum / share,
     });
     Ok(Score {
-        error_max: errors.iter().copied().fold(0.0, f64::max),
+        error_max: if errors.iter().any(|e| e.is_nan()) {
+            f64::NAN
+        } else {
+            errors.iter().copied().fold(0.0, f64::max)
+        },
         error_rms: sums::mean(&errors.iter().map(|e| e * e).collect::<Vec<_>>()).sqrt(),
         variance_mean: sums::mean(&tally.variances) / variance_m2,
         variance_spread: spread(&tally.variances) / variance_m2,

@@ -25,6 +25,15 @@ const RATIO_MIN: f64 = 0.02;
 /// Width in ranges that a periodic tile needs for a Matern covariance, and a non-periodic one.
 const SELF_AFFINE_RANGES: [f64; 2] = [16.0, 4.0];
 
+/// Keys of a tile that only textures from a covariance have, and what a method that repeats a site keeps instead.
+pub(super) const OF_COVARIANCE: [(&str, &str); 5] = [
+    ("ratio", "directions"),
+    ("azimuth_deg", "directions"),
+    ("outer_m", "waves"),
+    ("marginal", "heights"),
+    ("marginal_m", "heights"),
+];
+
 /// Size of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "must be a number, or two numbers: east-west and north-south, m")]
@@ -207,6 +216,20 @@ impl Tile {
         Value::Object(all.map(|(key, value)| (key.clone(), value.clone())).collect())
     }
 
+    /// The same for a method that repeats a site, without the keys of [`OF_COVARIANCE`].
+    pub(super) fn parameters_of_site(&self, own: &impl Serialize) -> Value {
+        let mut all = self.parameters_with(own);
+        if let Value::Object(map) = &mut all {
+            map.retain(|key, _| !is_of_covariance(key));
+        }
+        all
+    }
+
+    /// A note if the size was rounded down.
+    pub(super) fn note(&self) -> Option<String> {
+        self.note.clone()
+    }
+
     /// Cost of a tile including its repetition.
     pub fn repeated_cost(&self, tile: Cost) -> Cost {
         let whole = self.whole().len();
@@ -327,6 +350,23 @@ pub fn schema<T: JsonSchema>() -> Value {
         }
     }
     own
+}
+
+/// The same for a method that repeats a site, without the keys of [`OF_COVARIANCE`].
+pub(super) fn schema_of_site<T: JsonSchema>() -> Value {
+    let mut all = schema::<T>();
+    if let Some(properties) = all["properties"].as_object_mut() {
+        properties.retain(|key, _| !is_of_covariance(key));
+    }
+    // The type of `marginal`.
+    if let Some(types) = all["$defs"].as_object_mut() {
+        types.retain(|name, _| name != "Heights");
+    }
+    all
+}
+
+fn is_of_covariance(key: &str) -> bool {
+    OF_COVARIANCE.iter().any(|(of_covariance, _)| *of_covariance == key)
 }
 
 #[cfg(test)]

@@ -38,19 +38,23 @@
 
 pub mod sampling;
 
-use super::SynthesisError;
 use super::measured::{Collage, Measured};
+use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
+use super::{Cost, SynthesisError};
 use sampling::{Field, Sampling};
 use sastrugi_numeric::{Counter, Streams};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Name of the method.
 const NAME: &str = "exemplar";
 /// Spacing of the first cells in correlation lengths, if not stated.
 const SPACING_LENGTHS: usize = 2;
+/// Operations for the comparison of two cells: an estimate.
+const OPERATIONS_PER_CELL: f64 = 100.0;
 /// Fewest cells with data in a site.
 const PLACES_MIN: usize = 1000;
 
@@ -76,12 +80,16 @@ impl Default for ExemplarParameters {
     }
 }
 
-impl ExemplarParameters {
-    /// Refuses parameters that are invalid whatever the site.
-    ///
-    /// # Errors
-    /// Parameters out of range.
-    pub fn check(&self) -> Result<(), ParameterError> {
+impl ResidualParameters for ExemplarParameters {
+    const NAME: &'static str = NAME;
+    type Source = Measured;
+    type Kernel = Sampler;
+
+    fn is_periodic(&self) -> bool {
+        self.periodic
+    }
+
+    fn check(&self) -> Result<(), ParameterError> {
         self.spacing_m.map(|m| ParameterError::positive("spacing_m", m)).transpose()?;
         for (key, value, low, high) in [("neighbours", self.neighbours, 4, 64), ("scan", self.scan, 0, 100_000)] {
             if !(low..=high).contains(&value) {
@@ -89,6 +97,40 @@ impl ExemplarParameters {
             }
         }
         Ok(())
+    }
+
+    fn cost_of(&self, tile: &Tile, site: &Site) -> Cost {
+        self.cost(site.cells, tile.geometry.len() as u64)
+    }
+
+    fn kernel(&self, tile: &Tile, measured: &Arc<Measured>) -> Result<Sampler, ParameterError> {
+        Ok(Sampler { measured: measured.clone(), tile: tile.clone(), parameters: self.clone() })
+    }
+}
+
+/// Direct sampling bound to a site.
+pub struct Sampler {
+    measured: Arc<Measured>,
+    tile: Tile,
+    parameters: ExemplarParameters,
+}
+
+impl ResidualKernel for Sampler {
+    fn cost(&self) -> Cost {
+        self.parameters.cost(self.measured.residual.geometry.len() as u64, self.tile.geometry.len() as u64)
+    }
+
+    fn make(&self, streams: &Streams) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
+        let Collage { heights_m, copies } = synthesise(&self.measured, &self.tile, &self.parameters, streams)?;
+        Ok((heights_m, vec![copies.to_string()]))
+    }
+}
+
+impl ExemplarParameters {
+    /// Cost of a tile of `cells` from a site of `places` cells.
+    fn cost(&self, places: u64, cells: u64) -> Cost {
+        let compared = f64::from(self.neighbours) * (1.5 * f64::from(self.neighbours));
+        Cost { memory_bytes: 12 * places + 40 * cells, operations: OPERATIONS_PER_CELL * compared * cells as f64 }
     }
 
     /// Spacing of the first cells, a power of 2, cells: at most half of the tile's shorter side.
@@ -114,7 +156,7 @@ pub fn kind() -> Kind {
         kind: NAME,
         summary: "direct sampling of the measured residual, grid by grid; needs the DEM, whose licence extends to the texture",
         source: "Mariethoz, Renard and Straubhaar 2010; Gravey and Mariethoz 2020",
-        parameters: tile::schema::<ExemplarParameters>(),
+        parameters: tile::schema_of_site::<ExemplarParameters>(),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Variance and range of the amplitude from the flatness of increments.
 
 use super::transform::{NormalCorrelation, Transform};
-use super::{LOG_VARIANCE_MAX, Modulated, RANGE_CELLS_MIN};
+use super::{LOG_VARIANCE_MAX, Modulated, RANGE_CELLS_FITTED, RANGE_CELLS_MIN};
 use crate::synth::statistics::{lags, spectrum};
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use sastrugi_schemas::statistics::{Modulation, Statistics};
@@ -12,7 +12,7 @@ const SIDE: usize = 320;
 const LAG_MAX: usize = 64;
 /// Variances of the logarithm and ranges, cells, of the first candidates, beside 0.
 const LOG_VARIANCES: [f64; 7] = [0.1, 0.25, 0.45, 0.7, 1.0, 1.4, 1.9];
-const RANGES: [f64; 6] = [RANGE_CELLS_MIN, 3.0, 6.0, 12.0, 24.0, 40.0];
+const RANGES: [f64; 6] = [RANGE_CELLS_MIN, 3.0, 6.0, 12.0, 24.0, RANGE_CELLS_FITTED];
 /// Largest negative share of the spectrum of G that a candidate may have: it is the error of the covariance.
 const CLIP_SHARE_MAX: f64 = 0.04;
 /// Rounds of refinement: each moves to the best neighbour, or halves the steps.

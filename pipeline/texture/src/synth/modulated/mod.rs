@@ -35,8 +35,10 @@ mod transform;
 
 pub use fit::{flatness, flatness_at, measure};
 
+use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::statistics::{lags, spectrum};
-use super::{Cost, tile};
+use super::tile::{self, Tile};
+use super::{Cost, SynthesisError};
 use crate::synth::fft_ma::{Phase, random_column};
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, RealFft2, smooth_length};
@@ -46,6 +48,7 @@ use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
+use std::sync::Arc;
 use transform::{NormalCorrelation, Transform, amplitude};
 
 /// Name in the registry.
@@ -59,6 +62,8 @@ pub const RANGE_CELLS_MIN: f64 = 1.5;
 const RANGE_SHARE_MAX: f64 = 0.25;
 /// Ranges of the amplitude that a torus is wider than a texture that is not periodic.
 const MARGIN_RANGES: f64 = 3.0;
+/// Longest range of the amplitude that a fit finds, in the longer side of a cell.
+const RANGE_CELLS_FITTED: f64 = 40.0;
 /// Bytes per torus cell at the peak.
 const BYTES_PER_CELL: u64 = 40;
 /// Square root of the smallest eigenvalue of W, relative to the largest, that is synthesised.
@@ -84,16 +89,52 @@ impl Default for ModulatedParameters {
     }
 }
 
-impl ModulatedParameters {
-    /// Refuses parameters that are invalid whatever the fit.
-    ///
-    /// # Errors
-    /// A parameter out of range.
-    pub fn check(&self) -> Result<(), ParameterError> {
+impl ResidualParameters for ModulatedParameters {
+    const NAME: &'static str = NAME;
+    type Source = Statistics;
+    type Kernel = Modulated;
+
+    fn is_periodic(&self) -> bool {
+        self.periodic
+    }
+
+    fn check(&self) -> Result<(), ParameterError> {
         if let Some(log_variance) = self.log_variance {
             check_log_variance(log_variance)?;
         }
         self.range_m.map(|range_m| ParameterError::positive("range_m", range_m)).transpose().map(drop)
+    }
+
+    fn cost_of(&self, tile: &Tile, site: &Site) -> Cost {
+        let ([dx, dy], shape) = (tile.geometry.cell, [tile.geometry.rows, tile.geometry.cols]);
+        let range_m = self.range_m.unwrap_or(RANGE_CELLS_FITTED * dx.max(dy));
+        cost(torus(site.reach, shape, [range_m / dy, range_m / dx], self.periodic), shape)
+    }
+
+    fn kernel(&self, tile: &Tile, statistics: &Arc<Statistics>) -> Result<Modulated, ParameterError> {
+        Modulated::new(statistics, [tile.geometry.rows, tile.geometry.cols], self)
+    }
+}
+
+impl ResidualKernel for Modulated {
+    fn cost(&self) -> Cost {
+        cost(self.torus, self.shape)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let share = self.clip_share;
+        let note = format!(
+            "{share:.1e} of the spectrum was negative and set to 0; the covariance is off by at most that share of the variance"
+        );
+        (share > 0.0).then_some(note).into_iter().collect()
+    }
+
+    fn clip_share(&self) -> f64 {
+        self.clip_share
+    }
+
+    fn make(&self, streams: &Streams) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
+        Ok((Modulated::make(self, streams), Vec::new()))
     }
 }
 
@@ -112,7 +153,7 @@ pub fn kind() -> Kind {
         kind: NAME,
         summary: "normal field times a log-normal amplitude, with the residual's covariance and heights: rough in patches",
         source: "Castaing, Gagne and Hopfinger 1990; Mehler 1866",
-        parameters: tile::schema::<ModulatedParameters>(),
+        parameters: tile::schema_of_site::<ModulatedParameters>(),
     }
 }
 
@@ -154,7 +195,7 @@ impl Modulated {
         let range_m = parameters.range_m.unwrap_or(statistics.modulation.range_m);
         let [dx, dy] = statistics.cell_m;
         let range_cells = [range_m / dy, range_m / dx];
-        let torus = torus(statistics, shape, range_cells, parameters.periodic);
+        let torus = torus(lags::reach(&statistics.covariance), shape, range_cells, parameters.periodic);
         check_range(range_m, range_cells, torus, statistics.cell_m)?;
         let variance_m2 = statistics.covariance.variance();
         let transform = Transform::new(&statistics.probabilities, &statistics.heights_m, variance_m2, log_variance);
@@ -174,15 +215,6 @@ impl Modulated {
     ) -> Self {
         let (magnitudes, clip_share) = magnitudes(covariance_m2, torus, table, range_cells);
         Self { shape, torus, transform, log_variance, magnitudes, range_cells, clip_share }
-    }
-
-    /// Cost of [`Self::make`], with the spectrum.
-    pub fn cost(&self) -> Cost {
-        /// Operations for phases, exponential and tables of a cell.
-        const PER_CELL: f64 = 90.0;
-        let [cells, shown] = [self.torus, self.shape].map(|[rows, cols]| (rows * cols) as u64);
-        let operations = cells as f64 * (7.5 * libm::log2(cells as f64) + PER_CELL);
-        Cost { memory_bytes: BYTES_PER_CELL * cells + 8 * shown, operations }
     }
 
     /// Share of the spectrum of G that was negative and set to 0; the covariance is off by no more than this share of the variance of G.
@@ -239,9 +271,17 @@ pub fn synthesise(
     Ok(Modulated::new(statistics, shape, parameters)?.make(streams))
 }
 
-/// Rows and columns of the torus of a texture.
-fn torus(statistics: &Statistics, shape: [usize; 2], range_cells: [f64; 2], periodic: bool) -> [usize; 2] {
-    let reach = lags::reach(&statistics.covariance);
+/// Cost of a texture of `shape` on a torus, with its spectrum.
+fn cost(torus: [usize; 2], shape: [usize; 2]) -> Cost {
+    /// Operations for phases, exponential and tables of a cell.
+    const PER_CELL: f64 = 90.0;
+    let [cells, shown] = [torus, shape].map(|[rows, cols]| (rows * cols) as u64);
+    let operations = cells as f64 * (7.5 * libm::log2(cells as f64) + PER_CELL);
+    Cost { memory_bytes: BYTES_PER_CELL * cells + 8 * shown, operations }
+}
+
+/// Rows and columns of the torus of a texture, for a covariance with lags up to `reach` cells.
+fn torus(reach: [usize; 2], shape: [usize; 2], range_cells: [f64; 2], periodic: bool) -> [usize; 2] {
     let margin = |axis: usize| (MARGIN_RANGES * range_cells[axis]).min(1e6).max(reach[axis] as f64).ceil() as usize;
     [0, 1].map(|axis| if periodic { shape[axis] } else { smooth_length(shape[axis] + margin(axis)) })
 }

@@ -35,16 +35,18 @@
 pub mod cut;
 mod search;
 
-use super::SynthesisError;
 use super::exemplar::sampling::{self, Field};
 use super::measured::{Collage, Holes, Measured};
+use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
+use super::{Cost, SynthesisError};
 use cut::Strips;
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use search::{Search, Wanted};
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 
 /// Name of the method.
 const NAME: &str = "quilting";
@@ -58,6 +60,9 @@ pub const PATCH_MIN: usize = 12;
 const COVERED_SHARE: f64 = 0.8;
 /// Gaps are closed where at least half of a window of this many cells has data.
 const GAP: usize = 13;
+/// Operations per cell of the texture and per cell of the site: an estimate.
+const OPERATIONS_PER_CELL: f64 = 3500.0;
+const OPERATIONS_PER_PLACE: f64 = 500.0;
 /// Fewest complete patches to choose from.
 const PLACES_MIN: usize = 100;
 
@@ -86,12 +91,16 @@ impl Default for QuiltingParameters {
     }
 }
 
-impl QuiltingParameters {
-    /// Refuses parameters that are invalid whatever the site.
-    ///
-    /// # Errors
-    /// Parameters out of range.
-    pub fn check(&self) -> Result<(), ParameterError> {
+impl ResidualParameters for QuiltingParameters {
+    const NAME: &'static str = NAME;
+    type Source = Measured;
+    type Kernel = Quilt;
+
+    fn is_periodic(&self) -> bool {
+        self.periodic
+    }
+
+    fn check(&self) -> Result<(), ParameterError> {
         self.patch_m.map(|m| ParameterError::positive("patch_m", m)).transpose()?;
         let ranges = [("overlap", self.overlap, 0.1, 0.5), ("tolerance", self.tolerance, 0.0, 1.0)];
         for (key, value, low, high) in ranges {
@@ -106,6 +115,43 @@ impl QuiltingParameters {
             ));
         }
         Ok(())
+    }
+
+    fn cost_of(&self, tile: &Tile, site: &Site) -> Cost {
+        self.cost(site.cells, tile.geometry.len() as u64)
+    }
+
+    fn kernel(&self, tile: &Tile, measured: &Arc<Measured>) -> Result<Quilt, ParameterError> {
+        Ok(Quilt { measured: measured.clone(), tile: tile.clone(), parameters: self.clone() })
+    }
+}
+
+/// Quilting bound to a site.
+pub struct Quilt {
+    measured: Arc<Measured>,
+    tile: Tile,
+    parameters: QuiltingParameters,
+}
+
+impl ResidualKernel for Quilt {
+    fn cost(&self) -> Cost {
+        self.parameters.cost(self.measured.residual.geometry.len() as u64, self.tile.geometry.len() as u64)
+    }
+
+    fn make(&self, streams: &Streams) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
+        let Collage { heights_m, copies } = synthesise(&self.measured, &self.tile, &self.parameters, streams)?;
+        Ok((heights_m, vec![copies.to_string()]))
+    }
+}
+
+impl QuiltingParameters {
+    /// Cost of a tile of `cells` from a site of `places` cells.
+    fn cost(&self, places: u64, cells: u64) -> Cost {
+        Cost {
+            memory_bytes: (8 << 20) + 48 * places + 24 * cells,
+            // Patches are laid as densely whatever their number; each is compared with every place of the site.
+            operations: OPERATIONS_PER_CELL * cells as f64 + OPERATIONS_PER_PLACE * places as f64,
+        }
     }
 
     /// Rows and columns of a patch.
@@ -178,7 +224,7 @@ pub fn kind() -> Kind {
         kind: NAME,
         summary: "patches of the measured residual joined along least-error cuts; needs the DEM, whose licence extends to the texture",
         source: "Efros and Freeman 2001, section 2",
-        parameters: tile::schema::<QuiltingParameters>(),
+        parameters: tile::schema_of_site::<QuiltingParameters>(),
     }
 }
 

@@ -75,6 +75,12 @@ fn dense(table: &LagCovariances) -> Vec<Vec<f64>> {
         .collect()
 }
 
+/// The covariance at lags of 0 to `most` cells along rows, or as far as the table reaches, m2.
+pub fn along_rows(table: &LagCovariances, most: usize) -> Vec<f64> {
+    let eastwards = dense(table).into_iter().next().unwrap_or_default();
+    eastwards.into_iter().skip(reach(table)[1]).take(most + 1).collect()
+}
+
 /// Weight of a lag, from its rows and columns as shares of the largest lag.
 pub type Taper = fn([f64; 2]) -> f64;
 

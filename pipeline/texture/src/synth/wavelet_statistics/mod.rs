@@ -54,11 +54,12 @@ mod target;
 
 pub use measure::measure;
 
-use super::Cost;
 use super::fft_ma::{Phase, random_spectrum};
+use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::statistics::lags;
 use super::statistics::spectrum::{self, Modes};
-use super::tile::{self, CELLS_MAX};
+use super::tile::{self, CELLS_MAX, Tile};
+use super::{Cost, SynthesisError};
 use bands::{Band, Bands, ORIENTATIONS};
 use differences::Matcher;
 use rayon::prelude::*;
@@ -68,6 +69,7 @@ use sastrugi_schemas::statistics::{Statistics, Wavelets};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::Arc;
 use symmetric::Symmetric;
 use target::Target;
 
@@ -103,24 +105,85 @@ impl Default for WaveletStatisticsParameters {
     }
 }
 
-impl WaveletStatisticsParameters {
-    /// Refuses parameters that are invalid whatever the fit.
-    ///
-    /// # Errors
-    /// A number of rounds out of range.
-    pub fn check(&self) -> Result<(), ParameterError> {
+impl ResidualParameters for WaveletStatisticsParameters {
+    const NAME: &'static str = NAME;
+    type Source = Statistics;
+    type Kernel = WaveletTexture;
+
+    fn is_periodic(&self) -> bool {
+        self.periodic
+    }
+
+    fn check(&self) -> Result<(), ParameterError> {
         if (1..=ROUNDS_MAX).contains(&self.rounds) {
             return Ok(());
         }
         Err(ParameterError::new("rounds", format!("is {}; it must lie in [1, {ROUNDS_MAX}]", self.rounds)))
     }
 
+    fn cost_of(&self, tile: &Tile, site: &Site) -> Cost {
+        self.cost([tile.geometry.rows, tile.geometry.cols], site.reach, measure::OCTAVES_MAX as u32)
+    }
+
+    fn kernel(&self, tile: &Tile, statistics: &Arc<Statistics>) -> Result<WaveletTexture, ParameterError> {
+        let shape = [tile.geometry.rows, tile.geometry.cols];
+        let torus = self.checked_torus(statistics, shape)?;
+        Ok(WaveletTexture { statistics: statistics.clone(), shape, torus, parameters: self.clone() })
+    }
+}
+
+/// A texture by wavelet statistics, bound to its statistics.
+pub struct WaveletTexture {
+    statistics: Arc<Statistics>,
+    shape: [usize; 2],
+    torus: [usize; 2],
+    parameters: WaveletStatisticsParameters,
+}
+
+impl ResidualKernel for WaveletTexture {
+    fn cost(&self) -> Cost {
+        let reach = lags::reach(&self.statistics.covariance);
+        self.parameters.cost(self.shape, reach, self.statistics.wavelets.octaves)
+    }
+
+    fn notes(&self) -> Vec<String> {
+        let cells = (self.torus[0] * self.torus[1]) as u64;
+        let note = format!(
+            "the torus of {cells} cells is smaller than the site, {} cells with data, so rare heights and steps of the site are too frequent; \
+             make the texture larger",
+            self.statistics.cells
+        );
+        (cells < self.statistics.cells).then_some(note).into_iter().collect()
+    }
+
+    fn make(&self, streams: &Streams) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
+        Ok((field(&self.statistics, [self.shape, self.torus], self.parameters.rounds, streams), Vec::new()))
+    }
+}
+
+impl WaveletStatisticsParameters {
     /// Rows and columns of the torus of a texture of `shape`, for a covariance with lags up to `reach` cells.
     fn torus(&self, shape: [usize; 2], reach: [usize; 2]) -> [usize; 2] {
         [0, 1].map(|axis| match self.periodic {
             true => shape[axis],
             false => smooth_length((shape[axis] + reach[axis]).max(SIDE_MIN)),
         })
+    }
+
+    /// The torus, for statistics that were read from a file.
+    fn checked_torus(&self, statistics: &Statistics, shape: [usize; 2]) -> Result<[usize; 2], ParameterError> {
+        if !statistics.wavelets.differences.iter().any(|d| matches!(d.stencil[..], [(0, 0, _)])) {
+            let message = "has no distribution of heights; fit the DEM again with --statistics";
+            return Err(ParameterError::new("statistics.wavelets.differences", message));
+        }
+        let torus = self.torus(shape, lags::reach(&statistics.covariance));
+        let cells = torus[0] as f64 * torus[1] as f64;
+        if cells > CELLS_MAX as f64 {
+            let message =
+                format!("needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}: make the texture smaller");
+            return Err(ParameterError::new("size_px", message));
+        }
+        Ok(torus)
     }
 
     /// Cost of a texture of `shape` (rows, columns) with `octaves` and lags up to `reach` cells.
@@ -147,7 +210,7 @@ pub fn kind() -> Kind {
         kind: NAME,
         summary: "field with the measured distributions of increments, covariance, and joint magnitudes of wavelets",
         source: "Portilla and Simoncelli 2000; Heeger and Bergen 1995",
-        parameters: tile::schema::<WaveletStatisticsParameters>(),
+        parameters: tile::schema_of_site::<WaveletStatisticsParameters>(),
     }
 }
 
@@ -163,22 +226,18 @@ pub fn synthesise(
 ) -> Result<Vec<f64>, ParameterError> {
     statistics.check()?;
     parameters.check()?;
-    if !statistics.wavelets.differences.iter().any(|d| matches!(d.stencil[..], [(0, 0, _)])) {
-        let message = "has no distribution of heights; fit the DEM again with --statistics";
-        return Err(ParameterError::new("statistics.wavelets.differences", message));
-    }
-    let torus = parameters.torus(shape, lags::reach(&statistics.covariance));
-    let cells = torus[0] as f64 * torus[1] as f64;
-    if cells > CELLS_MAX as f64 {
-        let message = format!("needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}: make the texture smaller");
-        return Err(ParameterError::new("size_px", message));
-    }
-    let field = Rounds::new(statistics, torus).run(parameters.rounds, &streams.child("start"));
+    let torus = parameters.checked_torus(statistics, shape)?;
+    Ok(field(statistics, [shape, torus], parameters.rounds, streams))
+}
+
+/// The part of a field on a torus that a texture of `shape` shows.
+fn field(statistics: &Statistics, [shape, torus]: [[usize; 2]; 2], rounds: u32, streams: &Streams) -> Vec<f64> {
+    let field = Rounds::new(statistics, torus).run(rounds, &streams.child("start"));
     if shape == torus {
-        return Ok(field);
+        return field;
     }
     let [rows, cols] = shape;
-    Ok(field.chunks_exact(torus[1]).take(rows).flat_map(|line| &line[..cols]).copied().collect())
+    field.chunks_exact(torus[1]).take(rows).flat_map(|line| &line[..cols]).copied().collect()
 }
 
 /// The natural logarithm of the magnitude of a wavelet.
