@@ -384,7 +384,7 @@ pub struct TextureItem {
     #[serde(default = "default_method")]
     pub method: String,
     /// Several methods to compare, `"all"` or a list, instead of `method`: one texture `<id>-<method>` each, and the table
-    /// `scoreboard`.
+    /// `scoreboard`. `"all"` are the methods of a covariance; if the fit has `statistics = true`, also those that repeat a site.
     #[serde(default)]
     pub methods: Option<Methods>,
     /// Number of realisations per method for the scoreboard.
@@ -400,7 +400,7 @@ pub struct TextureItem {
     /// Local factor on the texture: the id of a raster of factors, or a table of factors by the slope of the base.
     #[serde(default)]
     pub modulate: Option<Modulate>,
-    /// Id of a DEM whose holes are filled with texture conditioned on their surroundings.
+    /// Id of a DEM whose holes are filled with texture conditioned on their surroundings; by `fft_ma` only.
     #[serde(default)]
     pub fill: Option<String>,
     /// Label for statistics.

@@ -18,7 +18,7 @@
 //! let parameters = [("sigma_m", 0.05), ("range_m", 0.2)].map(|(name, value)| (name.to_owned(), value)).into();
 //! let truth = FitFile { model: "exponential".to_owned(), parameters, ..FitFile::default() };
 //! let size = json!({ "size_m": [16.0, 16.0], "cell_m": 0.1, "phase": "gaussian", "periodic": false });
-//! let site = texture(&truth, "fft_ma", &size, 1)?.heights;
+//! let site = texture(&truth, None, "fft_ma", &size, 1)?.heights;
 //! let found = fit(&site, &json!({ "outer_scale_m": 1.0, "bootstrap": 0 }), 0)?;
 //! assert!((found.parameters["sigma_m"] / 0.05 - 1.0).abs() < 0.2);
 //!
@@ -34,6 +34,7 @@ use crate::jobs::{fit as fits, texture as textures};
 use crate::memory;
 use crate::operations::coregistration::{IN_DEGREES, check_systems, verdict};
 use crate::operations::inputs::Loaded;
+use crate::operations::textures::on_site_cells;
 use crate::verbs::fit::settings;
 use crate::verbs::parameters;
 use crate::verbs::roughness::{Described, RideRequest, Wanted};
@@ -43,9 +44,11 @@ use sastrugi_schemas::coregistration::Coregistration;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_store::dem::Crs;
 use sastrugi_terrain::Terrain;
+use sastrugi_texture::Measured;
 use sastrugi_texture::coregister::{self as registration, Coregistered};
 use serde_json::Value;
 use std::collections::BTreeMap;
+use std::sync::Arc;
 
 /// What is wrong with heights in degrees.
 const DEGREES: &str = "the DEM is in degrees; convert it to metres";
@@ -150,19 +153,32 @@ pub struct Textured {
     pub notes: Vec<String>,
 }
 
-/// Synthesises a texture with the covariance of a fit.
+/// Synthesises a texture that matches a fit; `exemplar` are the fitted heights, for methods that copy from their residual.
 ///
 /// # Errors
-/// Unknown methods and parameters, a fit that cannot be used, too little memory.
-pub fn texture(fit: &FitFile, method: &str, parameters: &Value, seed: u64) -> Result<Textured, Error> {
+/// Unknown methods and parameters, a fit or an exemplar that cannot be used, too little memory.
+pub fn texture(
+    fit: &FitFile,
+    exemplar: Option<&Raster>,
+    method: &str,
+    parameters: &Value,
+    seed: u64,
+) -> Result<Textured, Error> {
+    sastrugi_texture::check_keys(method, parameters)?;
     if let Some(known) = textures::kinds().iter().find(|k| k.kind == method) {
         parameters::check(parameters, known)?;
     }
-    let synthesis = sastrugi_texture::prepare(method, parameters, fit)?;
-    let notes = sastrugi_texture::fit_notes(fit).into_iter().chain(synthesis.notes()).collect();
+    let measured = match exemplar {
+        None => None,
+        Some(heights) => Some(Arc::new(Measured::of_fit(heights.metric(DEGREES)?, fit)?)),
+    };
+    let mut parameters = parameters.clone();
+    on_site_cells(method, &mut parameters, fit.cell_m);
+    let synthesis = sastrugi_texture::prepare_from(method, &parameters, fit, measured.as_ref())?;
     memory::check("the texture", synthesis.cost().memory_bytes)?;
     let streams = Streams::for_seed(seed, textures::STAGE);
     let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
+    let notes = sastrugi_texture::fit_notes(fit).into_iter().chain(synthesis.notes()).chain(outcome.notes).collect();
     let heights = Raster { grid: outcome.grid, crs: Crs::default() };
     Ok(Textured { heights, parameters: synthesis.parameters(), notes })
 }

@@ -1,6 +1,7 @@
 //! Builder of a study's graph: the items so far, and what later sections can refer to.
 
 use crate::job::ItemRef;
+use crate::jobs::fit::Site;
 use crate::operations::drawn::{Drawn, Routes};
 use crate::runner::graph::{Graph, InputFile, Node};
 use crate::study::entry::ITEMS_MAX;
@@ -155,6 +156,8 @@ pub struct Builder<'a> {
     pub fits: Vec<String>,
     /// What is known about the fits before the run, by id.
     pub prospects: BTreeMap<String, Prospect>,
+    /// The DEMs of the fits, by id of the fit.
+    pub sites: BTreeMap<String, Site>,
     /// Missions by id, with their heightfields.
     pub missions: BTreeMap<String, Drawn>,
     /// Routes by id; a swept id has several searches.
@@ -197,6 +200,7 @@ impl<'a> Builder<'a> {
             families: BTreeMap::new(),
             fits: Vec::new(),
             prospects: BTreeMap::new(),
+            sites: BTreeMap::new(),
             missions: BTreeMap::new(),
             routes: BTreeMap::new(),
             images: BTreeMap::new(),

@@ -26,7 +26,7 @@ use sastrugi_store::dem::{Crs, Dem};
 use sastrugi_store::{dem, digest};
 use sastrugi_texture::coregister::Coregistered;
 use sastrugi_texture::noise::Noise;
-use sastrugi_texture::{FitError, FitParameters, FitSettings, shown};
+use sastrugi_texture::{FitError, FitParameters, FitSettings, Measured, shown};
 use serde_json::{Value, json};
 
 /// Name of the stage.
@@ -48,8 +48,9 @@ pub fn kinds() -> Vec<Kind> {
     sastrugi_texture::kinds().into_iter().filter(|k| k.family == STAGE).collect()
 }
 
-struct FitJob {
-    id: String,
+/// The DEM of a fit, and everything else that its residual depends on.
+#[derive(Clone)]
+pub struct Site {
     dem_id: String,
     dem: ItemRef,
     masks: Vec<Mask>,
@@ -57,9 +58,73 @@ struct FitJob {
     noise_reference: Option<Mask>,
     minus: Option<Subtrahend>,
     settings: FitSettings,
-    streams: Streams,
     cells: u64,
     cell_m: Option<f64>,
+}
+
+/// The DEM of a fit as it is fitted.
+struct Fitted {
+    dem: Dem,
+    settings: FitSettings,
+    source: Source,
+    notes: Vec<String>,
+}
+
+impl Site {
+    /// The items that it is read from, the DEM first.
+    pub fn parents(&self) -> Vec<ItemRef> {
+        let others = self.masks.iter().chain(&self.noise_reference).map(|m| &m.item);
+        [&self.dem].into_iter().chain(others).chain(self.minus.iter().map(|m| &m.dem)).cloned().collect()
+    }
+
+    /// Reads the DEM: masked, and minus another if there is one.
+    fn read(&self, work: &Work<'_>) -> Result<Fitted, JobError> {
+        let mut dem = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(input_error)?;
+        let mut settings = self.settings.clone();
+        let mut notes = Vec::new();
+        let mut source = self.source.clone();
+        if let Some(reference) = &self.noise_reference {
+            let noise = mask::noise_of_item(&dem.grid, &self.dem, reference, work)?;
+            settings = settings.with_noise(&noise.noise).map_err(JobError::input)?;
+            notes.push(masks::noise_note(&noise));
+            let MaskSource { file, sha256, .. } = &reference.source;
+            source.noise_reference = Some(noise_reference(file, sha256, &noise));
+        }
+        source.masked_share = mask::of_item(&mut dem.grid, &self.dem, &self.masks, work)?;
+        notes.extend(source.masked_share.map(masks::share_note));
+        if let Some(subtrahend) = &self.minus {
+            let (difference, minus) = subtrahend.subtract(&self.dem, &dem, work)?;
+            dem.grid = difference;
+            notes.push(coregistration::sentence(&minus));
+            source.minus = Some(minus);
+        }
+        Ok(Fitted { dem, settings, source, notes })
+    }
+
+    /// The residual as the fit computes it, before trimming.
+    ///
+    /// # Errors
+    /// A DEM, mask or difference that cannot be read.
+    pub fn residual(&self, work: &Work<'_>) -> Result<Measured, JobError> {
+        let Fitted { dem, settings, .. } = self.read(work)?;
+        Ok(Measured { residual: sastrugi_texture::residual(&dem.grid, &settings).map_err(JobError::new)? })
+    }
+
+    /// Most bytes that [`Self::residual`] needs: heights and residual, and the passes over them.
+    pub fn memory_bytes(&self) -> u64 {
+        16 * self.cells + self.settings.memory_bytes(self.cells, self.cell_m, 0)
+    }
+
+    /// Number of cells.
+    pub fn cells(&self) -> u64 {
+        self.cells
+    }
+}
+
+struct FitJob {
+    id: String,
+    site: Site,
+    streams: Streams,
     /// Shape and position of the DEM, if known before the run.
     place: Option<Geometry>,
     /// Whether it was measured, and so may have holes.
@@ -134,8 +199,6 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
     let mask_sources = masks.iter().map(|m| m.source.clone()).collect();
     let source = Source { masks: mask_sources, ..builder.source_of(&item.dem, &field) };
     let minus = item.minus.as_ref().map(|id| Subtrahend::of(builder, entry, id)).transpose()?;
-    let others = masks.iter().chain(&noise_reference).map(|m| &m.item).chain(minus.iter().map(|m| &m.dem));
-    let parents: Vec<ItemRef> = [&field.item].into_iter().chain(others).cloned().collect();
     for one in expanded {
         let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
         let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
@@ -145,9 +208,10 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
                 .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
                 .map_err(|e| entry.refuse(e))?;
         }
-        builder.prospects.insert(one.id.clone(), settings.prospect(field.expected.map(|place| place.cell)));
-        let job = FitJob {
-            id: one.id.clone(),
+        builder
+            .prospects
+            .insert(one.id.clone(), settings.prospect(field.expected.map(|place| place.cell), field.cells));
+        let site = Site {
             dem_id: item.dem.clone(),
             dem: field.item.clone(),
             masks: masks.clone(),
@@ -155,15 +219,21 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
             noise_reference: noise_reference.clone(),
             minus: minus.clone(),
             settings,
-            streams: builder.streams(STAGE, &one.id, item.seed, 0),
             cells: field.cells,
             cell_m: field.cell_m,
+        };
+        builder.sites.insert(one.id.clone(), site.clone());
+        let parents = site.parents();
+        let job = FitJob {
+            id: one.id.clone(),
+            site,
+            streams: builder.streams(STAGE, &one.id, item.seed, 0),
             place: field.expected,
             is_measured: field.item.stage == measured::STAGE,
         };
         let node = Node {
             item: ItemRef::new(STAGE, &one.id),
-            parents: parents.clone(),
+            parents,
             inputs: Vec::new(),
             stream: Some(job.streams.label()),
             job: Box::new(job),
@@ -176,14 +246,15 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
 
 impl Job for FitJob {
     fn recipe(&self) -> Value {
-        let minus = self.minus.as_ref().map(|m| json!({ "dem": m.id, "source": m.source }));
-        let noise_reference = self.noise_reference.as_ref().map(|n| &n.source);
+        let site = &self.site;
+        let minus = site.minus.as_ref().map(|m| json!({ "dem": m.id, "source": m.source }));
+        let noise_reference = site.noise_reference.as_ref().map(|n| &n.source);
         json!({
-            "dem": self.dem_id,
-            "source": self.source,
+            "dem": site.dem_id,
+            "source": site.source,
             "noise_reference": noise_reference,
             "minus": minus,
-            "fit": self.settings.parameters(),
+            "fit": site.settings.parameters(),
         })
     }
 
@@ -193,35 +264,19 @@ impl Job for FitJob {
 
     fn memory_bytes(&self) -> u64 {
         // After the fit: background, residual, mask and the statistics of the residual take 81 bytes per cell.
-        let fit = self.settings.memory_bytes(self.cells, self.cell_m, rayon::current_num_threads() as u64);
-        8 * self.cells + fit.max((256 << 20) + 81 * self.cells)
+        let Site { settings, cells, cell_m, .. } = &self.site;
+        let fit = settings.memory_bytes(*cells, *cell_m, rayon::current_num_threads() as u64);
+        8 * cells + fit.max((256 << 20) + 81 * cells)
     }
 
     fn estimate(&self) -> Estimate {
-        let fit = self.settings.seconds(self.cells, self.place.as_ref(), self.is_measured);
-        Estimate { seconds: fit + SECONDS_PER_DESCRIBED_CELL * self.cells as f64, bytes: 1e6 }
+        let Site { settings, cells, .. } = &self.site;
+        let fit = settings.seconds(*cells, self.place.as_ref(), self.is_measured);
+        Estimate { seconds: fit + SECONDS_PER_DESCRIBED_CELL * *cells as f64, bytes: 1e6 }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
-        let mut read = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(input_error)?;
-        let mut settings = self.settings.clone();
-        let mut notes = Vec::new();
-        let mut source = self.source.clone();
-        if let Some(reference) = &self.noise_reference {
-            let noise = mask::noise_of_item(&read.grid, &self.dem, reference, work)?;
-            settings = settings.with_noise(&noise.noise).map_err(JobError::input)?;
-            notes.push(masks::noise_note(&noise));
-            let MaskSource { file, sha256, .. } = &reference.source;
-            source.noise_reference = Some(noise_reference(file, sha256, &noise));
-        }
-        source.masked_share = mask::of_item(&mut read.grid, &self.dem, &self.masks, work)?;
-        notes.extend(source.masked_share.map(masks::share_note));
-        if let Some(subtrahend) = &self.minus {
-            let (difference, minus) = subtrahend.subtract(&self.dem, &read, work)?;
-            read.grid = difference;
-            notes.push(coregistration::sentence(&minus));
-            source.minus = Some(minus);
-        }
+        let Fitted { dem: read, settings, source, mut notes } = self.site.read(work)?;
         // The co-registration is a result even if the fit fails, so the error reports it.
         let failed = |e: FitError| match &source.minus {
             Some(minus) => JobError::new(format!("{e}; {}", coregistration::sentence(minus))),
@@ -248,7 +303,7 @@ impl Job for FitJob {
         products.push(Product::released(MASK, format!("fit/{id}.{MASK}"), Some(digest::classes(&mask))));
         let surface = Surface { id, stage: STAGE, fit_id: Some(id), grid: &residual };
         let mut outcome = Outcome { products, notes };
-        outcome.write_rows(work, [fit_row(id, &self.dem_id, &fit)])?;
+        outcome.write_rows(work, [fit_row(id, &self.site.dem_id, &fit)])?;
         outcome.write_rows(work, covariance_rows(id, &fit, &band))?;
         outcome.write_rows(work, candidate_rows(id, &fit))?;
         outcome.write_rows(work, curve_rows(id, &fit))?;

@@ -57,7 +57,7 @@ impl Matched {
     pub fn cost(&self, method: &dyn Method, prospects: &BTreeMap<String, Prospect>) -> Result<Cost, ParameterError> {
         match self {
             Self::Item(fit) => Ok(prospects.get(&fit.id).map_or_else(|| method.cost(), |fit| method.cost_of(fit))),
-            Self::Stated(fit) => Ok(method.bind(fit)?.cost()),
+            Self::Stated(fit) => Ok(method.bind(fit, None)?.cost()),
         }
     }
 }

@@ -1,13 +1,16 @@
 //! Stage `scoreboard`: compares all synthesis methods of a texture.
 
+use super::fit::Site;
 use super::matched::{Matched, seconds_per_operation};
 use crate::job::{Estimate, Job, JobError, Outcome, Work};
 use crate::revision::Room;
 use sastrugi_numeric::Streams;
+use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{ScoreCovarianceRow, ScoreRow};
-use sastrugi_texture::Cost;
 use sastrugi_texture::synth::scoreboard::{Score, score};
+use sastrugi_texture::{Cost, Measured};
 use serde_json::{Value, json};
+use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "scoreboard";
@@ -32,20 +35,26 @@ pub struct ScoreboardJob {
     pub entrants: Vec<Entrant>,
     /// Realisations of each method.
     pub realisations: u32,
+    /// The DEM of the fit, if a method copies from its residual.
+    pub exemplar: Option<Site>,
     /// Random streams.
     pub streams: Streams,
 }
 
 impl ScoreboardJob {
-    fn rows(&self, entrant: &Entrant, work: &Work<'_>) -> Result<(ScoreRow, Vec<ScoreCovarianceRow>), JobError> {
-        let fit = self.matched.read(work)?;
-        let scored = sastrugi_texture::prepare(&entrant.method, &entrant.parameters, &fit)
+    fn rows(
+        &self,
+        entrant: &Entrant,
+        fit: &FitFile,
+        measured: Option<&Arc<Measured>>,
+    ) -> (ScoreRow, Vec<ScoreCovarianceRow>) {
+        let scored = sastrugi_texture::prepare_from(&entrant.method, &entrant.parameters, fit, measured)
             .map_err(|e| e.to_string())
             .and_then(|s| score(s.as_ref(), &self.streams, self.realisations).map_err(|e| e.to_string()));
-        Ok(match scored {
+        match scored {
             Ok(score) => (self.row(entrant, &score), self.curve(entrant, &score)),
             Err(reason) => (self.refusal(entrant, reason), Vec::new()),
-        })
+        }
     }
 
     fn row(&self, entrant: &Entrant, score: &Score) -> ScoreRow {
@@ -111,7 +120,8 @@ impl Job for ScoreboardJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.entrants.iter().filter_map(|e| e.cost).map(|cost| cost.memory_bytes).max().unwrap_or(0)
+        let methods = self.entrants.iter().filter_map(|e| e.cost).map(|cost| cost.memory_bytes).max().unwrap_or(0);
+        self.exemplar.as_ref().map_or(methods, |site| methods + site.memory_bytes())
     }
 
     fn estimate(&self) -> Estimate {
@@ -124,8 +134,10 @@ impl Job for ScoreboardJob {
         let (mut scores, mut curves) = (Vec::new(), Vec::new());
         let mut entrants: Vec<&Entrant> = self.entrants.iter().collect();
         entrants.sort_by(|a, b| a.method.cmp(&b.method));
+        let fit = self.matched.read(work)?;
+        let measured = self.exemplar.as_ref().map(|site| site.residual(work)).transpose()?.map(Arc::new);
         for entrant in entrants {
-            let (row, curve) = self.rows(entrant, work)?;
+            let (row, curve) = self.rows(entrant, &fit, measured.as_ref());
             scores.push(row);
             curves.extend(curve);
         }

@@ -1,7 +1,7 @@
 //! Stage `texture`: synthesises a texture that matches a fit, alone or on a base surface.
 
 use super::dem as dem_job;
-use super::fit;
+use super::fit::{self, Site};
 use super::matched::{Matched, seconds_per_operation};
 use super::rasters::{SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
@@ -9,7 +9,7 @@ use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
-use crate::operations::textures::{fill_note, has_its_texture, lay_onto, scaled};
+use crate::operations::textures::{fill_note, has_its_texture, lay_onto, on_site_cells, scaled};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::{Entry, Expanded, StudyError};
@@ -21,7 +21,7 @@ use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
 use sastrugi_texture::synth::{conditional, fft_ma};
-use sastrugi_texture::{Cost, Method, SlopeFactors, TextureOutcome};
+use sastrugi_texture::{Cost, Method, Needs, Prospect, SlopeFactors, TextureOutcome, needs};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -33,6 +33,9 @@ const REALISATIONS_MAX: u32 = 1000;
 
 /// Approximate time to detrend, trim and describe one cell of a texture, s.
 const SECONDS_PER_DESCRIBED_CELL: f64 = 6e-7;
+
+/// Approximate time to compute the residual of one cell of a site, s.
+const SECONDS_PER_DETRENDED_CELL: f64 = 1e-6;
 
 /// Synthesis methods.
 pub fn kinds() -> Vec<Kind> {
@@ -107,6 +110,8 @@ struct TextureJob {
     modulation: Option<Modulation>,
     /// The DEM whose holes are filled.
     fill: Option<ItemRef>,
+    /// The DEM of the fit, if the method copies from its residual.
+    exemplar: Option<Site>,
     method: String,
     synthesis: Box<dyn Method>,
     cost: Cost,
@@ -129,9 +134,15 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let kinds = kinds();
     let (item, params): (TextureItem, Value) = entry.read()?;
-    let methods = methods(entry, &item, &kinds)?;
-    entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
     let matched = matched(builder, entry, &item)?;
+    let prospect = matched.parent().and_then(|fit| builder.prospects.get(&fit.id)).copied();
+    let methods = methods(entry, &item, &kinds, prospect.is_some_and(|fit| fit.has_statistics))?;
+    if item.methods.is_none() {
+        sastrugi_texture::check_keys(&item.method, &params).map_err(|e| entry.refuse(e))?;
+    }
+    entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
+    let site = matched.parent().and_then(|fit| builder.sites.get(&fit.id)).cloned();
+    let exemplar_of = |method: &str| site.clone().filter(|_| needs(method) == Some(Needs::Residual));
     check_purpose(entry, &item, &params)?;
     let base = item.onto.as_ref().map(|onto| Base::of(builder, entry, onto, &matched)).transpose()?;
     let fill = item.fill.as_deref().map(|id| builder.surface(entry, "fill", id).cloned()).transpose()?;
@@ -144,12 +155,15 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         let mut entrants = Vec::new();
         let mut refusal = None;
         for method in &methods {
-            let own =
+            let mut own =
                 if side_by_side { own_parameters(&one.params, &kinds, method) } else { Value::clone(&one.params) };
+            on_site_cells(method, &mut own, prospect.and_then(|fit| fit.cell_m));
             let checked = sastrugi_texture::method(method, &own).and_then(|synthesis| {
                 // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
                 if !side_by_side && fill.is_none() {
-                    check_before_run(builder, &matched, base.as_ref(), synthesis.as_ref())?;
+                    check_before_run(prospect.as_ref(), base.as_ref(), synthesis.as_ref())?;
+                } else if let Some(fit) = prospect.filter(|_| needs(method) != Some(Needs::Covariance)) {
+                    synthesis.check_prospect(&fit)?;
                 }
                 Ok((matched.cost(synthesis.as_ref(), &builder.prospects)?, synthesis))
             });
@@ -196,8 +210,10 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 Some(Modulation::Raster(raster)) => Some(raster.clone()),
                 _ => None,
             };
+            let exemplar = exemplar_of(method);
             let others = [matched.parent(), fill.clone(), raster].into_iter().flatten();
-            let parents: BTreeSet<ItemRef> = others.chain(base.iter().flat_map(Base::parents)).collect();
+            let of_site = exemplar.iter().flat_map(Site::parents);
+            let parents: BTreeSet<ItemRef> = others.chain(of_site).chain(base.iter().flat_map(Base::parents)).collect();
             let parents = parents.into_iter().collect();
             let (method, matched, modulation) = (method.clone(), matched.clone(), modulation.clone());
             let job = TextureJob {
@@ -207,6 +223,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 amplitude: item.amplitude,
                 modulation,
                 fill,
+                exemplar,
                 method,
                 synthesis,
                 cost,
@@ -229,8 +246,11 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             let stream = Some(streams.label());
             let realisations = item.realisations;
             let matched = matched.clone();
-            let parents = matched.parent().into_iter().collect();
-            let job = ScoreboardJob { id: one.id.clone(), matched, entrants, realisations, streams };
+            let exemplar = entrants.iter().filter(|e| e.cost.is_some()).find_map(|e| exemplar_of(&e.method));
+            let parents: BTreeSet<ItemRef> =
+                matched.parent().into_iter().chain(exemplar.iter().flat_map(Site::parents)).collect();
+            let parents = parents.into_iter().collect();
+            let job = ScoreboardJob { id: one.id.clone(), matched, entrants, realisations, exemplar, streams };
             let item = ItemRef::new(scoreboard::STAGE, &one.id);
             builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
         }
@@ -239,17 +259,13 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     Ok(())
 }
 
-/// Refuses, before the fit is computed, cells of the texture that are known not to match those of a measured covariance or of the base.
+/// Refuses, before the fit is computed, a texture that is known not to match the fit, and cells that do not match those of the base.
 fn check_before_run(
-    builder: &Builder<'_>,
-    matched: &Matched,
+    prospect: Option<&Prospect>,
     base: Option<&Base>,
     synthesis: &dyn Method,
 ) -> Result<(), ParameterError> {
-    let prospect = matched.parent().and_then(|fit| builder.prospects.get(&fit.id));
-    if let Some(measured_m) = prospect.filter(|fit| fit.is_measured).and_then(|fit| fit.cell_m) {
-        synthesis.check_measured(measured_m)?;
-    }
+    prospect.map_or(Ok(()), |fit| synthesis.check_prospect(fit))?;
     match base.and_then(|base| base.expected) {
         Some(place) => sastrugi_texture::check_cells(place.cell, synthesis.geometry().cell)
             .map_err(|error| ParameterError::new("cell_m", format!("does not match `onto`: {error}"))),
@@ -304,11 +320,19 @@ fn modulation(builder: &Builder<'_>, entry: &Entry<'_>, item: &TextureItem) -> R
 }
 
 /// The methods of an item.
-fn methods(entry: &Entry<'_>, item: &TextureItem, kinds: &[Kind]) -> Result<Vec<String>, StudyError> {
+///
+/// `all` are those that reproduce a covariance; with the statistics of the residual, also those that repeat it.
+fn methods(
+    entry: &Entry<'_>,
+    item: &TextureItem,
+    kinds: &[Kind],
+    has_statistics: bool,
+) -> Result<Vec<String>, StudyError> {
     let known: Vec<String> = kinds.iter().map(|k| k.kind.to_owned()).collect();
+    let all = || known.iter().filter(|name| has_statistics || needs(name) == Some(Needs::Covariance)).cloned();
     let (key, wanted) = match &item.methods {
         None => ("method", vec![item.method.clone()]),
-        Some(Methods::Word(word)) if word == "all" => ("methods", known.clone()),
+        Some(Methods::Word(word)) if word == "all" => ("methods", all().collect()),
         Some(Methods::Word(word)) => ("methods", vec![word.clone()]),
         Some(Methods::List(list)) => ("methods", list.clone()),
     };
@@ -418,7 +442,8 @@ impl Job for TextureJob {
 
     fn memory_bytes(&self) -> u64 {
         // The texture, the statistics of its residual (detrended like the fit's), and a base or a DEM to fill.
-        self.cost.memory_bytes.max((64 << 20) + 110 * self.cells)
+        let texture = self.cost.memory_bytes.max((64 << 20) + 110 * self.cells);
+        self.exemplar.as_ref().map_or(texture, |site| texture + site.memory_bytes())
     }
 
     fn estimate(&self) -> Estimate {
@@ -429,7 +454,8 @@ impl Job for TextureJob {
         let seconds = 0.02
             + seconds_per_operation(&self.method) * self.cost.operations
             + SECONDS_PER_WRITTEN_CELL * self.cells as f64
-            + described * cells;
+            + described * cells
+            + self.exemplar.as_ref().map_or(0.0, |site| SECONDS_PER_DETRENDED_CELL * site.cells() as f64);
         Estimate { seconds, bytes: 3.5 * self.cells as f64 }
     }
 
@@ -438,18 +464,19 @@ impl Job for TextureJob {
         if let Some(dem) = &self.fill {
             return self.filled(work, dem, &fit);
         }
-        let synthesis = self.synthesis.bind(&fit).map_err(JobError::new)?;
-        let TextureOutcome { grid, covariance_error_max_m2, clip_share } =
+        let measured = self.exemplar.as_ref().map(|site| site.residual(work)).transpose()?.map(Arc::new);
+        let synthesis = self.synthesis.bind(&fit, measured.as_ref()).map_err(JobError::new)?;
+        let TextureOutcome { grid, covariance_error_max_m2, clip_share, notes: on_this } =
             synthesis.generate(&self.streams).map_err(JobError::new)?;
         let mut notes = sastrugi_texture::fit_notes(&fit);
-        notes.extend(synthesis.notes());
+        notes.extend(synthesis.notes().into_iter().chain(on_this));
         if self.one_of_many && synthesis.parameters()["phase"] == "unit" {
             notes.push(
                 "one of several textures with unit phases, which vary too little between realisations: use phase = \"gaussian\" for a realistic spread"
                     .to_owned(),
             );
         }
-        if clip_share > 0.0 {
+        if clip_share > 0.0 && covariance_error_max_m2.is_finite() {
             notes.push(format!(
                 "{clip_share:.1e} of the spectrum was negative and set to 0; the error of the covariance is at most {covariance_error_max_m2:.1e} m2"
             ));

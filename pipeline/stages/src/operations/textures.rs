@@ -3,10 +3,19 @@
 use crate::job::JobError;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
+use sastrugi_texture::Needs;
+use serde_json::{Value, json};
 
 /// A texture with its heights multiplied by a factor.
 pub fn scaled(texture: Grid, factor: f64) -> Grid {
     if factor == 1.0 { texture } else { texture.map(|height| factor * height) }
+}
+
+/// Sets the cells of a texture that repeats a site to those of the site, unless they are given.
+pub fn on_site_cells(method: &str, parameters: &mut Value, cell_m: Option<[f64; 2]>) {
+    let repeats = sastrugi_texture::needs(method).is_some_and(|needs| needs != Needs::Covariance);
+    let (Some([x, y]), true, true) = (cell_m, repeats, parameters["cell_m"].is_null()) else { return };
+    parameters["cell_m"] = if x == y { json!(x) } else { json!([x, y]) };
 }
 
 /// A note on holes filled with an empirical fit.

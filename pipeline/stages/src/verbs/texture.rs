@@ -5,18 +5,20 @@ use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds};
 use crate::memory;
 use crate::operations::fits::of_json;
-use crate::operations::textures::{fill_note, has_its_texture, lay_onto, scaled};
+use crate::operations::textures::{fill_note, has_its_texture, lay_onto, on_site_cells, scaled};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::ParameterError;
-use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_store::dem::points::GridSettings;
 use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
 use sastrugi_texture::synth::{conditional, fft_ma};
+use sastrugi_texture::{Measured, Needs, needs};
 use serde_json::{Value, json};
-use std::path::Path;
+use std::path::{Path, PathBuf};
+use std::sync::Arc;
 
 /// What to synthesise.
 pub struct Request<'a> {
@@ -28,6 +30,8 @@ pub struct Request<'a> {
     pub parameters: Value,
     /// Seed of the random streams.
     pub seed: u64,
+    /// The DEM of the fit, for methods that copy from its residual.
+    pub exemplar: Option<Exemplar<'a>>,
     /// DEM to add the texture to.
     pub onto: Option<&'a Path>,
     /// Factor on the heights of the texture.
@@ -38,6 +42,14 @@ pub struct Request<'a> {
     pub output: &'a Path,
     /// How to write.
     pub options: WriteOptions,
+}
+
+/// The DEM of a fit.
+pub struct Exemplar<'a> {
+    /// Its file.
+    pub dem: &'a Path,
+    /// Masks of the fit; `true` for those that exclude cells.
+    pub masks: Vec<(PathBuf, bool)>,
 }
 
 /// Factor on a texture.
@@ -65,8 +77,9 @@ fn is_fitted_dem(path: &Path, fit: &FitFile) -> bool {
 /// background of a fit.
 ///
 /// # Errors
-/// Unknown methods and parameters, an unusable fit file or base, too little memory, a file that cannot be written.
+/// Unknown methods and parameters, an unusable fit file, exemplar or base, too little memory, a file that cannot be written.
 pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
+    sastrugi_texture::check_keys(request.method, &request.parameters)?;
     if let Some(known) = kinds().iter().find(|k| k.kind == request.method) {
         parameters::check(&request.parameters, known)?;
     }
@@ -89,11 +102,26 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     if chosen {
         parameters["covariance"] = json!(fft_ma::CovarianceOf::Residual);
     }
-    let synthesis = sastrugi_texture::prepare(request.method, &parameters, &fit)?;
+    on_site_cells(request.method, &mut parameters, fit.cell_m);
+    let copies = needs(request.method) == Some(Needs::Residual);
+    if let Some(exemplar) = request.exemplar.as_ref().filter(|_| !copies) {
+        let message = format!(
+            "{}: `{}` does not copy from a DEM; omit `--exemplar`, or choose `quilting` or `exemplar`",
+            exemplar.dem.display(),
+            request.method
+        );
+        return Err(Error::Usage(message));
+    }
     super::check_output(request.output)?;
+    let (measured, read_notes) = match &request.exemplar {
+        None => (None, Vec::new()),
+        Some(exemplar) => measured(exemplar, &fit)?,
+    };
+    let synthesis = sastrugi_texture::prepare_from(request.method, &parameters, &fit, measured.as_ref())?;
     memory::check("the texture", synthesis.cost().memory_bytes)?;
     let streams = Streams::for_seed(request.seed, STAGE);
     let mut notes = sastrugi_texture::fit_notes(&fit);
+    notes.extend(read_notes);
     notes.extend(synthesis.notes());
     notes.extend((factor != 1.0).then(|| format!("heights scaled by {factor}")));
     notes.extend(chosen.then(|| RESIDUAL_CHOSEN.to_owned()));
@@ -101,6 +129,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         notes.push(format!("{}: {}", path.display(), has_its_texture("`fit --background DEM` writes it")));
     }
     let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
+    notes.extend(outcome.notes);
     let texture = scaled(outcome.grid, factor);
     let (heights, crs) = match request.onto {
         None => (texture, Crs::default()),
@@ -138,6 +167,48 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         "warnings": warnings,
         "notes": notes,
     }))
+}
+
+/// The residual of the DEM of a fit, read as the fit read it, and notes on the reading.
+fn measured(exemplar: &Exemplar<'_>, fit: &FitFile) -> Result<(Option<Arc<Measured>>, Vec<String>), Error> {
+    let name = exemplar.dem.display();
+    let source = fit.source.clone().unwrap_or_default();
+    if let Some(minus) = &source.minus {
+        let message = format!(
+            "{name}: the fit is of the difference to {}; write that with `fit --minus --difference`, and fit it",
+            minus.file
+        );
+        return Err(Error::Input(message));
+    }
+    if !source.sha256.is_empty() && !is_fitted_dem(exemplar.dem, fit) {
+        return Err(Error::Input(format!(
+            "{name} is not the DEM of the fit, {} with SHA-256 {}; give that file, or fit this one",
+            source.file, source.sha256
+        )));
+    }
+    check_masks(exemplar, &source)?;
+    let reading =
+        Reading { window: source.window, cell_m: fit.cell_m, masks: exemplar.masks.clone(), ..Reading::default() };
+    let Read { dem, notes, .. } = read(exemplar.dem, &reading)?;
+    Ok((Some(Arc::new(Measured::of_fit(&dem.grid, fit)?)), notes))
+}
+
+/// Refuses masks that are not those of the fit, in its order.
+fn check_masks(exemplar: &Exemplar<'_>, source: &Source) -> Result<(), Error> {
+    let given = exemplar.masks.iter().map(|(path, excludes)| {
+        let (_, sha256) = digest::of_file(path).map_err(|e| Error::unreadable(path, &e))?;
+        Ok((sha256, *excludes))
+    });
+    let given = given.collect::<Result<Vec<_>, Error>>()?;
+    let fitted: Vec<(String, bool)> = source.masks.iter().map(|m| (m.sha256.clone(), m.excludes)).collect();
+    if given == fitted {
+        return Ok(());
+    }
+    let option = |excludes: bool| if excludes { "--exclude" } else { "--mask" };
+    let wanted: Vec<String> = source.masks.iter().map(|m| format!("`{} {}`", option(m.excludes), m.file)).collect();
+    let wanted = if wanted.is_empty() { "none".to_owned() } else { wanted.join(", ") };
+    let message = format!("{}: the masks are not those of the fit: {wanted}", exemplar.dem.display());
+    Err(Error::Usage(message))
 }
 
 /// Fills the holes of a DEM and writes it.
