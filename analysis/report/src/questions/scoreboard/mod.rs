@@ -73,19 +73,30 @@ fn figure(texture: &str, score: &ScoreRow, curve: &[&ScoreCovarianceRow], x: Axi
     let wanted = Stroke { paint: Paint::Ink, width: 4.5, dash: "", opacity: 0.3 };
     let achieved = Stroke::new(Paint::Series(1), 2.0);
     let measured = Stroke::new(Paint::Series(0), 1.8).dashed("4 3");
-    let legend = [
-        (Mark::Line(wanted), "target".to_owned()),
-        (Mark::Line(achieved), "expected".to_owned()),
-        (Mark::Line(measured), format!("mean, n = {}", score.realisations)),
-    ];
+    // A method that repeats a site does not know its mean covariance beforehand.
+    let expected = score.covariance_error_max.is_finite();
+    let legend: Vec<(Mark, String)> = [
+        Some((Mark::Line(wanted), "target".to_owned())),
+        expected.then(|| (Mark::Line(achieved), "expected".to_owned())),
+        Some((Mark::Line(measured), format!("mean, n = {}", score.realisations))),
+    ]
+    .into_iter()
+    .flatten()
+    .collect();
+    let error = |factor: f64, unit: &str| match expected {
+        true => format!("largest error {}{unit}", set::significant(factor * score.covariance_error_max, 2)),
+        false => "mean covariance not known beforehand".to_owned(),
+    };
     let mut plot = Plot::new((WIDTH, HEIGHT + 20.0), (x, "lag, m"), (y, "covariance, m²"), &legend);
     plot.line([(0.0, 0.0), (x.range().1, 0.0)], Stroke::new(Paint::Muted, 1.0));
     plot.clip(&format!("{id}-clip"));
     plot.line(curve.iter().map(|r| (r.lag_m, r.wanted_m2)), wanted);
-    plot.line(curve.iter().map(|r| (r.lag_m, r.achieved_m2)), achieved);
+    if expected {
+        plot.line(curve.iter().map(|r| (r.lag_m, r.achieved_m2)), achieved);
+    }
     plot.line(curve.iter().map(|r| (r.lag_m, r.measured_m2)), measured);
     plot.svg.close();
-    plot.note(0, &format!("largest error {} %", set::significant(100.0 * score.covariance_error_max, 2)));
+    plot.note(0, &error(100.0, " %"));
     let names = ["bin", "lag_m", "wanted_m2", "achieved_m2", "measured_m2"];
     let query = format!("texture_id = {} and method = {}", quoted(texture), quoted(&score.method));
     Figure {
@@ -93,11 +104,7 @@ fn figure(texture: &str, score: &ScoreRow, curve: &[&ScoreCovarianceRow], x: Axi
         title: format!("{}.", score.method),
         caption: "Covariance along rows: the target, the expectation of the method, and the mean over n realisations."
             .into(),
-        description: format!(
-            "Covariance of method {} against lag; its largest error is {} of the variance.",
-            score.method,
-            set::significant(score.covariance_error_max, 2)
-        ),
+        description: format!("Covariance of method {} against lag; {}.", score.method, error(1.0, " of the variance")),
         svg: plot.svg,
         numbers: Numbers::select(&query, curve.iter().copied(), &names),
     }
