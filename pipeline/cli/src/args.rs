@@ -85,6 +85,7 @@ pub enum Verb {
         sastrugi fit snow.tif --outer-scale 2 --model auto --bootstrap 199 --plot fit.svg -o fit.json\n  \
         sastrugi fit snow.tif --outer-scale 2 --mask plot.geojson --exclude trees.geojson -o fit.json\n  \
         sastrugi fit scan.laz --cell 0.05 --statistic median --outer-scale 2 -o fit.json\n  \
+        sastrugi fit gravel.tif --outer-scale 0.5 --statistics -o fit.json\n  \
         sastrugi fit march.tif april.tif may.tif --outer-scale 2 --table season.csv\n  \
         sastrugi fit snow_on.tif --minus snow_off.tif --outer-scale 2 --difference depth.tif -o depth.json")]
     Fit(Box<Fit>),
@@ -103,6 +104,8 @@ pub enum Verb {
         after_help = "Examples:\n  sastrugi texture fit.json --size 20x20 --cell 0.1 --seed 1 -o texture.tif\n  \
         sastrugi texture fit.json --size 10x10 --cell 0.05 --onto terrain.tif \\\n    \
         --covariance surface -o textured.tif\n  \
+        sastrugi texture fit.json --method wavelet_statistics --size 20x20 -o texture.tif\n  \
+        sastrugi texture fit.json --method quilting --exemplar snow.tif --size 20x20 -o texture.tif\n  \
         sastrugi texture fit.json --fill snow.tif -o without-holes.tif"
     )]
     Texture(Texture),
@@ -448,9 +451,14 @@ pub struct Masks {
 impl Masks {
     /// Every file, with `true` for those that exclude.
     pub fn all(&self) -> Vec<(PathBuf, bool)> {
-        let of = |files: &[PathBuf], excludes: bool| files.iter().map(|f| (f.clone(), excludes)).collect::<Vec<_>>();
-        [of(&self.mask, false), of(&self.exclude, true)].concat()
+        marked(&self.mask, &self.exclude)
     }
+}
+
+/// Mask files, with `true` for those that exclude.
+fn marked(mask: &[PathBuf], exclude: &[PathBuf]) -> Vec<(PathBuf, bool)> {
+    let of = |files: &[PathBuf], excludes: bool| files.iter().map(|f| (f.clone(), excludes)).collect::<Vec<_>>();
+    [of(mask, false), of(exclude, true)].concat()
 }
 
 /// `fit`.
@@ -482,6 +490,9 @@ pub struct Fit {
     /// Number of bootstrap replicates for the confidence intervals (99); 0 for no intervals.
     #[arg(long, value_name = "N")]
     pub bootstrap: Option<u32>,
+    /// Store the statistics of the residual, from which `texture --method modulated` and `wavelet_statistics` work without the DEM.
+    #[arg(long)]
+    pub statistics: bool,
     /// Standard deviation of the DEM's white noise, m.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub noise_sigma: Option<f64>,
@@ -573,6 +584,24 @@ pub struct Coregister {
     pub writing: Writing,
 }
 
+/// Masks with which the DEM of a fit was fitted.
+#[derive(Debug, Args)]
+pub struct ExemplarMasks {
+    /// With `--exemplar`: a `--mask` of the fit; all of them, in its order.
+    #[arg(long, value_name = "FILE", requires = "exemplar")]
+    pub mask: Vec<PathBuf>,
+    /// With `--exemplar`: an `--exclude` of the fit, likewise.
+    #[arg(long, value_name = "FILE", requires = "exemplar")]
+    pub exclude: Vec<PathBuf>,
+}
+
+impl ExemplarMasks {
+    /// Every file, with `true` for those that exclude.
+    pub fn all(&self) -> Vec<(PathBuf, bool)> {
+        marked(&self.mask, &self.exclude)
+    }
+}
+
 /// `texture`.
 #[derive(Debug, Args)]
 pub struct Texture {
@@ -581,15 +610,22 @@ pub struct Texture {
     /// Size east-west by north-south, m.
     #[arg(long, value_name = "WxH")]
     pub size: Option<String>,
-    /// Cell size, m.
+    /// Cell size, m; default: that of the site for methods that repeat it, otherwise 0.1.
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub cell: Option<f64>,
     /// Seed of the random streams.
     #[arg(long, value_name = "N")]
     pub seed: Option<u64>,
-    /// Synthesis method.
+    /// Synthesis method. From any fit: fft_ma, cholesky, gaussians, quasi_wavelets; from one with `--statistics`: modulated,
+    /// wavelet_statistics; with `--exemplar`: quilting, exemplar.
     #[arg(long, value_name = "M", default_value = "fft_ma")]
     pub method: String,
+    /// The DEM of the fit, from whose residual `quilting` and `exemplar` copy cells. Its licence extends to the texture.
+    #[arg(long, value_name = "DEM")]
+    pub exemplar: Option<PathBuf>,
+    /// Masks of the fit.
+    #[command(flatten)]
+    pub masks: ExemplarMasks,
     /// Spectral coefficients of `unit` magnitude (exact covariance in each tile) or `gaussian`.
     #[arg(long, value_name = "unit|gaussian")]
     pub phase: Option<String>,
@@ -608,7 +644,7 @@ pub struct Texture {
     pub amplitude: Option<String>,
     /// Only fill the holes of this DEM, with texture conditioned on their surroundings. `--cell` gives the cell size of a DEM that
     /// states none.
-    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "method", "covariance", "amplitude", "set"])]
+    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "method", "covariance", "amplitude", "exemplar", "set"])]
     pub fill: Option<PathBuf>,
     /// Set any other parameter of the method (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]

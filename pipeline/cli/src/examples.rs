@@ -2,7 +2,7 @@
 
 /// Example values of keys that have no default and appear in no starting study. The key is the full name or its last part, preceded by
 /// `section: ` where sections differ.
-pub const EXAMPLES: [(&str, &str); 146] = [
+pub const EXAMPLES: [(&str, &str); 151] = [
     ("license_file", r#""site.license.txt""#),
     ("basic_spacing_m", "0.01"),
     ("pixel_m", "0.64"),
@@ -91,6 +91,11 @@ pub const EXAMPLES: [(&str, &str); 146] = [
     ("azimuth_deg", "30.0"),
     ("outer_m", "2.0"),
     ("marginal_m", "[-0.05, 0.0, 0.05]"),
+    ("fit: statistics", "true"),
+    ("log_variance", "0.5"),
+    ("texture: range_m", "0.6"),
+    ("patch_m", "2.0"),
+    ("spacing_m", "1.0"),
     ("scale_m", "0.2"),
     ("bumps", "4000"),
     ("methods", r#"["fft_ma", "gaussians"]"#),

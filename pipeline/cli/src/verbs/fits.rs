@@ -127,6 +127,7 @@ pub fn fit_parameters(args: &Fit) -> Result<Value, Failure> {
     put("trim", args.trim.map(|v| json!(v)));
     put("model", args.model.as_ref().map(|v| json!(v)));
     put("bootstrap", args.bootstrap.map(|v| json!(v)));
+    put("statistics", args.statistics.then(|| json!(true)));
     put("noise_sigma_m", args.noise_sigma.map(|v| json!(v)));
     put("correlated_noise_sigma_m", args.correlated_noise_sigma.map(|v| json!(v)));
     put("correlated_noise_range_m", args.correlated_noise_range.map(|v| json!(v)));

@@ -14,7 +14,7 @@ use sastrugi_stages::verbs::local::Local;
 use sastrugi_stages::verbs::roughness::{
     AerodynamicRoughness, ArealFigures, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate, WindSettings,
 };
-use sastrugi_stages::verbs::texture::Amplitude;
+use sastrugi_stages::verbs::texture::{Amplitude, Exemplar};
 use sastrugi_stages::verbs::{self, numbers, parameters};
 use serde_json::{Value, json};
 use std::path::Path;
@@ -51,6 +51,7 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         method: &args.method,
         parameters: params,
         seed: args.seed.unwrap_or(0),
+        exemplar: args.exemplar.as_deref().map(|dem| Exemplar { dem, masks: args.masks.all() }),
         onto: args.onto.as_deref(),
         amplitude: args.amplitude.as_deref().map(amplitude),
         fill: args.fill.as_deref(),
