@@ -122,18 +122,21 @@ class Fit:
     def texture(
         self,
         size: float | Sequence[float],
-        cell: float,
+        cell: float | None = None,
         seed: int = 0,
         *,
         method: str = "fft_ma",
+        exemplar: Any = None,
         **parameters: Any,
     ) -> Heightfield:
         """Synthesises a heightfield with this covariance, as `sastrugi texture` does.
 
         size: extent east-west and north-south, m; one number for a square.
-        cell: size of its cells, m.
+        cell: size of its cells, m; by default 0.1, or that of the site for methods that repeat it.
         seed: of the random streams; the same seed gives the same heights.
-        method: fft_ma, cholesky, gaussians or quasi_wavelets; its parameters (`sastrugi kinds`) as keywords.
+        method: fft_ma, cholesky, gaussians or quasi_wavelets; modulated or wavelet_statistics, of a `fit(..., statistics=True)`; quilting or
+            exemplar, with `exemplar`. Its parameters (`sastrugi kinds`) as keywords.
+        exemplar: the fitted heights (a Heightfield, or a file), from which quilting and exemplar copy. Their licence extends to the texture.
 
         >>> snow = Fit({"model": "exponential", "parameters": {"sigma_m": 0.03, "range_m": 0.28}})
         >>> tile = snow.texture(20.0, 0.1, seed=3)
@@ -141,9 +144,21 @@ class Fit:
         True
         """
         refuse_stated(parameters, size_m="size", size_px="size", cell_m="cell")
-        parameters = {"size_m": pair("size", size), "cell_m": cell, **parameters}
-        parts, info = _native.texture(self._text, method, to_json(parameters), seed_of(seed))
+        parameters = {"size_m": pair("size", size), **({} if cell is None else {"cell_m": cell}), **parameters}
+        site = None if exemplar is None else self._site(exemplar)
+        parts, info = _native.texture(self._text, method, to_json(parameters), seed_of(seed), site)
         return Heightfield(*parts, notes=json.loads(info)["notes"])
+
+    def _site(self, exemplar: Any) -> Heightfield:
+        """The fitted heights: as they are, or read as the fit read them."""
+        if isinstance(exemplar, Heightfield):
+            return exemplar
+        if not isinstance(exemplar, (str, os.PathLike)):
+            return heights_of(exemplar, self._content.get("cell_m"))
+        source = self._content.get("source") or {}
+        if source.get("minus") or source.get("masks"):
+            raise SastrugiError("the fit has masks or is of a difference; give the heights that it used as `exemplar`", USAGE)
+        return Heightfield.read(exemplar, window=source.get("window"))
 
     def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
         """Draws the measured covariance and the model, both as detrending and trimming leave them, by lag. Needs matplotlib."""
@@ -182,7 +197,7 @@ def fit(
     window: part of a file, (x0, y0, x1, y1) in its own coordinates.
     minus: another file, which is co-registered to `dem` (then a file too) and subtracted.
     seed: of the replicates.
-    parameters: as in a study (`sastrugi kinds covariance`): mode, trim, model, bootstrap, inner_scale_m, noise_sigma_m ...
+    parameters: as in a study (`sastrugi kinds covariance`): mode, trim, model, bootstrap, statistics, inner_scale_m, noise_sigma_m ...
 
     Notes on how a file was read, such as a cell size that was assumed, are issued as warnings. The file that `save` writes is that of the program for the same file and parameters. Ctrl-C returns at once; the fit then ends in the
     background without effect.

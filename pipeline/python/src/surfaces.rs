@@ -123,7 +123,7 @@ pub fn quoted(fit: &str) -> PyResult<String> {
     text(&json!({ "level": level, "kind": kind, "parameters": parameters }))
 }
 
-/// Synthesises a texture: its parts, and a JSON object with `parameters` and `notes`.
+/// Synthesises a texture, from the fitted heights where a method copies from them: its parts, and a JSON object with `parameters` and `notes`.
 #[pyfunction]
 pub fn texture<'py>(
     py: Python<'py>,
@@ -131,9 +131,11 @@ pub fn texture<'py>(
     method: String,
     parameters: &str,
     seed: u64,
+    exemplar: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<(Parts<'py>, String)> {
     let (fit, parameters) = (fit_of(fit)?, value(parameters)?);
-    let made = waited(py, move || arrays::texture(&fit, &method, &parameters, seed))?;
+    let exemplar = exemplar.map(raster).transpose()?;
+    let made = waited(py, move || arrays::texture(&fit, exemplar.as_ref(), &method, &parameters, seed))?;
     let Textured { heights, parameters, notes } = made;
     Ok((parts(py, heights)?, text(&json!({ "parameters": parameters, "notes": notes }))?))
 }

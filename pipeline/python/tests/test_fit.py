@@ -118,6 +118,20 @@ def test_plot():
         snow().plot()
 
 
+def test_textures_that_repeat_a_site_say_what_they_need():
+    site = snow().texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)
+    found = sastrugi.fit(site, outer_scale=1.0, bootstrap=0)
+    with pytest.raises(sastrugi.SastrugiError, match="fit the DEM with --statistics"):
+        found.texture(8.0, method="modulated")
+    with pytest.raises(sastrugi.SastrugiError, match="give the DEM of the fit with --exemplar"):
+        found.texture(8.0, method="quilting")
+    with pytest.raises(sastrugi.SastrugiError, match="keeps the directions of the site"):
+        found.texture(8.0, method="quilting", exemplar=site, ratio=0.5)
+    masked = Fit({**found.to_dict(), "source": {"file": "a.tif", "sha256": "", "window": None, "masks": [{"file": "m", "sha256": "", "excludes": True}]}})
+    with pytest.raises(sastrugi.SastrugiError, match="the fit has masks or is of a difference"):
+        masked.texture(8.0, method="quilting", exemplar="a.tif")
+
+
 def test_errors_are_those_of_the_program():
     with pytest.raises(sastrugi.SastrugiError) as refused:
         snow().texture(4.0, 0.1, phases="unit")

@@ -76,6 +76,23 @@ def test_textures(sastrugi_program, tmp_path):
     assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
 
 
+@pytest.mark.parametrize("method", ["modulated", "wavelet_statistics", "quilting", "exemplar"])
+def test_textures_that_repeat_a_site(method, sastrugi_program, tmp_path):
+    site = snow(tmp_path / "snow.tif")
+    found = sastrugi.fit(site, outer_scale=1.0, bootstrap=0, statistics=True)
+    found.save(tmp_path / "program.json")
+    copies = method in ("quilting", "exemplar")
+    options = ["--exemplar", "snow.tif"] if copies else []
+    size = ["--size", "12x9", "--set", "periodic=false", "--seed", 5]
+    sastrugi_program("texture", "program.json", "--method", method, *options, *size, "-o", "program.tif")
+    of = {"method": method, "seed": 5, "periodic": False}
+    for exemplar in [site, sastrugi.Heightfield.read(site)] if copies else [None]:
+        made = found.texture((12.0, 9.0), exemplar=exemplar, **of)
+        assert made.cell == (0.1, 0.1) and made.shape == (90, 120)
+        made.save(tmp_path / "module.tif")
+        assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
+
+
 def test_roughness_and_coregistration(sastrugi_program, tmp_path):
     a = sastrugi.Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(96.0, 1.0, seed=2)
     b = sastrugi.Heightfield(a.values + 1.0, a.cell, origin=(0.3, -0.2))
