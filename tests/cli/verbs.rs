@@ -384,6 +384,117 @@ fn val_textures_are_tiled_shaped_and_fill_holes() {
     assert_eq!(stated["filled_cells"], 1);
 }
 
+/// A site of 16 m x 16 m with cells of 10 cm, as `site.tif`, its fit with statistics, `fit.json`, and its background.
+fn site_with_statistics(path: &Path) -> Value {
+    write(path, "own.json", "{\"model\": \"exponential\", \"parameters\": {\"sigma_m\": 0.05, \"range_m\": 0.3}}");
+    let size = ["--size", "16x16", "--cell", "0.1", "--phase", "gaussian", "--set", "periodic=false", "--seed", "3"];
+    ok(path, &[&["texture", "own.json", "-o", "site.tif"], &size[..]].concat());
+    let fit = ["fit", "site.tif", "--outer-scale", "2", "--bootstrap", "0"];
+    ok(path, &[&fit[..], &["--statistics", "--background", "background.tif", "-o", "fit.json"]].concat());
+    ok(path, &[&fit[..], &["-o", "plain.json"]].concat());
+    serde_json::from_str(&std::fs::read_to_string(path.join("fit.json")).unwrap()).unwrap()
+}
+
+/// What each method that repeats a site needs beside the fit with statistics.
+const REPEATING: [(&str, &[&str]); 4] = [
+    ("modulated", &[]),
+    ("wavelet_statistics", &[]),
+    ("quilting", &["--exemplar", "site.tif"]),
+    ("exemplar", &["--exemplar", "site.tif"]),
+];
+
+/// Textures from statistics, and from the DEM: cells of the site by default, its roughness, the same bytes on one and two threads; and on the
+/// background of the fit. The residual of the site has some 500 independent pieces, so the spread of its RMS is a few percent; limit 30 %.
+#[test]
+fn val_textures_repeat_a_site() {
+    let folder = area();
+    let path = folder.path();
+    let fit = site_with_statistics(path);
+    let plain: Value = serde_json::from_str(&std::fs::read_to_string(path.join("plain.json")).unwrap()).unwrap();
+    assert_eq!((fit["statistics"]["version"].as_u64(), fit["settings"]["statistics"].as_bool()), (Some(1), Some(true)));
+    assert!(plain.get("statistics").is_none() && plain["settings"].get("statistics").is_none());
+    assert_eq!((&plain["parameters"], &plain["height_quantiles_m"]), (&fit["parameters"], &fit["height_quantiles_m"]));
+    let wanted_m = fit["diagnostics"]["band_rms_m"].as_f64().unwrap();
+    for (method, needs) in REPEATING {
+        let verb = ["texture", "fit.json", "--method", method, "--size", "12.8x9.6", "--seed", "5"];
+        let more = |threads: &'static str, output: &'static str| {
+            [&verb[..], needs, &["--set", "periodic=false", "--threads", threads, "-o", output]].concat()
+        };
+        let made = ok_json(path, &more("1", "one.tif"));
+        assert_eq!([&made["grid"]["rows"], &made["grid"]["cols"]], [96, 128], "{method}");
+        assert!(made["covariance_error_max_m2"].is_null() && made["parameters"].get("ratio").is_none(), "{made}");
+        let notes = made["notes"].to_string();
+        assert_eq!(notes.contains("licence and attribution"), !needs.is_empty(), "{notes}");
+        assert_eq!(notes.contains("copied runs"), !needs.is_empty(), "{notes}");
+        let all = heights(path, "one.tif");
+        let rms = (all.iter().map(|z| z * z).sum::<f64>() / all.len() as f64).sqrt();
+        assert!((rms / wanted_m - 1.0).abs() < 0.3, "{method}: {rms} {wanted_m}");
+        ok(path, &more("2", "two.tif"));
+        let bytes = |name: &str| std::fs::read(path.join(name)).unwrap();
+        assert_eq!(bytes("one.tif"), bytes("two.tif"), "{method}");
+    }
+    let laid = ["texture", "fit.json", "--method", "quilting", "--exemplar", "site.tif", "--size", "8x8"];
+    ok(path, &[&laid[..], &["--onto", "background.tif", "-o", "laid.tif"]].concat());
+    let (base, sum) = (heights(path, "background.tif"), heights(path, "laid.tif"));
+    assert!(base.len() == sum.len() && base.iter().zip(&sum).any(|(a, b)| a != b));
+}
+
+/// What the methods cannot do is refused in one sentence, before anything is written.
+#[test]
+fn val_textures_that_repeat_a_site_refuse() {
+    let folder = area();
+    let path = folder.path();
+    site_with_statistics(path);
+    ok(path, &["texture", "own.json", "--size", "16x16", "--cell", "0.1", "--seed", "4", "-o", "other.tif"]);
+    write(path, "plot.geojson", "{\"type\": \"Polygon\", \"coordinates\": [[[1,1],[9,1],[9,9],[1,9],[1,1]]]}");
+    let exemplar = ["--exemplar", "site.tif"];
+    let none: &[&str] = &[];
+    let cases: [(&str, &str, &[&str], i32, &str); 15] = [
+        ("plain.json", "modulated", none, 2, "fit the DEM with --statistics"),
+        ("plain.json", "wavelet_statistics", none, 2, "fit the DEM with --statistics"),
+        ("fit.json", "quilting", none, 2, "give the DEM of the fit with --exemplar"),
+        ("fit.json", "exemplar", none, 2, "give the DEM of the fit with --exemplar"),
+        ("fit.json", "fft_ma", &exemplar, 2, "`fft_ma` does not copy from a DEM"),
+        ("fit.json", "quilting", &["--exemplar", "other.tif"], 65, "is not the DEM of the fit"),
+        ("own.json", "quilting", &exemplar, 2, "`settings` are missing"),
+        (
+            "fit.json",
+            "quilting",
+            &["--exemplar", "site.tif", "--mask", "plot.geojson"],
+            2,
+            "not those of the fit: none",
+        ),
+        ("fit.json", "modulated", &["--mask", "plot.geojson"], 2, "--exemplar"),
+        ("fit.json", "modulated", &["--cell", "0.2"], 2, "on the cells of the site only, 0.1 m x 0.1 m"),
+        ("fit.json", "modulated", &["--set", "ratio=0.5"], 2, "`modulated` keeps the directions of the site"),
+        ("fit.json", "wavelet_statistics", &["--set", "azimuth_deg=30"], 2, "keeps the directions of the site"),
+        ("fit.json", "wavelet_statistics", &["--set", "marginal=measured"], 2, "keeps the heights of the site"),
+        ("fit.json", "wavelet_statistics", &["--set", "outer_m=3"], 2, "keeps the waves of the site"),
+        ("fit.json", "modulated", &["--phase", "unit"], 2, "phase"),
+    ];
+    for (fit, method, more, code, words) in cases {
+        let arguments = [&["texture", fit, "--method", method, "--size", "8x8", "-o", "refused.tif"], more].concat();
+        let call = sastrugi_in(path, &arguments);
+        assert_eq!(call.code, code, "{arguments:?}: {}", call.stderr);
+        assert!(call.stderr.contains(words), "{arguments:?}: {}", call.stderr);
+    }
+    let filled =
+        sastrugi_in(path, &["texture", "fit.json", "--fill", "site.tif", "--exemplar", "site.tif", "-o", "f.tif"]);
+    assert!(filled.code == 2 && filled.stderr.contains("cannot be used with"), "{}", filled.stderr);
+    let paper = ["fit", "site.tif", "--outer-scale", "2", "--mode", "paper", "--statistics", "-o", "paper.json"];
+    let call = sastrugi_in(path, &paper);
+    assert!(call.code == 2 && call.stderr.contains("use `corrected` for statistics"), "{}", call.stderr);
+    // Transects have one direction.
+    let line: Vec<String> =
+        (0..400).map(|k| format!("{} {}", f64::from(k) * 0.1, f64::from(k * 7919 % 97) * 0.001)).collect();
+    write(path, "line.csv", &format!("x z\n{}\n", line.join("\n")));
+    let call = sastrugi_in(path, &["fit", "line.csv", "--outer-scale", "2", "--statistics", "-o", "line.json"]);
+    assert!(call.code != 0, "{}", call.stderr);
+    for name in ["refused.tif", "f.tif", "paper.json", "line.json"] {
+        assert!(!path.join(name).exists(), "{name}");
+    }
+}
+
 #[test]
 fn val_conversions_keep_the_heights() {
     let folder = area();

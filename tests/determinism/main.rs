@@ -7,7 +7,9 @@ mod emulated;
 mod every_stage;
 
 use every_stage::EveryStage;
-use sastrugi_tests::{area, called, differing, program, routed_study, run_with_kills, sastrugi_in, sums, write};
+use sastrugi_tests::{
+    area, called, differing, program, routed_study, run_in_shards, run_with_kills, sastrugi_in, sums, textured_study, write,
+};
 use std::collections::BTreeMap;
 use std::path::Path;
 use std::process::Command;
@@ -37,6 +39,16 @@ fn gold_threads_change_nothing() {
     for threads in ["2", "8"] {
         assert_same(&one, &run_fresh(&routed_study(), &["--threads", threads]), threads);
     }
+}
+
+/// Textures that repeat a site: from stored statistics and from the DEM.
+#[test]
+fn gold_threads_and_shards_change_no_texture_of_a_site() {
+    let one = run_fresh(&textured_study(), &["--threads", "1"]);
+    assert_same(&one, &run_fresh(&textured_study(), &["--threads", "2"]), "two threads");
+    let folder = area();
+    write(folder.path(), "study.toml", &textured_study());
+    assert_same(&one, &run_in_shards(folder.path(), "study.toml"), "shards");
 }
 
 #[test]

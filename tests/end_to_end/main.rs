@@ -18,6 +18,7 @@ mod rover;
 mod serve;
 mod serve_faults;
 mod team;
+mod textures;
 mod traverse;
 
 use sastrugi_tests::{area, rows, sastrugi_in, small_study, sums, write};

@@ -224,6 +224,55 @@ missions = "short"
     )
 }
 
+/// A study of textures that repeat a site: side by side, on a background, tiled.
+pub fn textured_study() -> String {
+    r#"
+[study]
+name = "textures"
+seed = 7
+date = "2026-01-01"
+
+[[terrain]]
+id = "site"
+kind = "weierstrass_mandelbrot"
+size_px = [200, 180]
+cell_m = 0.1
+
+[[fit]]
+id = "fit"
+dem = "site"
+outer_scale_m = 2.0
+bootstrap = 0
+statistics = true
+
+[[texture]]
+id = "side"
+fit = "fit"
+methods = ["fft_ma", "modulated", "wavelet_statistics", "quilting", "exemplar"]
+realisations = 2
+periodic = false
+size_px = [96, 80]
+cell_m = 0.1
+
+[[texture]]
+id = "laid"
+fit = "fit"
+method = "quilting"
+onto = { background = "fit" }
+size_px = [80, 80]
+
+[[texture]]
+id = "loose"
+fit = "fit"
+method = "wavelet_statistics"
+seed = 5
+size_px = [64, 96]
+tile = [2, 1]
+rounds = 3
+"#
+    .to_owned()
+}
+
 /// The small study with routes: missions along them, and teams that plan with limited sensing.
 pub fn routed_study() -> String {
     small_study()

@@ -1,0 +1,124 @@
+//! Textures that repeat a site, in studies.
+
+use sastrugi_tests::{area, differing, rows, run_study, sastrugi_in, textured_study, write};
+use serde_json::Value;
+use std::fs;
+use std::path::Path;
+
+/// All methods that repeat a site in one study, side by side, on a background and tiled; planned, and recomputed to the same bytes.
+#[test]
+fn val_a_study_of_textures_that_repeat_a_site() {
+    let folder = area();
+    write(folder.path(), "study.toml", &textured_study());
+    let plan = sastrugi_in(folder.path(), &["plan", "study.toml", "--json"]);
+    assert_eq!(plan.code, 0, "{}", plan.stderr);
+    let sums = run_study(folder.path(), &textured_study(), &[]);
+    let methods = ["fft-ma", "modulated", "wavelet-statistics", "quilting", "exemplar"];
+    let textures = methods.map(|method| format!("texture/side-{method}.tif"));
+    for path in textures.iter().map(String::as_str).chain(["texture/laid.tif", "texture/loose.tif"]) {
+        assert!(sums.contains_key(path), "{path} is missing from {:?}", sums.keys());
+    }
+    let release = folder.path().join("release");
+    for row in rows(&release, "scoreboard") {
+        let method = row["method"].as_str().unwrap_or_default();
+        assert_eq!(row["refused"], "", "{method}");
+        let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);
+        // Methods that repeat a site do not know their mean covariance beforehand; what they make is measured.
+        assert_eq!(number("covariance_error_max").is_finite(), method == "fft_ma", "{method}");
+        assert!((0.4..1.6).contains(&number("variance_mean")), "{method}: {}", number("variance_mean"));
+    }
+    let page = fs::read_to_string(release.join("report/index.html")).unwrap();
+    assert!(page.contains("mean covariance not known beforehand"));
+    let verify = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
+    assert_eq!(verify.code, 0, "{}{}", verify.stdout, verify.stderr);
+    // Without the statistics, the methods that need them are refused before anything runs.
+    for (method, code) in [("modulated", 2), ("quilting", 0)] {
+        let study = textured_study().replace("statistics = true\n", "");
+        let study = format!(
+            "{}[[texture]]\nid = \"one\"\nfit = \"fit\"\nmethod = \"{method}\"\n",
+            &study[..study.find("[[texture]]").unwrap()]
+        );
+        write(folder.path(), "other.toml", &study);
+        let call = sastrugi_in(folder.path(), &["plan", "other.toml"]);
+        assert_eq!(call.code, code, "{method}: {}", call.stderr);
+        assert_eq!(call.stderr.contains("statistics = true"), code == 2, "{method}: {}", call.stderr);
+    }
+    for (key, words) in
+        [("ratio = 0.5", "keeps the directions of the site"), ("cell_m = 0.2", "on the cells of the site")]
+    {
+        let study = textured_study().replace("method = \"quilting\"\n", &format!("method = \"quilting\"\n{key}\n"));
+        write(folder.path(), "other.toml", &study);
+        let call = sastrugi_in(folder.path(), &["plan", "other.toml"]);
+        assert!(call.code == 2 && call.stderr.contains(words), "{key}: {}", call.stderr);
+    }
+}
+
+/// A site of 16 m x 16 m, `site.tif`, and a mask of it.
+fn site(path: &Path) {
+    write(path, "own.json", "{\"model\": \"exponential\", \"parameters\": {\"sigma_m\": 0.05, \"range_m\": 0.3}}");
+    write(path, "plot.geojson", "{\"type\": \"Polygon\", \"coordinates\": [[[1,1],[15,1],[15,15],[1,15],[1,1]]]}");
+    let call = sastrugi_in(
+        path,
+        &[
+            "texture", "own.json", "--size", "16x16", "--cell", "0.1", "--phase", "gaussian", "--seed", "3", "-o",
+            "site.tif",
+        ],
+    );
+    assert_eq!(call.code, 0, "{}", call.stderr);
+}
+
+fn heights(path: &Path, name: &str) -> String {
+    let call = sastrugi_in(path, &["convert", name, "heights.asc"]);
+    assert_eq!(call.code, 0, "{name}: {}", call.stderr);
+    fs::read_to_string(path.join("heights.asc")).unwrap()
+}
+
+/// A texture copied from a measured DEM names it as its source, so that its terms follow; the verb makes the same heights from the same DEM
+/// and mask.
+#[test]
+fn val_the_terms_of_the_exemplar_follow_the_texture() {
+    let folder = area();
+    let path = folder.path();
+    site(path);
+    let study = "[study]\nname = \"copied\"\nseed = 7\ndate = \"2026-01-01\"\nlicense = \"CC-BY-4.0\"\n\n[[dem]]\nid = \"site\"\n\
+                 file = \"site.tif\"\nlicense = \"CC-BY-4.0\"\nattribution = \"The agency\"\n\n[[fit]]\nid = \"fit\"\ndem = \"site\"\n\
+                 outer_scale_m = 2.0\nbootstrap = 0\nmask = \"plot.geojson\"\n\n[[texture]]\nid = \"copied\"\nfit = \"fit\"\n\
+                 method = \"quilting\"\nseed = 4\nsize_m = [8.0, 8.0]\n";
+    let sums = run_study(path, study, &[]);
+    assert!(sums.contains_key("texture/copied.tif"));
+    let text = fs::read_to_string(path.join("release/manifest.json")).unwrap();
+    let manifest: Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(manifest["sources"][0]["attribution"], "The agency");
+    let artifacts = manifest["artifacts"].as_array().unwrap();
+    let texture = artifacts.iter().find(|a| a["path"] == "texture/copied.tif").unwrap();
+    assert_eq!(texture["sources"], serde_json::json!(["site"]));
+    let notes = manifest["notes"].to_string();
+    assert!(notes.contains("licence and attribution of its DEM extend to the texture"), "{notes}");
+    for arguments in [
+        &["fit", "site.tif", "--outer-scale", "2", "--bootstrap", "0", "--mask", "plot.geojson", "-o", "fit.json"][..],
+        &[
+            "texture",
+            "fit.json",
+            "--method",
+            "quilting",
+            "--exemplar",
+            "site.tif",
+            "--mask",
+            "plot.geojson",
+            "--size",
+            "8x8",
+            "--seed",
+            "4",
+            "-o",
+            "verb.tif",
+        ],
+    ] {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+    }
+    assert_eq!(heights(path, "verb.tif"), heights(path, "release/texture/copied.tif"));
+    // Another run gives the same release.
+    let other = area();
+    site(other.path());
+    assert_eq!(differing(&sums, &run_study(other.path(), study, &["--threads", "1"])), Vec::<String>::new());
+}
