@@ -8,7 +8,8 @@ mod every_stage;
 
 use every_stage::EveryStage;
 use sastrugi_tests::{
-    area, called, differing, program, routed_study, run_in_shards, run_with_kills, sastrugi_in, sums, textured_study, write,
+    area, called, differing, program, routed_study, run_in_shards, run_with_kills, sastrugi_in, sums, textured_study,
+    write,
 };
 use std::collections::BTreeMap;
 use std::path::Path;

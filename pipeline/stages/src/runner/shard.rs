@@ -239,9 +239,9 @@ pub struct Joined {
 pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     let (shards, mut problems) = read_all(folders);
     let of_set = check_set(&shards);
-    if let Some((_, first)) = shards.first().filter(|_| !problems.is_empty() && of_set.is_empty()) {
+    if let Some(one) = shards.first().filter(|_| !problems.is_empty() && of_set.is_empty()) {
         let it = if problems.len() == 1 { "it" } else { "them" };
-        problems.push(format!("all {} shards are there without {it}; leave {it} out", first.part.count));
+        problems.push(format!("all {} shards are there without {it}; leave {it} out", one.shard.part.count));
     }
     problems.extend(of_set);
     if !problems.is_empty() {
