@@ -409,7 +409,7 @@ fn val_rasters_that_cannot_be_fitted_say_why() {
     let flat = "1 ".repeat(64 * 64);
     write(path, "flat.asc", &format!("ncols 64\nnrows 64\nxllcorner 0\nyllcorner 0\ncellsize 0.1\n{flat}\n"));
     refused(path, &["fit", "flat.asc", "--outer-scale", "1", "-o", "fit.json"], INPUT, &["flat or a plane"]);
-    refused(path, &["fit", "flat.asc", "--outer-scale", "5", "-o", "fit.json"], INPUT, &["window"]);
+    refused(path, &["fit", "flat.asc", "--outer-scale", "5", "-o", "fit.json"], INPUT, &["outer scale of 5 m"]);
     refused(path, &["fit", "flat.asc", "--outer-scale", "-1", "-o", "fit.json"], USAGE, &["outer_scale_m"]);
     refused(path, &["fit", "flat.asc", "--trim", "0.7", "-o", "fit.json"], USAGE, &["trim"]);
     refused(path, &["fit", "flat.asc", "--window", "9,9,10,10", "-o", "fit.json"], INPUT, &["window"]);
@@ -456,7 +456,7 @@ fn val_everything_that_a_fit_refuses() {
         assert_eq!(stderr.lines().count(), 1, "one sentence: {stderr}");
     };
     let scale = |metres| ["--outer-scale", metres];
-    fit("white.asc", &scale("5"), INPUT, &["9.6", "two windows", "10 m"]);
+    fit("white.asc", &scale("5"), INPUT, &["9.6 m x 9.6 m", "outer scale of 5 m", "at most a third"]);
     fit("white.asc", &scale("4"), INPUT, &["outer scale of 4 m", "a third of the DEM", "3.2"]);
     fit("white.asc", &scale("0.2"), INPUT, &["outer scale of 0.2 m", "three cells"]);
     fit("white.asc", &scale("0"), USAGE, &["outer_scale_m", "above 0"]);

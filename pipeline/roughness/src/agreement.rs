@@ -9,8 +9,8 @@
 //! * `third_order_structure`: `<d^3> / <d^2>^(3/2)` by lag, eastwards and northwards; 0 for a surface whose statistics do not
 //!   change on reversing the axis, and for any normal surface;
 //! * `extrema_density`: `ln` of the share of cells higher, or lower, than all eight neighbours;
-//! * `directional_psd`: `ln` of the mean power in sectors of 30 degrees over the mean of all, between the longest increment and half
-//!   the Nyquist frequency.
+//! * `directional_psd`: `ln` of the mean power in sectors of 30 degrees over the mean of all, between the longest increment (at least
+//!   8 cells) and half the Nyquist frequency.
 //!
 //! [`surface_statistics`] adds what a fit may set, and the shape of the sets above a level:
 //! * `covariance`: mean product of the residuals, m²: at lag 0, then at 1, 2, 3 ... cells east-west, then north-south;
@@ -38,6 +38,8 @@ const QUANTILES: usize = 19;
 const HEIGHTS: usize = 99;
 /// Number of levels of the Minkowski functionals, at shares of `k / 10` of the area.
 const LEVELS: usize = 9;
+/// Least length of the longest waves of the sectors, cells: an octave above the shortest, which are of 4 cells.
+const SECTOR_CELLS_MIN: usize = 8;
 /// Sectors in half a turn.
 const SECTORS: usize = 6;
 
@@ -236,7 +238,7 @@ fn directional_power(z: &Grid, lag_max: usize) -> Vec<f64> {
     let spectrum = fft.forward(&field);
     let cell = z.geometry.cell;
     let coarse = cell[0].max(cell[1]);
-    let band = [1.0 / (lag_max.max(2) as f64 * coarse), 0.25 / coarse];
+    let band = [1.0 / (lag_max.max(SECTOR_CELLS_MIN) as f64 * coarse), 0.25 / coarse];
     let mut sectors = [(0.0, 0.0); SECTORS];
     for (k, value) in spectrum.values.iter().enumerate() {
         let (kx, ky) = (k / height, k % height);

@@ -329,7 +329,7 @@ fn val_unusable_ascii_grids_are_refused_with_the_reason() {
     assert!(with("1 2 3 4 5 six").contains("\"six\""));
     assert!(with("-9999 -9999 -9999 -9999 -9999 -9999").contains("holds data"));
     let absurd = head.replace("ncols 3", "ncols 4000000000").replace("nrows 2", "nrows 4000000000");
-    assert!(refusal("a.asc", absurd.as_bytes()).contains("a.asc claims "));
+    assert!(refusal("a.asc", absurd.as_bytes()).starts_with("claims "));
     let large = head.replace("ncols 3", "ncols 10000").replace("nrows 2", "nrows 10000");
     assert!(refusal("a.asc", large.as_bytes()).contains("bytes"));
     assert!(refusal("a.asc", head.replace("ncols 3", "ncols -3").as_bytes()).contains("count"));

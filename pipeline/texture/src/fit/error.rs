@@ -17,8 +17,10 @@ pub enum FitError {
     Unreadable(String),
     /// Fewer than two windows fit side by side.
     #[error(
-        "the DEM is {width_m} m x {height_m} m, too small for an outer scale of {} m; choose at most a third of its extent",
-        0.5 * needed_m
+        "the DEM is {} m x {} m, too small for an outer scale of {} m; choose at most a third of its extent",
+        in_um(*width_m),
+        in_um(*height_m),
+        in_um(0.5 * needed_m)
     )]
     DemTooSmall {
         /// East-west extent, m.
@@ -96,4 +98,9 @@ pub enum FitError {
         /// Bins needed.
         needed: usize,
     },
+}
+
+/// Length rounded to a micrometre, so that 96 cells of 0.1 m are 9.6 m.
+fn in_um(length_m: f64) -> f64 {
+    (1e6 * length_m).round() / 1e6
 }
