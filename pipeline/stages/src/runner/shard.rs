@@ -18,8 +18,8 @@ use sastrugi_store::digest;
 use sastrugi_store::release::{Staging, check_path};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::fs;
-use std::io::{self, BufReader};
+use std::fs::{self, File};
+use std::io::{self, BufReader, ErrorKind};
 use std::path::{Path, PathBuf};
 
 const DESCRIPTION: &str = sastrugi_store::release::SHARD;
@@ -298,7 +298,7 @@ fn place<'a>(shards: &mut Vec<Placed<'a>>, folder: &'a PathBuf, mut shard: Descr
     shards.push(Placed { folder, shard, has_same_items });
 }
 
-/// The folders of all results, parents before children.
+/// The folders of all results, parents before children. Their files are on disk.
 fn results(shards: &[Placed<'_>], failures: &BTreeMap<ItemRef, Failure>) -> Result<Vec<PathBuf>, Error> {
     let by_part: BTreeMap<u32, &PathBuf> = shards.iter().map(|p| (p.shard.part.index, p.folder)).collect();
     let Some(Placed { shard: first, .. }) = shards.first() else { return Ok(Vec::new()) };
@@ -307,7 +307,8 @@ fn results(shards: &[Placed<'_>], failures: &BTreeMap<ItemRef, Failure>) -> Resu
     for (item, key) in &first.items {
         let part = owner(key, first.part.count).unwrap_or(1);
         let Some(folder) = by_part.get(&part).map(|folder| item_folder(folder, item)) else { continue };
-        if load_record(&folder).is_some_and(|r| r.key == *key && is_intact(&r, &folder)) {
+        if let Some(record) = load_record(&folder).filter(|r| r.key == *key && is_intact(r, &folder)) {
+            flush(&record, &folder)?;
             results.push(folder);
         } else if !failures.contains_key(item) {
             missing.entry(part).or_default().push(item);
@@ -352,6 +353,19 @@ fn is_intact(record: &Record, folder: &Path) -> bool {
     let same =
         |f: &StoredFile| digest::of_file(&folder.join(&f.product.file)).is_ok_and(|(_, sha256)| sha256 == f.sha256);
     record.files.iter().all(same)
+}
+
+/// Flushes the files that go into the release to disk: the release links to them, a link flushes nothing, and neither do the programs with
+/// which users copy shards. Files that are on disk cost nothing.
+fn flush(record: &Record, folder: &Path) -> Result<(), Error> {
+    let released = record.files.iter().filter(|file| file.product.release_path.is_some());
+    released.map(|file| folder.join(&file.product.file)).try_for_each(|path| {
+        match File::open(&path).and_then(|file| file.sync_all()) {
+            // What a read-only file system answers, if anything.
+            Err(e) if matches!(e.kind(), ErrorKind::InvalidInput | ErrorKind::ReadOnlyFilesystem) => Ok(()),
+            flushed => flushed.map_err(|e| Error::at(&path, e)),
+        }
+    })
 }
 
 fn read(folder: &Path) -> Result<Description, Error> {
