@@ -4,7 +4,7 @@
 //! files and the keys of its rows stay in memory.
 
 use super::cache::{Record, StoredFile, load_record};
-use super::damage::damaged;
+use super::damage::Changed;
 use super::execute::Failure;
 use super::lock;
 use super::progress::Progress;
@@ -39,14 +39,16 @@ pub struct Contents<'a> {
 /// Assembles and seals a release, and returns its notes.
 ///
 /// # Errors
-/// A destination that is not a sastrugi release, is one of another study, or has fewer failed items of the same study, results that cannot be read, or an I/O error.
+/// A destination that is not a sastrugi release, is one of another study, or has fewer failed items of the same study; results that cannot
+/// be read, or that changed, which are removed; an I/O error.
 pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Vec<ItemNote>, Error> {
     let mut sources = Sources::of(contents.study)?;
     let _lock = DestinationLock::take(dest)?;
     contents.check_replaced(dest)?;
     let mut builder = ReleaseBuilder::beside(dest, head(contents.study, contents.text))?;
     progress.phase("assembling artifacts");
-    let fragments = add_results(&mut builder, contents, &mut sources)?;
+    let changed = Changed::default();
+    let fragments = add_results(&mut builder, contents, &mut sources, &changed)?;
     builder.name_sources(sources.list.clone());
     for note in &sources.notes {
         builder.note(note.clone());
@@ -55,7 +57,9 @@ pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -
         progress.phase(&warning);
     }
     progress.phase("writing tables");
-    fragments.write(&mut builder, contents.splits)?;
+    let written = fragments.write(&mut builder, contents.splits, &changed);
+    changed.remove()?;
+    written?;
     add_documents(&mut builder, contents, &sources)?;
     progress.phase("writing the report");
     add_report(&mut builder, progress)?;
@@ -173,18 +177,19 @@ pub fn notes_of(record: &Record) -> Vec<ItemNote> {
     record.notes.iter().map(note).collect()
 }
 
-/// Adds the files of all results, reading each record once. Returns the fragments of the tables.
+/// Adds the files of all results, reading each record once, and notes the results that changed. Returns the fragments of the tables.
 fn add_results(
     builder: &mut ReleaseBuilder,
     contents: &Contents<'_>,
     sources: &mut Sources,
+    changed: &Changed,
 ) -> Result<Fragments, Error> {
     let mut fragments = Fragments::default();
     let mut notes = Vec::new();
     for folder in &contents.results {
         let record = record(folder)?;
         sources.trace(&record);
-        add_artifacts(builder, &record, folder, sources)?;
+        add_artifacts(builder, &record, folder, sources, changed)?;
         fragments.add(&record, folder)?;
         notes.extend(notes_of(&record));
     }
@@ -201,7 +206,13 @@ fn add_results(
     Ok(fragments)
 }
 
-fn add_artifacts(builder: &mut ReleaseBuilder, record: &Record, folder: &Path, sources: &Sources) -> Result<(), Error> {
+fn add_artifacts(
+    builder: &mut ReleaseBuilder,
+    record: &Record,
+    folder: &Path,
+    sources: &Sources,
+    changed: &Changed,
+) -> Result<(), Error> {
     let released = record.files.iter().filter(|file| file.product.release_path.is_some());
     let files: Vec<(&StoredFile, Artifact)> = released.zip(artifacts(record, sources)).collect();
     let incoming = files.iter().map(|(file, artifact)| Incoming {
@@ -210,10 +221,9 @@ fn add_artifacts(builder: &mut ReleaseBuilder, record: &Record, folder: &Path, s
         origin: artifact.origin.clone(),
     });
     let added = builder.add_files(incoming.collect())?;
-    match files.iter().zip(&added).find(|((file, _), sha256)| file.sha256 != **sha256) {
-        Some(((file, _), _)) => Err(damaged(folder, &record.item, &file.product.file)),
-        None => Ok(()),
-    }
+    let differing = files.iter().zip(&added).filter(|((file, _), sha256)| file.sha256 != **sha256);
+    differing.for_each(|((file, _), _)| changed.note(folder, &record.item, &file.product.file));
+    Ok(())
 }
 
 fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources: &Sources) -> Result<(), Error> {

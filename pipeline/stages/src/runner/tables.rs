@@ -5,7 +5,7 @@
 //! many terrains) are kept once. If the study splits its terrains, tables with a column for the split have one file per split.
 
 use super::cache::Record;
-use super::damage::damaged;
+use super::damage::Changed;
 use crate::error::Error;
 use crate::job::{Fragment, ItemRef};
 use crate::splits::{self, Splits};
@@ -82,11 +82,11 @@ impl Fragments {
         Ok(())
     }
 
-    /// Writes all tables, several files at a time.
+    /// Writes all tables, several files at a time. Fragments that changed after they were written are noted and left out.
     ///
     /// # Errors
     /// Fragments that cannot be read or that contradict each other, or a file that cannot be written.
-    pub fn write(mut self, builder: &mut ReleaseBuilder, splits: &Splits) -> Result<(), Error> {
+    pub fn write(mut self, builder: &mut ReleaseBuilder, splits: &Splits, changed: &Changed) -> Result<(), Error> {
         let mut parts = Vec::new();
         let mut files = BTreeMap::new();
         for table in tables::ALL {
@@ -98,7 +98,7 @@ impl Fragments {
             }
         }
         builder.write_tables(parts, |part, writer| match files.get(&(part.table.name, part.name.clone())) {
-            Some(file) => merge(part.table, file, splits, writer),
+            Some(file) => merge(part.table, file, splits, changed, writer),
             None => Ok(()),
         })
     }
@@ -166,20 +166,27 @@ impl LocatedFragment {
         of_end(0).then_with(|| of_end(1)).then_with(|| self.sha256.cmp(&other.sha256))
     }
 
-    /// The rows. A file that changed after it was written is an error.
-    fn rows(&self, table: &Table) -> Result<TableReader, Error> {
+    /// The rows; `None`, and noted, if the file changed after it was written.
+    fn rows(&self, table: &Table, changed: &Changed) -> Result<Option<TableReader>, Error> {
         let ItemResult { folder, item } = &*self.result;
         let path = folder.join(&self.file);
         let (_, sha256) = digest::of_file(&path).map_err(|e| Error::at(&path, e))?;
-        match sha256 == self.sha256 {
-            true => TableReader::open(&path, table).map_err(Error::io),
-            false => Err(damaged(folder, item, &self.file)),
+        if sha256 != self.sha256 {
+            changed.note(folder, item, &self.file);
+            return Ok(None);
         }
+        TableReader::open(&path, table).map(Some).map_err(Error::io)
     }
 }
 
 /// Writes the rows of a file, whose fragments are sorted by their first keys.
-fn merge(table: &Table, file: &TableFile, splits: &Splits, writer: &mut PartWriter<'_>) -> Result<(), Error> {
+fn merge(
+    table: &Table,
+    file: &TableFile,
+    splits: &Splits,
+    changed: &Changed,
+    writer: &mut PartWriter<'_>,
+) -> Result<(), Error> {
     let mut push = |mut cells: Vec<Cell>| {
         splits::fill(table, &mut cells, splits);
         match file.part.is_none_or(|part| splits::is_in_file(table, &cells, part)) {
@@ -191,8 +198,11 @@ fn merge(table: &Table, file: &TableFile, splits: &Splits, writer: &mut PartWrit
     while !rest.is_empty() {
         let (overlapping, others) = rest.split_at(overlapping(rest));
         match overlapping {
-            [one] => one.rows(table)?.try_for_each(|row| push(row.map_err(Error::io)?))?,
-            several => sorted_rows(table, several)?.into_iter().try_for_each(&mut push)?,
+            [one] => {
+                let mut rows = one.rows(table, changed)?.into_iter().flatten();
+                rows.try_for_each(|row| push(row.map_err(Error::io)?))?;
+            }
+            several => sorted_rows(table, several, changed)?.into_iter().try_for_each(&mut push)?,
         }
         rest = others;
     }
@@ -213,10 +223,10 @@ fn overlapping(fragments: &[LocatedFragment]) -> usize {
 }
 
 /// The rows of several fragments, sorted by key. Duplicate rows are kept once. (Every table has keys.)
-fn sorted_rows(table: &Table, fragments: &[LocatedFragment]) -> Result<Vec<Vec<Cell>>, Error> {
+fn sorted_rows(table: &Table, fragments: &[LocatedFragment], changed: &Changed) -> Result<Vec<Vec<Cell>>, Error> {
     let mut rows = Vec::new();
     for fragment in fragments {
-        for row in fragment.rows(table)? {
+        for row in fragment.rows(table, changed)?.into_iter().flatten() {
             rows.push((row.map_err(Error::io)?, &fragment.result.item));
         }
     }
@@ -303,7 +313,9 @@ mod tests {
             };
             let dest = self.folder.path().join("release");
             let mut builder = ReleaseBuilder::beside(&dest, head)?;
-            std::mem::take(&mut self.fragments).write(&mut builder, splits)?;
+            let changed = Changed::default();
+            std::mem::take(&mut self.fragments).write(&mut builder, splits, &changed)?;
+            changed.remove()?;
             builder.seal(&dest)?;
             Ok(Release::open(&dest)?)
         }
@@ -411,18 +423,27 @@ mod tests {
         assert_eq!(names("terrains"), ["part-other.parquet", "part-test.parquet"]);
     }
 
-    /// A file that changed after it was written is removed with the result of its item, so that the next run recomputes it.
+    /// Files that changed after they were written are removed with the results of their items, so that the next run recomputes them; also
+    /// files of different tables, and of keys that overlap.
     #[test]
-    fn val_a_changed_fragment_is_removed() {
+    fn val_changed_fragments_are_removed() {
         let mut area = Area::new();
         area.leave("fit", vec![curve("a", 1, 0)], true);
-        let path = area.folder.path().join("1/rows.parquet");
-        let mut bytes = std::fs::read(&path).unwrap();
-        let middle = bytes.len() / 2;
-        bytes[middle] ^= 1;
-        std::fs::write(&path, bytes).unwrap();
+        area.leave("fit", vec![curve("b", 1, 0), curve("c", 1, 0)], true);
+        area.leave("fit", vec![curve("b", 1, 1)], true);
+        area.leave("traverse", vec![parameter("run", "a", "1")], true);
+        let path = |item: usize| area.folder.path().join(format!("{item}/rows.parquet"));
+        for path in [1, 2, 4].map(path) {
+            let mut bytes = std::fs::read(&path).unwrap();
+            let middle = bytes.len() / 2;
+            bytes[middle] ^= 1;
+            std::fs::write(&path, bytes).unwrap();
+        }
+        let left = [1, 2, 3, 4].map(path);
         let error = area.release().unwrap_err().to_string();
-        assert!(error.contains("fit/1: rows.parquet was changed") && !path.exists(), "{error}");
+        assert!(error.contains("fit/1: rows.parquet was changed"), "{error}");
+        assert!(error.ends_with(", and so were 2 other results; these results were removed; run again"), "{error}");
+        assert_eq!(left.map(|path| path.exists()), [false, false, true, false]);
     }
 
     #[test]
