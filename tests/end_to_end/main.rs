@@ -340,22 +340,26 @@ fn flip(path: &Path) {
     fs::write(path, bytes).unwrap();
 }
 
-/// Results that were changed in the work area are detected and dropped together, and recomputed by the next run.
+/// Results that were changed in the work area are detected and dropped together, by a run and by a shard, and recomputed by the next run.
 #[test]
 fn val_changed_results_are_not_sealed() {
     let folder = area();
     release_in(folder.path());
     let whole = sums(&folder.path().join("release"));
     let below = |folder: &Path| -> Vec<_> { fs::read_dir(folder).unwrap().map(|e| e.unwrap().path()).collect() };
-    let terrains = below(&folder.path().join("release.work/items/terrain"));
-    assert_eq!(terrains.len(), 3);
-    terrains.iter().flat_map(|item| below(item)).for_each(|result| flip(&result.join("heights.tif")));
-    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
-    let words = ", and so were 2 other results; these results were removed; run again";
-    assert!(call.code == 1 && call.stderr.contains("terrain/rough"), "{} {}", call.code, call.stderr);
-    assert!(call.stderr.contains(words), "{}", call.stderr);
-    release_in(folder.path());
-    assert_eq!(sums(&folder.path().join("release")), whole);
+    let run = ["run", "study.toml", "-o", "release", "--quiet"];
+    let shard = ["run", "study.toml", "--shard", "1/1", "--work", "release.work", "-o", "shard", "--quiet"];
+    for arguments in [run.as_slice(), shard.as_slice()] {
+        let terrains = below(&folder.path().join("release.work/items/terrain"));
+        assert_eq!(terrains.len(), 3);
+        terrains.iter().flat_map(|item| below(item)).for_each(|result| flip(&result.join("heights.tif")));
+        let call = sastrugi_in(folder.path(), arguments);
+        let words = ", and so were 2 other results; these results were removed; run again";
+        assert!(call.code == 1 && call.stderr.contains("terrain/rough"), "{} {}", call.code, call.stderr);
+        assert!(call.stderr.contains(words), "{}", call.stderr);
+        release_in(folder.path());
+        assert_eq!(sums(&folder.path().join("release")), whole);
+    }
 }
 
 /// Nothing is written into a sealed release, by whatever path it is reached.

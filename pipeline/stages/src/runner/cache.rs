@@ -4,6 +4,7 @@
 //! unfinished. Every file is flushed as it is written, the record last, then the folder; a single rename then turns the folder
 //! into a result.
 
+use super::damage::Changed;
 use super::graph::{Graph, Ingredients};
 use super::lock;
 use super::shared::Sharing;
@@ -357,12 +358,31 @@ pub fn load_record(folder: &Path) -> Option<Record> {
     are_complete(folder, &record.files).then_some(record)
 }
 
-/// Copies the files of a result and then its record into an existing folder, each flushed to disk. Shards and shared caches are copies,
-/// because they are carried elsewhere or changed by others.
+/// True if every file of a result has its recorded hash; the result is noted otherwise.
 ///
 /// # Errors
 /// I/O errors.
-pub fn copy_result(record: &Record, from: &Path, to: &Path) -> Result<(), Error> {
+pub fn is_unchanged(record: &Record, folder: &Path, changed: &Changed) -> Result<bool, Error> {
+    for file in &record.files {
+        let path = folder.join(&file.product.file);
+        let (_, sha256) = digest::of_file(&path).map_err(|e| Error::at(&path, e))?;
+        if sha256 != file.sha256 {
+            changed.note(folder, &record.item, &file.product.file);
+            return Ok(false);
+        }
+    }
+    Ok(true)
+}
+
+/// Copies the files of a result and then its record into an existing folder, each flushed to disk. Shards and shared caches are copies,
+/// because they are carried elsewhere or changed by others. A result that changed after it was written is noted instead.
+///
+/// # Errors
+/// I/O errors.
+pub fn copy_result(record: &Record, from: &Path, to: &Path, changed: &Changed) -> Result<(), Error> {
+    if !is_unchanged(record, from, changed)? {
+        return Ok(());
+    }
     for name in record.names() {
         let target = to.join(name);
         fs::copy(from.join(name), &target)

@@ -100,12 +100,13 @@ pub fn execute(
     limits: Limits,
     progress: &dyn Progress,
 ) -> Result<Execution, Stopped> {
-    let (ready, missing): (Vec<usize>, Vec<usize>) =
-        needed.iter().partition(|&&p| cache.holds(&graph.node(p).item, graph.key(p)));
     if cache.shared().is_some() {
-        let records = ready.par_iter().filter_map(|&p| cache.load(&graph.node(p).item, graph.key(p)));
+        // First, because a result that changed is removed instead, and then has to be computed.
+        let records = needed.par_iter().filter_map(|&p| cache.load(&graph.node(p).item, graph.key(p)));
         records.for_each(|record| cache.publish(&record));
     }
+    let (ready, missing): (Vec<usize>, Vec<usize>) =
+        needed.iter().partition(|&&p| cache.holds(&graph.node(p).item, graph.key(p)));
     let seconds = missing.iter().map(|&p| graph.node(p).job.estimate().seconds).sum();
     progress.begin(needed.len(), ready.len(), seconds);
     let run = Run {

@@ -5,6 +5,7 @@
 
 use super::assemble::{DestinationLock, fewer_items};
 use super::cache::{Cache, Record, StoredFile, copy_result, load_record};
+use super::damage::Changed;
 use super::execute::Failure;
 use super::graph::Graph;
 use crate::error::Error;
@@ -105,7 +106,8 @@ pub fn all_items(graph: &Graph) -> Vec<(ItemRef, String)> {
 /// Writes the folder of a shard, completely or not at all.
 ///
 /// # Errors
-/// As [`check_destination`]; the same shard with fewer failed items, unless it may be replaced; an I/O error.
+/// As [`check_destination`]; the same shard with fewer failed items, unless it may be replaced; results that changed, which are removed; an
+/// I/O error.
 pub fn write(
     target: &Path,
     loaded: &Loaded,
@@ -119,14 +121,16 @@ pub fn write(
     let replaced = occupant(target)?;
     check_occupant(replaced.as_ref(), &loaded.study, target, part, replace)?;
     let staging = Staging::beside(target)?;
+    let changed = Changed::default();
     for position in (0..graph.len()).filter(|&p| part.owns(graph.key(p))) {
         let (item, key) = (&graph.node(position).item, graph.key(position));
         if let Some(record) = cache.load(item, key) {
             let to = item_folder(staging.path(), item);
             fs::create_dir_all(&to).map_err(|e| Error::at(&to, e))?;
-            copy_result(&record, &cache.result_folder(item, key), &to)?;
+            copy_result(&record, &cache.result_folder(item, key), &to, &changed)?;
         }
     }
+    changed.remove()?;
     let owned = |f: &&Failure| graph.find(&f.item).is_some_and(|p| part.owns(graph.key(p)));
     let description = Description {
         part,

@@ -12,6 +12,7 @@
 use super::{ENTRIES, Entry, Shared, is_entry};
 use crate::error::Error;
 use crate::runner::cache::{RECORD, Record, copy_result};
+use crate::runner::damage::Changed;
 use sastrugi_store::{atomic, file};
 use std::collections::BTreeSet;
 use std::ffi::{OsStr, OsString};
@@ -151,7 +152,9 @@ impl Shared for Folder {
             return Ok(false);
         }
         let draft = self.draft().map_err(|e| Error::at(&self.root, e))?;
-        let published = copy_result(record, folder, &draft)
+        let changed = Changed::default();
+        let published = copy_result(record, folder, &draft, &changed)
+            .and_then(|()| changed.remove())
             .and_then(|()| atomic::sync_folder(&draft).map_err(|e| Error::at(&draft, e)))
             .and_then(|()| self.put_in_place(&draft, name));
         if !matches!(published, Ok(true)) {

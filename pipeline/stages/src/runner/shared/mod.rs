@@ -50,7 +50,7 @@ pub trait Shared: Debug + Send + Sync {
     /// Publishes the files in a folder as an entry; false if the entry exists already.
     ///
     /// # Errors
-    /// The place cannot be written to.
+    /// The place cannot be written to; a result that changed after it was written, which is removed.
     fn publish(&self, name: &str, record: &Record, folder: &Path) -> Result<bool, Error>;
 
     /// Notes that an entry was used, where that is cheap.

@@ -6,7 +6,8 @@
 
 use super::{Entry, Shared, is_entry};
 use crate::error::Error;
-use crate::runner::cache::{RECORD, Record};
+use crate::runner::cache::{RECORD, Record, is_unchanged};
+use crate::runner::damage::Changed;
 use sastrugi_store::objects::{Bucket, Object};
 use sastrugi_store::release::MANIFEST;
 use std::collections::BTreeMap;
@@ -50,6 +51,9 @@ impl Shared for Objects {
         if self.bucket.contains(&own)? {
             return Ok(false);
         }
+        let changed = Changed::default();
+        is_unchanged(record, folder, &changed)?;
+        changed.remove()?;
         for stored in &record.files {
             let file = &stored.product.file;
             // What a killed run left under this name is replaced.

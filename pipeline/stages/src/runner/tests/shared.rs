@@ -76,6 +76,28 @@ fn val_ready_results_are_published() {
     assert!(run_fresh(diamond, shared.path()).0.is_empty());
 }
 
+/// A ready result that changed after it was written is removed instead of published, and computed in the same run.
+#[test]
+fn val_changed_results_are_not_published() {
+    let shared = tempfile::tempdir().unwrap();
+    let bucket = Bucket::in_memory("s3://bucket/cache").unwrap();
+    let places: [Box<dyn Shared>; 2] =
+        [Box::new(Folder::open(shared.path(), false).unwrap()), Box::new(Objects::new(Arc::new(bucket), false))];
+    for place in places {
+        let area = Area::new();
+        let graph = diamond(&area);
+        run(&graph, &area.cache(), 1);
+        area.ran();
+        let cache = area.cache().sharing(Some(Sharing::new(place)));
+        fs::write(cache.result_folder(&item("b"), graph.key(1)).join(FILE), "b < A").unwrap();
+        assert_eq!(run(&graph, &cache, 1).done, all(&graph));
+        let tally = cache.shared().unwrap().tally();
+        assert_eq!((area.ran(), tally.published, tally.problems.len()), (vec!["b".to_owned()], 4, 1));
+        assert!(tally.problems.first().unwrap().starts_with("s/b: line.txt was changed"), "{:?}", tally.problems);
+        assert_eq!(text_of(&graph, &cache, 1), "b < a");
+    }
+}
+
 /// Name of a damage, and what does it to an entry.
 type Damage<'a> = (&'a str, &'a dyn Fn(&Path));
 
