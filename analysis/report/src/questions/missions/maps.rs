@@ -33,26 +33,28 @@ pub struct Drawn<'a> {
     pub terrain: &'a TerrainRow,
     /// Number of its missions by outcome.
     counts: [usize; ALL.len()],
-    /// Its missions, or a random sample of [`MISSIONS_MAX`] of them.
+    /// All its missions.
+    pub all: Vec<&'a Mission>,
+    /// Those on the map: all, or a random sample of [`MISSIONS_MAX`] of them.
     pub missions: Vec<&'a Mission>,
-    /// Their samples, by mission.
+    /// The samples of those, by mission.
     pub samples: Vec<SampleRow>,
 }
 
 /// The terrain of each group with the median share of successful missions.
 pub fn drawn<'a>(data: &'a Data, groups: &[Group<'a, Mission>]) -> Result<Vec<Drawn<'a>>, ReportError> {
-    let mut all = Vec::new();
+    let mut drawn = Vec::new();
     for group in groups.iter().take(GROUPS_MAX) {
         let Some(terrain) = middle(group).and_then(|id| data.terrain(id)) else { continue };
         let of_terrain = group.rows.iter().copied().filter(|m| m.terrain_id.as_str() == terrain.terrain_id);
-        let missions: Vec<&Mission> = of_terrain.collect();
-        let counts = outcome::counts(missions.iter().copied());
-        let missions = sample(missions, MISSIONS_MAX, &mut data.stream(&terrain.terrain_id, "missions drawn"));
+        let all: Vec<&Mission> = of_terrain.collect();
+        let counts = outcome::counts(all.iter().copied());
+        let missions = sample(all.clone(), MISSIONS_MAX, &mut data.stream(&terrain.terrain_id, "missions drawn"));
         let ids = missions.iter().map(|m| m.mission_id.as_str()).collect();
         let samples = data.files.samples(&terrain.terrain_id, &ids)?;
-        all.push(Drawn { group: group.name.clone(), terrain, counts, missions, samples });
+        drawn.push(Drawn { group: group.name.clone(), terrain, counts, all, missions, samples });
     }
-    Ok(all)
+    Ok(drawn)
 }
 
 /// Id of the terrain with the median share of successes: the lower middle of an even number, the first of equals.
@@ -83,8 +85,7 @@ pub fn figures(data: &Data, drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError>
 }
 
 fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
-    let Drawn { group, terrain, counts, missions, samples } = drawn;
-    let all: usize = counts.iter().sum();
+    let Drawn { group, terrain, counts, all, missions, samples } = drawn;
     let Some(codes) = data.files.classes(&format!("classes/{}.tif", terrain.terrain_id))? else { return Ok(None) };
     let heights = data.files.grid(&terrain.path)?;
     let picture = picture::classes(&codes, heights.as_ref(), exaggeration(terrain.rms_slope), PIXELS)?;
@@ -96,7 +97,7 @@ fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
     let occurred = ALL.iter().zip(counts).filter(|(_, n)| **n > 0);
     let outcomes: Vec<String> = occurred.map(|(o, n)| format!("{} {n}", o.name)).collect();
     let columns = ["mission_id", "outcome", "start_x_m", "start_y_m", "goal_x_m", "goal_y_m", "time_s", "path"];
-    let plain = if missions.iter().all(|m| m.variant.is_none()) { " and variant is null" } else { "" };
+    let plain = if all.iter().all(|m| m.variant.is_none()) { " and variant is null" } else { "" };
     let query = format!("terrain_id = {}{plain}", sql::quoted(&terrain.terrain_id));
     Ok(Some(Figure {
         id,
@@ -105,13 +106,17 @@ fn figure(data: &Data, drawn: &Drawn) -> Result<Option<Figure>, ReportError> {
             "{}: {} of {} reached the goal{}. Background: {} over the relief.",
             terrain.terrain_id,
             set::count(counts[0]),
-            set::counted(all, "mission"),
-            if missions.len() < all { format!("; a random sample of {MISSIONS_MAX} is drawn") } else { String::new() },
+            set::counted(all.len(), "mission"),
+            if missions.len() < all.len() {
+                format!("; a random sample of {MISSIONS_MAX} is drawn")
+            } else {
+                String::new()
+            },
             class_map_words(data)
         ),
         description: format!("Map of missions, {}; missions by outcome: {}.", extent(&codes), outcomes.join(", ")),
         svg: map.svg,
-        numbers: Numbers::select(&query, missions.iter().copied(), &columns).of_all(all),
+        numbers: Numbers::select(&query, missions.iter().copied(), &columns).of_all(all.len()),
     }))
 }
 

@@ -30,11 +30,8 @@ const SHOWN: [usize; 3] = [0, 2, 1];
 pub fn figures(data: &Data, groups: &[Group<Mission>], drawn: &[Drawn]) -> Result<Vec<Figure>, ReportError> {
     let mut figures = Vec::new();
     for kind in SHOWN {
-        let of_kind = |m: &&&Mission| outcome::index(m) == kind;
-        let mapped: Vec<&Mission> = drawn.iter().flat_map(|d| d.missions.iter().filter(of_kind).copied()).collect();
-        let all = || groups.iter().flat_map(|g| g.rows.iter().filter(of_kind).copied()).collect();
-        let Some(mission) = middle(if mapped.is_empty() { all() } else { mapped }) else { continue };
-        // Several groups may be drawn on one terrain, each with the samples of its own missions.
+        let Some(mission) = shown(kind, groups, drawn) else { continue };
+        // Several groups may be drawn on one terrain, each with the samples of its own missions; those of a large one are not all read.
         let read = drawn.iter().filter(|d| d.terrain.terrain_id == mission.terrain_id.as_str());
         let read = read.map(|d| of_mission(&d.samples, mission)).find(|samples| !samples.is_empty());
         let samples = match read {
@@ -44,6 +41,14 @@ pub fn figures(data: &Data, groups: &[Group<Mission>], drawn: &[Drawn]) -> Resul
         figures.extend((samples.len() > 2).then(|| draw(mission, &samples)));
     }
     Ok(figures)
+}
+
+/// The mission of an outcome that is shown: the middle one of all on the drawn terrains, or on all terrains if these have none.
+fn shown<'a>(kind: usize, groups: &[Group<'a, Mission>], drawn: &[Drawn<'a>]) -> Option<&'a Mission> {
+    let of_kind = |m: &&&Mission| outcome::index(m) == kind;
+    let near: Vec<&Mission> = drawn.iter().flat_map(|d| d.all.iter().filter(of_kind).copied()).collect();
+    let all = || groups.iter().flat_map(|g| g.rows.iter().filter(of_kind).copied()).collect();
+    middle(if near.is_empty() { all() } else { near })
 }
 
 /// The mission with the median vertical acceleration; those without a value come last.
@@ -180,4 +185,34 @@ fn finish(id: String, mission: &Mission, samples: &[SampleRow], heaves: &[f64], 
     numbers.columns.push(Heading { name: "vertical_acceleration_m_s2".into(), unit: "m/s2".into() });
     numbers.rows.iter_mut().zip(heaves).for_each(|(row, a)| row.push(number(*a)));
     Figure { id, title: format!("A mission with the outcome {outcome}."), caption, description, svg, numbers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::questions::missions::maps;
+
+    /// The mission shown is the median of all missions on the drawn terrains, also where their maps show a sample.
+    #[test]
+    fn val_the_mission_shown_is_the_median_of_all() {
+        let mut data = crate::tests::made_up::full(1, 24);
+        data.missions.retain(|m| m.variant.is_none());
+        let few = std::mem::take(&mut data.missions);
+        let copy = |(k, m): (usize, &Mission)| Mission {
+            mission_id: format!("{}-{k:03}", m.mission_id).into(),
+            rms_vertical_acceleration_m_s2: m.rms_vertical_acceleration_m_s2 + 1e-3 * k as f64,
+            ..m.clone()
+        };
+        data.missions = few.iter().flat_map(|m| (0..100).map(move |k| (k, m))).map(copy).collect();
+        let groups = data.mission_groups();
+        let drawn = maps::drawn(&data, &groups).unwrap();
+        assert!(drawn.len() == 3 && drawn.iter().all(|d| d.all.len() == 800 && d.missions.len() == 400));
+        for kind in SHOWN {
+            let of_kind = data.missions.iter().filter(|m| outcome::index(m) == kind);
+            let mut values: Vec<f64> = of_kind.map(|m| m.rms_vertical_acceleration_m_s2).collect();
+            values.sort_by(f64::total_cmp);
+            let expected = values[(values.len() - 1) / 2];
+            assert_eq!(shown(kind, &groups, &drawn).unwrap().rms_vertical_acceleration_m_s2, expected);
+        }
+    }
 }
