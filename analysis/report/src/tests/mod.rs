@@ -12,6 +12,7 @@ use crate::content::Block;
 use crate::data::{Against, Data, Mission};
 use crate::write::{Summary, write};
 use sastrugi_schemas::Cell;
+use sastrugi_schemas::manifest::FailedItem;
 use sastrugi_schemas::study::HypothesisItem;
 use sastrugi_schemas::tables::{LogRow, SampleRow, TerrainRow};
 use std::collections::BTreeMap;
@@ -567,6 +568,13 @@ fn prop_large_releases_are_sampled_and_say_so() {
     };
     data.missions = few.iter().flat_map(|m| (0..times).map(move |k| (k, m))).map(copy).collect();
     data.missions.sort_by(|a, b| (&a.terrain_id, &a.mission_id).cmp(&(&b.terrain_id, &b.mission_id)));
+    let failed = |k: u32| FailedItem {
+        stage: "traverse".into(),
+        item: format!("t{k:05}"),
+        error: "no start".into(),
+        parameters: serde_json::Value::Null,
+    };
+    data.failed = (0..21_000).map(failed).collect();
     let (files, _) = report(&data);
     assert_sound(&files);
     let json =
@@ -574,6 +582,9 @@ fn prop_large_releases_are_sampled_and_say_so() {
     let all = json("missions");
     assert_eq!(all["random_sample_of"].as_u64(), Some(data.missions.len() as u64));
     assert_eq!(all["rows"].as_array().unwrap().len(), crate::sample::ROWS_MAX);
+    let failed = json("failed");
+    assert_eq!(failed["random_sample_of"].as_u64(), Some(21_000));
+    assert_eq!(failed["rows"].as_array().unwrap().len(), crate::sample::ROWS_MAX);
     assert!(files["index.html"].contains("rows, a random sample of "));
     assert!(files["index.html"].contains("; a random sample of 400 is drawn"));
     // The counts are those of all.

@@ -5,6 +5,7 @@ use crate::ReportError;
 use crate::content::{Block, Numbers, TableBlock, text};
 use crate::data::Data;
 use crate::render::number as set;
+use crate::sample::{ROWS_MAX, sample};
 
 /// Registry entry.
 pub const QUESTION: Question = Question { id: "failures", name: "Missing items", title: "What is missing?", answer };
@@ -15,10 +16,11 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     let mut numbers =
         Numbers::of_file("manifest.json, failed", &[("stage", ""), ("item", ""), ("error", ""), ("parameters", "")]);
-    for item in &data.failed {
+    for item in sample(data.failed.iter().collect(), ROWS_MAX, &mut data.stream("failed", "listed")) {
         numbers.row([text(&item.stage), text(&item.item), text(&item.error), text(item.parameters.to_string())]);
     }
-    let table = TableBlock { id: "failed".into(), caption: "Failed items".into(), numbers };
+    let table =
+        TableBlock { id: "failed".into(), caption: "Failed items".into(), numbers: numbers.of_all(data.failed.len()) };
     Ok(in_words(data).map(Block::Warning).into_iter().chain([Block::Table(table)]).collect())
 }
 

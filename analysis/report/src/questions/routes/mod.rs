@@ -11,6 +11,7 @@ use crate::ReportError;
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
 use crate::render::number as set;
+use crate::sample::{ROWS_MAX, sample};
 use methods::{Method, found, geometric_mean, groups, methods};
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::RouteRow;
@@ -171,5 +172,7 @@ fn all(data: &Data) -> TableBlock {
         "steepest_down_deg",
         "path",
     ];
-    TableBlock { id: "routes".into(), caption: "All routes".into(), numbers: Numbers::select("", &data.routes, &names) }
+    let listed = sample(data.routes.iter().collect(), ROWS_MAX, &mut data.stream("routes", "listed"));
+    let numbers = Numbers::select("", listed, &names).of_all(data.routes.len());
+    TableBlock { id: "routes".into(), caption: "All routes".into(), numbers }
 }
