@@ -1,8 +1,7 @@
 //! The files of a release under construction, in little memory: a release may have a million of them.
 
 use sastrugi_schemas::manifest::{Artifact, Manifest, Origin};
-use serde::ser::{Error as _, Serialize, SerializeMap, Serializer};
-use serde_json::Value;
+use serde::ser::{Serialize, SerializeStruct, Serializer};
 use std::sync::Arc;
 
 /// A file of a release under construction. Files of one item share their origin.
@@ -66,16 +65,33 @@ pub(super) struct Listing<'a> {
 
 impl Serialize for Listing<'_> {
     fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
-        let value = serde_json::to_value(self.manifest).map_err(S::Error::custom)?;
-        let Value::Object(keys) = value else { return Err(S::Error::custom("a manifest is a JSON object")) };
-        let mut map = serializer.serialize_map(Some(keys.len()))?;
-        for (key, value) in &keys {
-            match key.as_str() {
-                "artifacts" => map.serialize_entry(key, &Files(self.files))?,
-                _ => map.serialize_entry(key, value)?,
-            }
-        }
-        map.end()
+        // Field by field, as the manifest serialises itself: a copy of it would double the memory of notes and failed items.
+        let Manifest {
+            program,
+            version,
+            format,
+            name,
+            study_sha256,
+            seed,
+            license,
+            artifacts: _,
+            sources,
+            failed,
+            notes,
+        } = self.manifest;
+        let mut fields = serializer.serialize_struct("Manifest", 11)?;
+        fields.serialize_field("program", program)?;
+        fields.serialize_field("version", version)?;
+        fields.serialize_field("format", format)?;
+        fields.serialize_field("name", name)?;
+        fields.serialize_field("study_sha256", study_sha256)?;
+        fields.serialize_field("seed", seed)?;
+        fields.serialize_field("license", license)?;
+        fields.serialize_field("artifacts", &Files(self.files))?;
+        fields.serialize_field("sources", sources)?;
+        fields.serialize_field("failed", failed)?;
+        fields.serialize_field("notes", notes)?;
+        fields.end()
     }
 }
 
