@@ -128,13 +128,13 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
 
     let there = files_of(folder)?;
     let artifacts = expected(manifest.as_ref(), &listed);
-    let names: BTreeSet<&str> = artifacts.keys().map(String::as_str).chain([MANIFEST, SUMS]).collect();
+    let names: BTreeSet<&str> = artifacts.keys().copied().chain([MANIFEST, SUMS]).collect();
     for path in there.iter().filter(|path| !names.contains(path.as_str())) {
         let what = if path.ends_with('/') { "the folder is empty" } else { "the file is not listed in the manifest" };
         problem(path, ProblemKind::Extra, what.to_owned());
     }
     let checks: Vec<(u64, Option<Problem>)> =
-        artifacts.par_iter().map(|(_, artifact)| check(folder, artifact)).collect::<Result<_, _>>()?;
+        artifacts.par_iter().map(|(path, expected)| check(folder, path, expected)).collect::<Result<_, _>>()?;
     report.files = checks.len() as u64;
     report.bytes = checks.iter().map(|(bytes, _)| bytes).sum();
     report.problems.extend(checks.into_iter().filter_map(|(_, problem)| problem));
@@ -166,26 +166,40 @@ fn parse_sums(text: &[u8]) -> BTreeMap<String, String> {
     text.lines().filter_map(|line| line.split_once("  ")).map(|(sha, path)| (path.to_owned(), sha.to_owned())).collect()
 }
 
-/// Expected files: those of the manifest, or of the checksums if the manifest is missing. The manifest's own line, which only the
+/// What a file is compared with; the rest of its manifest entry, such as its parents, is much longer.
+struct Expected<'a> {
+    /// Size; unknown for a file that only the checksums list.
+    bytes: Option<u64>,
+    sha256: &'a str,
+    /// Number of rows, if it is a table.
+    records: Option<u64>,
+}
+
+/// Expected files by path: those of the manifest, or of the checksums if the manifest is missing. The manifest's own line, which only the
 /// checksums have, is included.
-fn expected(manifest: Option<&Manifest>, listed: &BTreeMap<String, String>) -> BTreeMap<String, Artifact> {
-    let unsized_artifact = |(path, sha256): (&String, &String)| {
-        let artifact = Artifact { path: path.clone(), sha256: sha256.clone(), bytes: u64::MAX, ..Artifact::default() };
-        (path.clone(), artifact)
+fn expected<'a>(
+    manifest: Option<&'a Manifest>,
+    listed: &'a BTreeMap<String, String>,
+) -> BTreeMap<&'a str, Expected<'a>> {
+    let of_sums = |(path, sha256): (&'a String, &'a String)| {
+        (path.as_str(), Expected { bytes: None, sha256: sha256.as_str(), records: None })
+    };
+    let of_artifact = |a: &'a Artifact| {
+        (a.path.as_str(), Expected { bytes: Some(a.bytes), sha256: a.sha256.as_str(), records: a.origin.records })
     };
     match manifest {
         Some(manifest) => {
-            let own = listed.get_key_value(MANIFEST).map(unsized_artifact);
-            manifest.artifacts.iter().map(|a| (a.path.clone(), a.clone())).chain(own).collect()
+            let own = listed.get_key_value(MANIFEST).map(of_sums);
+            manifest.artifacts.iter().map(of_artifact).chain(own).collect()
         }
-        None => listed.iter().filter(|(path, _)| *path != MANIFEST).map(unsized_artifact).collect(),
+        None => listed.iter().filter(|(path, _)| *path != MANIFEST).map(of_sums).collect(),
     }
 }
 
 /// Checks one file; returns its size and the first problem found.
-fn check(folder: &Path, artifact: &Artifact) -> Result<(u64, Option<Problem>), ReleaseError> {
-    let path = folder.join(&artifact.path);
-    let problem = |kind, message| Some(Problem { path: artifact.path.clone(), kind, message });
+fn check(folder: &Path, name: &str, expected: &Expected<'_>) -> Result<(u64, Option<Problem>), ReleaseError> {
+    let path = folder.join(name);
+    let problem = |kind, message| Some(Problem { path: name.to_owned(), kind, message });
     let size = match fs::symlink_metadata(&path) {
         Ok(found) if found.is_file() => found.len(),
         Ok(_) => return Ok((0, problem(ProblemKind::Missing, "is not a regular file".to_owned()))),
@@ -194,25 +208,25 @@ fn check(folder: &Path, artifact: &Artifact) -> Result<(u64, Option<Problem>), R
         }
         Err(e) => return Err(ReleaseError::io(&path)(e)),
     };
-    if artifact.bytes != u64::MAX && size != artifact.bytes {
-        let message = format!("has {size} bytes, expected {}", artifact.bytes);
+    if let Some(bytes) = expected.bytes.filter(|bytes| *bytes != size) {
+        let message = format!("has {size} bytes, expected {bytes}");
         return Ok((size, problem(ProblemKind::Size, message)));
     }
     let (_, sha256) = digest::of_file(&path).map_err(ReleaseError::io(&path))?;
-    if sha256 != artifact.sha256 {
-        let message = format!("has SHA-256 {sha256}, expected {}", artifact.sha256);
+    if sha256 != expected.sha256 {
+        let message = format!("has SHA-256 {sha256}, expected {}", expected.sha256);
         return Ok((size, problem(ProblemKind::Checksum, message)));
     }
-    let table = check_rows(&path, artifact).err().and_then(|message| problem(ProblemKind::Table, message));
-    Ok((size, table))
+    let table = check_rows(&path, name, expected.records).err();
+    Ok((size, table.and_then(|message| problem(ProblemKind::Table, message))))
 }
 
 /// Checks a table's columns and number of rows.
-fn check_rows(path: &Path, artifact: &Artifact) -> Result<(), String> {
-    let Some(name) = table_of(&artifact.path) else { return Ok(()) };
+fn check_rows(path: &Path, name: &str, records: Option<u64>) -> Result<(), String> {
+    let Some(name) = table_of(name) else { return Ok(()) };
     let table = tables::by_name(name).ok_or_else(|| format!("table {name} does not exist in this version"))?;
     let rows = check_table(path, table).map_err(|e| e.to_string())?;
-    match artifact.origin.records {
+    match records {
         Some(expected) if expected != rows => Err(format!("has {rows} rows, expected {expected}")),
         _ => Ok(()),
     }
