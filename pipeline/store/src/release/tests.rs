@@ -165,6 +165,12 @@ fn val_added_files_have_their_hashes() {
     let incoming = |path: &str| Incoming { path: path.to_owned(), source: source.clone(), origin: Origin::default() };
     let sums = builder.add_files(vec![incoming("a/made.bin"), incoming("b/made.bin")]).unwrap();
     assert_eq!(sums, [digest::of_bytes(b"made"), digest::of_bytes(b"made")]);
+    #[cfg(unix)]
+    {
+        use std::os::unix::fs::MetadataExt;
+        // The file itself and its two places.
+        assert_eq!(fs::metadata(&source).unwrap().nlink(), 3);
+    }
     assert!(builder.add_files(vec![incoming("a/made.bin")]).is_err());
     builder.seal(&folder.path().join("release")).unwrap();
     assert_eq!(verify(&folder.path().join("release")).unwrap().problems, vec![]);
