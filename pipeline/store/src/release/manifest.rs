@@ -61,6 +61,9 @@ impl<'de, F: FnMut(Artifact)> Visitor<'de> for Parts<F> {
     fn visit_map<A: MapAccess<'de>>(mut self, mut map: A) -> Result<Self::Value, A::Error> {
         let mut rest = Map::new();
         while let Some(key) = map.next_key::<String>()? {
+            if rest.contains_key(&key) {
+                return Err(A::Error::custom(format!("duplicate field `{key}`")));
+            }
             let value = match key.as_str() {
                 "artifacts" => {
                     map.next_value_seed(Files(&mut self.0))?;

@@ -153,6 +153,14 @@ fn prop_a_manifest_read_piece_by_piece_is_the_same() {
         assert!(matches!(refused, Err(ReleaseError::NotARelease { .. })), "{to}: {refused:?}");
         assert!(Release::open(&dest).is_err(), "{to}");
     }
+    for (key, value) in [("seed", "7"), ("artifacts", "[]"), ("failed", "[]")] {
+        let from = format!("\"{key}\": ");
+        assert!(text.contains(&from), "{from}");
+        fs::write(dest.join(MANIFEST), text.replacen(&from, &format!("{from}{value}, {from}"), 1)).unwrap();
+        let refused = for_each_artifact(&dest, drop).unwrap_err().to_string();
+        assert!(refused.contains(&format!("duplicate field `{key}`")), "{refused}");
+        assert!(Release::open(&dest).unwrap_err().to_string().contains(&format!("duplicate field `{key}`")), "{key}");
+    }
 }
 
 /// A file that is added from the same file system is not copied, and has its own hash.
