@@ -69,8 +69,11 @@ pub(crate) fn joined(objects: &[&str]) -> String {
 }
 
 /// A recipe from its text.
+///
+/// # Panics
+/// When the text is not JSON (a bug): another value would hide what the key was made from.
 pub(crate) fn parsed(recipe: &str) -> Value {
-    serde_json::from_str(recipe).unwrap_or_default()
+    serde_json::from_str(recipe).unwrap_or_else(|e| panic!("{recipe:?} is not JSON: {e}"))
 }
 
 /// Rough cost of an item on one core.

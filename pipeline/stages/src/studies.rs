@@ -374,6 +374,7 @@ pub fn run_text(
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::jobs::{roughness, terrain, traverse};
     use crate::registry::Form;
     use crate::study::keys::properties;
     use crate::study::{Refusals, StudyError};
@@ -406,16 +407,37 @@ mod tests {
         assert!(summary.stale.iter().all(|item| item.reason == "new"));
     }
 
-    /// The text that goes into a key is that of the recipe, however a job keeps it, also beside groups, variants and odd characters.
+    /// The text that goes into a key is that of the recipe with all its keys, once each, however a job keeps it, also beside groups,
+    /// variants and odd characters.
     #[test]
     fn prop_recipes_and_their_texts_agree() {
         let odd = STUDY.replace("id = \"t\"\n", "id = \"t\"\ngroup = \"\\\"a é\"\n");
-        for text in [STUDY, &odd] {
+        // Jobs that keep their recipe as text.
+        let keys: [(&str, &[&str]); 3] = [
+            (terrain::STAGE, &["kind", "params"]),
+            (roughness::STAGE, &["section", "group", "variant", "kind", "params", "path"]),
+            (
+                traverse::STAGE,
+                &["traverse", "vehicle", "starts", "rasters", "terrain", "group", "variant", "missions", "study"],
+            ),
+        ];
+        for (text, group) in [(STUDY, None), (odd.as_str(), Some("\"a é"))] {
             let loaded = load_text(text, "study", Path::new("")).unwrap();
+            let mut found = 0;
             for (position, node) in loaded.graph.nodes().iter().enumerate() {
-                assert_eq!(node.job.recipe_text(), node.job.recipe().to_string(), "{}", node.item);
-                assert!(node.job.recipe().is_object() && loaded.graph.key(position).len() == 32);
+                let recipe = node.job.recipe();
+                assert_eq!(node.job.recipe_text(), recipe.to_string(), "{}", node.item);
+                assert!(recipe.is_object() && loaded.graph.key(position).len() == 32);
+                let Some((stage, expected)) = keys.iter().find(|(stage, _)| *stage == node.item.stage) else {
+                    continue;
+                };
+                assert!(recipe.as_object().unwrap().keys().eq(expected.iter()), "{}: {recipe}", node.item);
+                let is_named = *stage == terrain::STAGE || group.is_none_or(|group| recipe["group"] == group);
+                assert!(is_named, "{}: {recipe}", node.item);
+                found += 1;
             }
+            // Four terrains in three stages.
+            assert_eq!(found, 12);
         }
     }
 
