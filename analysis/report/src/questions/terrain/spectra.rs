@@ -48,13 +48,10 @@ pub fn spectra(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         };
         let caption = format!(
             "Radially averaged two-dimensional power spectral density, one line per terrain{}{of_slope}",
-            sampled(data, group)
+            sampled(data, group).map_or_else(String::new, |sample| format!(", for {sample}"))
         );
-        let description = format!(
-            "Log-log spectra of {}; median slope {}.",
-            set::counted(curves.len(), "terrain"),
-            set::fixed(middle, 2)
-        );
+        let (drawn, of_all) = in_words(data, group, curves);
+        let description = format!("Log-log spectra of {drawn}; median slope{of_all} {}.", set::fixed(middle, 2));
         let rows: Vec<&PsdRow> = group.rows.iter().flat_map(|t| data.spectrum(&t.terrain_id)).collect();
         let all = of_whole_group(data, group, rows.len());
         let names = ["surface_id", "bin", "frequency_cycles_m", "psd_m4", "modes"];
@@ -76,9 +73,9 @@ pub fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         let id = file_id("heights", group);
         let plot = curves::distributions(&id, curves, ranges);
         let [skewness, kurtosis] = [median(&group.rows, |t| t.skewness), median(&group.rows, |t| t.kurtosis)];
+        let (drawn, of_all) = in_words(data, group, curves);
         let description = format!(
-            "Height distributions of {}; median skewness {}, median kurtosis {} (3 for a normal distribution).",
-            set::counted(curves.len(), "terrain"),
+            "Height distributions of {drawn}; median skewness{of_all} {}, median kurtosis {} (3 for a normal distribution).",
             set::fixed(skewness, 2),
             set::fixed(kurtosis, 2)
         );
@@ -90,10 +87,7 @@ pub fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
             rows,
             &names,
         );
-        let caption = match sampled(data, group) {
-            words if words.is_empty() => description.clone(),
-            words => format!("{description} Lines are those{words}."),
-        };
+        let caption = description.clone();
         finish(id, format!("Heights, group {}.", group.name), &caption, description, plot, numbers.of_all(all))
     };
     drawn.iter().map(figure).collect()
@@ -104,13 +98,17 @@ fn kept(data: &Data, group: &Group<TerrainRow>) -> usize {
     group.rows.iter().filter(|t| !data.without_curves.contains(&t.terrain_id)).count()
 }
 
-/// Of how many terrains the lines are a sample, in words; empty if every terrain has one.
-fn sampled(data: &Data, group: &Group<TerrainRow>) -> String {
+/// Of how many terrains the lines are a sample, in words; `None` if every terrain has one.
+fn sampled(data: &Data, group: &Group<TerrainRow>) -> Option<String> {
     let (kept, all) = (kept(data, group), group.rows.len());
-    if kept == all {
-        String::new()
-    } else {
-        format!(" of a random sample of {} of the {}", set::count(kept), set::count(all))
+    (kept < all).then(|| format!("a random sample of {} of {}", set::count(kept), set::count(all)))
+}
+
+/// The terrains whose curves are drawn, and what the medians are of where these are not all.
+fn in_words(data: &Data, group: &Group<TerrainRow>, curves: &[Curve]) -> (String, &'static str) {
+    match sampled(data, group) {
+        Some(sample) => (format!("{sample} terrains"), " of all terrains"),
+        None => (set::counted(curves.len(), "terrain"), ""),
     }
 }
 
@@ -125,4 +123,39 @@ fn file_id(what: &str, group: &Group<TerrainRow>) -> String {
 
 fn finish(id: String, title: String, caption: &str, description: String, plot: Plot, numbers: Numbers) -> Figure {
     Figure { id, title, caption: caption.into(), description, svg: plot.svg, numbers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Of a group with many terrains, lines are of a sample and medians of all; both are named as what they are.
+    #[test]
+    fn val_lines_of_a_sample_and_medians_of_all_are_told_apart() {
+        let mut data = crate::tests::made_up::full(3, 24);
+        let texts = |data: &Data| {
+            let groups = data.terrain_groups();
+            let [psd, heights] =
+                [spectra(data, &groups), distributions(data, &groups)].map(|mut all| all.swap_remove(0));
+            assert_eq!(heights.caption, heights.description);
+            (psd.caption, psd.description, heights.description, psd.numbers.sampled_of.is_some())
+        };
+        let (caption, psd, heights, is_sampled) = texts(&data);
+        assert!(caption.starts_with("Radially averaged two-dimensional power spectral density, one line per terrain"));
+        assert!(!caption.contains("sample") && !is_sampled, "{caption}");
+        assert!(psd.starts_with("Log-log spectra of 3 terrains; median slope \u{2212}3.60"), "{psd}");
+        assert!(heights.starts_with("Height distributions of 3 terrains; median skewness 0.10,"), "{heights}");
+        data.without_curves = ["d2.30-0001".to_owned()].into();
+        let without = data.without_curves.clone();
+        data.psd.retain(|row| !without.contains(&row.surface_id));
+        data.heights.retain(|row| !without.contains(&row.surface_id));
+        let (caption, psd, heights, is_sampled) = texts(&data);
+        assert!(caption.contains(", one line per terrain, for a random sample of 2 of 3") && is_sampled, "{caption}");
+        let of_sample = "a random sample of 2 of 3 terrains; median";
+        assert!(psd.starts_with(&format!("Log-log spectra of {of_sample} slope of all terrains ")), "{psd}");
+        assert!(
+            heights.starts_with(&format!("Height distributions of {of_sample} skewness of all terrains ")),
+            "{heights}"
+        );
+    }
 }
