@@ -77,7 +77,7 @@ fn val_synthetic_releases_are_releases() {
     assert!(page.contains("<b>140</b> missions") && page.contains("<b>7</b> terrains"), "{}", &page[..2000]);
 }
 
-/// The files of a release are those of the work area under further names: nothing is copied on one file system.
+/// The files of a release are hard links to those of the work area: nothing is copied on one file system.
 #[cfg(unix)]
 #[test]
 fn val_files_of_a_release_are_linked() {

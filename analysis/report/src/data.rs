@@ -164,7 +164,7 @@ pub struct Against {
     pub data: Box<Data>,
 }
 
-/// Most terrains of a group whose curves (spectra, structure functions, histograms) are kept.
+/// Maximum number of terrains of a group whose curves (spectra, structure functions, histograms) are kept.
 pub const CURVES_MAX: usize = 200;
 
 /// The generated terrains beyond a random sample of [`CURVES_MAX`] of each group and variant.

@@ -2,7 +2,7 @@
 
 use sastrugi_numeric::Stream;
 
-/// Most rows of a table or behind a figure under `data/`.
+/// Maximum number of rows of a table or behind a figure under `data/`.
 pub const ROWS_MAX: usize = 20_000;
 
 /// `most` of the items, each equally likely, in their order; all of them if there are no more. By Knuth's algorithm S (The Art of Computer

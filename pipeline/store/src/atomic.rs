@@ -181,8 +181,8 @@ pub fn write<'a>(target: impl Into<Target<'a>>, bytes: &[u8]) -> io::Result<()> 
     file.commit()
 }
 
-/// Gives a complete file that is on disk a further name, or, where the file system has no such names for it (another file system, too many
-/// names), copies it and syncs the copy. The content of both is shared, so neither may be changed in place. The folder is not synced.
+/// Makes a hard link to a complete file that is on disk, or, where the file system allows none (another file system, too many links), copies
+/// it and syncs the copy. Links share their content, so neither file may be changed in place. The folder is not synced.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
@@ -315,7 +315,7 @@ mod tests {
         assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1);
     }
 
-    /// On one file system both names are of one file; a copy has the same bytes, and neither overwrites a file.
+    /// On one file system a hard link is made; a copy has the same bytes, and neither overwrites a file.
     #[test]
     fn val_files_are_linked_or_copied() {
         let folder = tempfile::tempdir().unwrap();

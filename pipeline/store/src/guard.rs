@@ -1,4 +1,4 @@
-//! Decoders of others that panic on some damaged files.
+//! Third-party decoders that panic on some damaged files.
 
 use std::cell::Cell;
 use std::panic::{self, AssertUnwindSafe};
@@ -35,9 +35,9 @@ fn silence_decoders() {
 mod tests {
     use super::*;
 
-    /// A panic ends a decoder without a value, and decoding with it.
+    /// A panic yields `None` and clears the flag.
     #[test]
-    fn val_a_panic_is_no_value() {
+    fn val_a_panic_yields_none() {
         assert_eq!(unless_panicking(|| 7), Some(7));
         assert_eq!(unless_panicking(|| unless_panicking(|| Vec::<u8>::new()[3])), Some(None));
         assert!(!DECODING.get());

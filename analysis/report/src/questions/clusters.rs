@@ -180,7 +180,7 @@ mod tests {
         }
     }
 
-    /// Two groups share pairs if any mission of one has the pair of a mission of the other; a pair that is twice in one group is none.
+    /// Two groups share pairs if any mission of one has the pair of a mission of the other; a pair that is twice in one group does not count.
     #[test]
     fn val_pairs_between_groups() {
         let missions = crate::tests::made_up::full(1, 24).missions;

@@ -93,7 +93,7 @@ fn block(block: &Block) -> String {
 
 /// Of how many rows these are a sample, in words; empty if these are all.
 fn sampled(numbers: &Numbers) -> String {
-    numbers.sampled_of.map_or_else(String::new, |all| format!(", a random sample of {}", number::count(all)))
+    numbers.sampled_of.map_or_else(String::new, |all| format!(", a random sample of the {}", number::count(all)))
 }
 
 /// A single sentence is shown; several are folded under their summary.

@@ -585,7 +585,7 @@ fn prop_large_releases_are_sampled_and_say_so() {
     let failed = json("failed");
     assert_eq!(failed["random_sample_of"].as_u64(), Some(21_000));
     assert_eq!(failed["rows"].as_array().unwrap().len(), crate::sample::ROWS_MAX);
-    assert!(files["index.html"].contains("rows, a random sample of "));
+    assert!(files["index.html"].contains("rows, a random sample of the "));
     assert!(files["index.html"].contains("; a random sample of 400 is drawn"));
     // The counts are those of all.
     let outcomes = rows(&files, "outcomes");

@@ -170,7 +170,7 @@ impl ReleaseBuilder {
     }
 
     /// Adds files to the release, several at a time; returns their SHA-256 in the same order. On the file system of the release they get a
-    /// further name, and must not be changed in place any more; from elsewhere they are copied.
+    /// hard link, and must not be changed in place any more; from elsewhere they are copied.
     ///
     /// # Errors
     /// A path is not allowed, or a file cannot be read or written.

@@ -167,7 +167,10 @@ pub fn figure(data: &Data, compared: &Compared) -> Option<Figure> {
     };
     let of_outliers = match samples.iter().any(|s| s.plot.outliers.len() > OUTLIERS_MAX) {
         true => {
-            format!(" Of more than {OUTLIERS_MAX} values beyond the whiskers of a group, a random sample is drawn.")
+            format!(
+                " Where more than {OUTLIERS_MAX} values of a group lie beyond the whiskers, {OUTLIERS_MAX} of them, drawn at random, \
+                 are shown."
+            )
         }
         false => String::new(),
     };
