@@ -63,7 +63,7 @@ def test_wrong_values_are_named():
     for call, said in [
         (lambda: Fit({"model": "exponential", "parameters": {"sigma_m": "3 cm"}}), 'not a fit: `parameters.sigma_m` must be a number, got "3 cm"'),
         (lambda: Fit({"model": 3, "parameters": {}}), "not a fit: `model` must be text in quotes, got 3"),
-        (lambda: snow().texture(4.0, "fine"), '`cell_m` must be a number, got "fine"'),
+        (lambda: snow().texture(4.0, "fine"), "`cell_m` must be a number, or two numbers: east-west and north-south, m"),
         (lambda: sastrugi.analyze(["a.mcap"], rate_hz="fast"), '`rate_hz` must be a number, got "fast"'),
         (lambda: sastrugi.analyze(["a.mcap"], differentiator="best"), "`differentiator` has the unknown value `best`; known: "),
         (lambda: sastrugi.roughness(snow().texture(4.0, 0.1), band=(5.0, 1.0)), "`band 5:1`: "),
