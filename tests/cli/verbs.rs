@@ -676,6 +676,12 @@ fn val_traverse_makes_a_release_of_its_own() {
     ok_json(path, &arguments);
     ok(path, &["verify", "drive"]);
     assert_eq!(sums(&path.join("drive")).keys().filter(|p| p.ends_with(".mcap")).count(), 2);
+    // Another DEM is another study.
+    ok(path, &["terrain", "weierstrass_mandelbrot", "--seed", "9", "--set", "size_px=[300,300]", "-o", "u.tif"]);
+    let before = sums(&path.join("drive"));
+    let refused = sastrugi_in(path, &[&["traverse", "u.tif"][..], &arguments[2..]].concat());
+    assert!(refused.code == 2 && refused.stderr.contains("is a release over another DEM"), "{}", refused.stderr);
+    assert_eq!(sums(&path.join("drive")), before);
     let coarse = sastrugi_fixtures::jacksboro();
     let refused = sastrugi_in(path, &["traverse", coarse.to_str().unwrap(), "-o", "no", "--quiet"]);
     assert_ne!(refused.code, 0);

@@ -818,7 +818,7 @@ pub struct Traverse {
     /// Number of starts per mission: the drawn one and perturbed ones, to estimate the probability of success.
     #[arg(long, value_name = "N")]
     pub replicates: Option<u32>,
-    /// Also replace a release of another study, or one with fewer failed items than the new one.
+    /// Also replace a release of another study, over another DEM, or with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Seed of the random streams.
@@ -870,7 +870,7 @@ pub struct Navigate {
     /// Set a parameter of the team (see `kinds`), `name=value`.
     #[arg(long = "team", value_name = "K=V", requires = "formation")]
     pub team: Vec<String>,
-    /// Also replace a release of another study, or one with fewer failed items than the new one.
+    /// Also replace a release of another study, over another DEM, or with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Date of the release.
@@ -895,7 +895,7 @@ pub struct Rover {
     /// Release folder and work area.
     #[command(flatten)]
     pub place: Place,
-    /// Also replace a release of another study, or one with fewer failed items than the new one.
+    /// Also replace a release of another study, of the whole study, or with fewer failed items than the new one.
     #[arg(long)]
     pub replace: bool,
     /// Limit on the working memory of concurrent items, GiB; items that need more are refused. Default: 4, and larger items run alone.

@@ -358,7 +358,7 @@ pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Pr
 /// Runs a study composed by a verb and writes its release.
 ///
 /// # Errors
-/// As [`run`].
+/// As [`run`]; a destination with a release over another DEM.
 pub fn run_text(
     text: &str,
     folder: &Path,
@@ -368,7 +368,29 @@ pub fn run_text(
     // Before the study, whose input may be refused.
     check_local(request.output)?;
     let loaded = load_text(text, "this command", folder)?;
+    check_other_dem(&loaded, request.output, request.replace)?;
     run(&loaded, request, progress)
+}
+
+/// Refuses a destination with a release over another DEM, unless it may be replaced: all studies that a verb composes have its name, so the
+/// name does not tell them apart.
+fn check_other_dem(loaded: &Loaded, dest: &Path, replace: bool) -> Result<(), Error> {
+    let is_given = |sha256: &str| {
+        let mut originals = loaded.graph.nodes().iter().filter(|node| node.item.stage == original::STAGE);
+        originals.any(|node| node.inputs.first().is_some_and(|dem| dem.sha256 == sha256))
+    };
+    let mut is_there = false;
+    let manifest = release::for_each_artifact(dest, |artifact| {
+        is_there |= artifact.origin.stage == original::STAGE && is_given(&artifact.sha256);
+    });
+    match manifest {
+        // A release of another name is refused as one of another study.
+        Ok(there) if there.name == loaded.study.head.name && !is_there && !replace => Err(Error::Usage(format!(
+            "{} is a release over another DEM; choose another folder with -o, or use --replace to replace it",
+            dest.display()
+        ))),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]
@@ -376,6 +398,7 @@ mod tests {
     use super::*;
     use crate::jobs::{roughness, terrain, traverse};
     use crate::registry::Form;
+    use crate::runner::assemble::head;
     use crate::study::keys::properties;
     use crate::study::{Refusals, StudyError};
     use proptest::collection::{btree_map, vec};
@@ -383,6 +406,8 @@ mod tests {
     use proptest::prelude::*;
     use proptest::sample::select;
     use sastrugi_schemas::kind::schema_of;
+    use sastrugi_schemas::manifest::Origin;
+    use sastrugi_store::release::ReleaseBuilder;
 
     const STUDY: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
         count = 2\nsize_px = [64, 64]\nhigh.fractal_dimension = 2.5\nsweep.cell_m = [0.05, 0.1]\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\n\n\
@@ -504,6 +529,34 @@ mod tests {
         assert!(check("file", None, None).contains("is a file; -o must be a folder"));
         assert_eq!(check("new", Some("new.work"), None), "");
         assert!(check("new", Some("empty/../new/work"), None).contains("the work area lies inside the output folder"));
+    }
+
+    /// A release over the given DEM may be replaced, whatever else changed; one over another DEM only on request.
+    #[test]
+    fn val_a_release_over_another_dem_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let dest = folder.path().join("release");
+        let study = |name: &str, heights: &str| {
+            fs::write(folder.path().join("site.asc"), heights).unwrap();
+            let head = format!("[study]\nname = \"{name}\"\nseed = 1\ndate = \"2026-01-01\"\n");
+            let text = format!("{head}[[dem]]\nid = \"dem\"\nfile = \"site.asc\"\n");
+            load_text(&text, "study", folder.path()).unwrap()
+        };
+        let said = |loaded: &Loaded, replace| {
+            check_other_dem(loaded, &dest, replace).err().map(|e| e.to_string()).unwrap_or_default()
+        };
+        let one = study("traverse", "heights");
+        assert_eq!(said(&one, false), "");
+        let mut builder = ReleaseBuilder::beside(&dest, head(&one.study, &one.released)).unwrap();
+        let origin = Origin { stage: original::STAGE.to_owned(), item: "dem".to_owned(), ..Origin::default() };
+        builder.write_text("dem/dem.asc", "heights", origin).unwrap();
+        builder.seal(&dest).unwrap();
+        assert_eq!(said(&one, false), "");
+        let other = study("traverse", "other heights");
+        let refused = said(&other, false);
+        assert!(refused.contains("release is a release over another DEM; choose another folder with -o"), "{refused}");
+        assert_eq!(said(&other, true), "");
+        assert_eq!(said(&study("navigate", "other heights"), false), "", "the name is refused later");
     }
 
     /// Beside other errors a missing file is one refusal more, at the table that names it; alone it is missing input.

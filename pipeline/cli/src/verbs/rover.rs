@@ -17,11 +17,12 @@ const RANKED: usize = 10;
 pub fn rover(args: &Rover, common: &Common) -> Verdict {
     let share = args.perturb.as_deref().map(share).transpose()?;
     let limits = limits(args.memory)?;
-    let loaded = load(&args.study, &Request { share, trajectories: args.trajectories })?;
+    let rovers = load(&args.study, &Request { share, trajectories: args.trajectories })?;
     let Place { output, work } = &args.place;
     let (work, replace) = (work.as_deref(), args.replace);
+    rovers.check_destination(output, replace)?;
     let request = RunRequest { output, work, part: None, purpose: Some(PURPOSE), replace, limits };
-    let (run, mut text) = watch(common, |reporter| Ok(studies::run(&loaded, &request, reporter)?))?;
+    let (run, mut text) = watch(common, |reporter| Ok(studies::run(&rovers.loaded, &request, reporter)?))?;
     let summary = summary(&run.output)?;
     text.push_str("\n\n");
     text.push_str(&trials(&summary));

@@ -4,6 +4,7 @@
 //! the same release.
 
 use crate::error::Error;
+use crate::job::ItemRef;
 use crate::jobs::{rover, rover_designs, rover_effects};
 use crate::loaded::{Loaded, load_text, read};
 use sastrugi_mobility::rover::Ending;
@@ -12,10 +13,10 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::study::Perturb;
 use sastrugi_schemas::tables::{RoverEffectRow, RoverRow};
 use sastrugi_statistics::{Interval, cluster_interval, proportion};
-use sastrugi_store::release::Release;
+use sastrugi_store::release::{Release, for_each_artifact};
 use serde::Serialize;
 use serde_json::Value;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::{BTreeMap, BTreeSet, HashSet};
 use std::path::Path;
 use toml_edit::{DocumentMut, InlineTable, Item, TableLike};
 
@@ -59,11 +60,46 @@ pub fn share(text: &str) -> Result<f64, Error> {
     }
 }
 
+/// The rover trials of a study.
+pub struct Trials {
+    /// The study, reduced to them.
+    pub loaded: Loaded,
+    /// Items of the complete study that it lacks.
+    left_out: HashSet<ItemRef>,
+}
+
+impl Trials {
+    /// Refuses a destination with a release of the complete study, which the release of the trials would replace by a part, unless it may be
+    /// replaced.
+    ///
+    /// # Errors
+    /// Such a destination.
+    pub fn check_destination(&self, dest: &Path, replace: bool) -> Result<(), Error> {
+        let mut lost = None;
+        let manifest = for_each_artifact(dest, |artifact| {
+            let item = ItemRef { stage: artifact.origin.stage, id: artifact.origin.item };
+            if lost.is_none() && self.left_out.contains(&item) {
+                lost = Some(item);
+            }
+        });
+        match (manifest, lost) {
+            // A release of another name is refused as one of another study.
+            (Ok(there), Some(item)) if there.name == self.loaded.study.head.name && !replace => {
+                Err(Error::Usage(format!(
+                    "{} is a release with more than the rovers of this study, such as {item}; choose another folder with -o, or use --replace to replace it",
+                    dest.display()
+                )))
+            }
+            _ => Ok(()),
+        }
+    }
+}
+
 /// Loads the rover trials of a study.
 ///
 /// # Errors
 /// A study that is invalid or has no rovers; trajectories without a perturbation.
-pub fn load(study: &Path, request: &Request) -> Result<Loaded, Error> {
+pub fn load(study: &Path, request: &Request) -> Result<Trials, Error> {
     let (text, name, folder) = (read(study)?, study.display().to_string(), study.parent().unwrap_or(Path::new("")));
     let whole = load_text(&text, &name, folder)?;
     let wanted = (0..whole.graph.len()).filter(|&p| STAGES.contains(&whole.graph.node(p).item.stage.as_str()));
@@ -75,7 +111,12 @@ pub fn load(study: &Path, request: &Request) -> Result<Loaded, Error> {
     }
     let origins = needed.iter().filter_map(|&p| whole.origins.get(&whole.graph.node(p).item.id));
     let edited = edit(&text, &origins.copied().collect(), request).map_err(|e| Error::Usage(format!("{name}: {e}")))?;
-    load_text(&edited, &name, folder)
+    let loaded = load_text(&edited, &name, folder)?;
+    // In ascending order. A table is kept with all its items, also those that no rover needs.
+    let is_needed = |p: usize| needed.binary_search(&p).is_ok();
+    let items = whole.graph.nodes().iter().enumerate().filter(|(p, _)| !is_needed(*p)).map(|(_, node)| &node.item);
+    let left_out = items.filter(|item| loaded.graph.find(item).is_none()).cloned().collect();
+    Ok(Trials { loaded, left_out })
 }
 
 /// The study's text, reduced to what rovers need and perturbed as requested.
@@ -272,6 +313,9 @@ fn of_trial(rows: &[RoverRow], stream: &mut Stream) -> TrialSummary {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::runner::assemble::head;
+    use sastrugi_schemas::manifest::Origin;
+    use sastrugi_store::release::ReleaseBuilder;
 
     const STUDY: &str = "# A study.\n[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"a\"\nkind = \"multifractal\"\n\
         count = 2\nsize_px = [64, 64]\n\n# Not for rovers.\n[[terrain]]\nid = \"b\"\nkind = \"multifractal\"\nsize_px = [64, 64]\n\n\
@@ -283,7 +327,35 @@ mod tests {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("study.toml");
         std::fs::write(&path, text).unwrap();
-        load(&path, &request).map_err(|e| e.to_string())
+        load(&path, &request).map(|trials| trials.loaded).map_err(|e| e.to_string())
+    }
+
+    /// A release with what the trials leave out is the whole study's. Items that the trials share with it, or that were perturbed otherwise, are
+    /// no reason to keep it.
+    #[test]
+    fn val_a_release_of_the_whole_study_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let [path, dest] = ["study.toml", "release"].map(|name| folder.path().join(name));
+        std::fs::write(&path, STUDY).unwrap();
+        let trials = load(&path, &Request { trajectories: Some(2), ..Request::default() }).unwrap();
+        let said = |replace| trials.check_destination(&dest, replace).err().map(|e| e.to_string()).unwrap_or_default();
+        assert_eq!(said(false), "");
+        let whole = load_text(STUDY, "study", folder.path()).unwrap();
+        let release_of = |is_kept: &dyn Fn(&ItemRef) -> bool| {
+            let mut builder = ReleaseBuilder::beside(&dest, head(&whole.study, &whole.released)).unwrap();
+            for item in whole.graph.nodes().iter().map(|node| &node.item).filter(|item| is_kept(item)) {
+                let origin = Origin { stage: item.stage.clone(), item: item.id.clone(), ..Origin::default() };
+                builder.write_text(&format!("{item}.txt"), "made", origin).unwrap();
+            }
+            builder.seal(&dest).unwrap();
+        };
+        release_of(&|item| item.id != "b" && !item.id.starts_with("m"));
+        assert_eq!(said(false), "");
+        release_of(&|item| item.id == "b");
+        let refused = said(false);
+        assert!(refused.contains("release is a release with more than the rovers of this study, such as"), "{refused}");
+        assert!(refused.contains("/b; choose another folder with -o, or use --replace"), "{refused}");
+        assert_eq!(said(true), "");
     }
 
     #[test]

@@ -32,7 +32,7 @@ pub struct Place<'a> {
     pub output: &'a Path,
     /// Work area; default: `<output>.work`.
     pub work: Option<&'a Path>,
-    /// Whether to replace a release of another study, or one with fewer failed items.
+    /// Whether to replace a release of another study, over another DEM, or with fewer failed items.
     pub replace: bool,
     /// Limits.
     pub limits: Limits,
