@@ -176,13 +176,14 @@ fn val_addresses_are_checked_first() {
     let folder = area();
     let path = folder.path();
     write(path, "study.toml", &small_study());
-    let cases: [(&[&str], &str); 10] = [
+    let cases: [(&[&str], &str); 11] = [
         (&["-o", "s3://"], "expected s3://bucket"),
         (&["-o", "s3:///a"], "expected s3://bucket"),
         (&["-o", "a", "--cache", "s3://b/../c"], "expected s3://bucket"),
         (&["-o", "s3://b/part-1", "--shard", "1/2"], "a shard is a folder"),
         (&["-o", "gs://b/c"], "give a folder, or s3://bucket/prefix"),
         (&["-o", "a", "--work", "s3://b/c"], "give a path on this machine"),
+        (&["-o", "s3://b/c", "--work", "gs://b"], "give a path on this machine"),
         (&["-o", "a", "--cache", "gs://b/c"], "give a folder, or s3://bucket/prefix"),
         (&["-o", "a", "--cache", "S3://b/c"], "give a folder, or s3://bucket/prefix"),
         (&["-o", "a", "--cache", "s3:/bucket"], "give a folder, or s3://bucket/prefix"),

@@ -65,6 +65,7 @@ pub fn releasing(
     make: impl FnOnce(&Path, Option<&Path>) -> Result<RunSummary, Error>,
 ) -> Result<RunSummary, Error> {
     check_place(output)?;
+    work.map_or(Ok(()), check_local)?;
     let Some(address) = address(output) else { return make(output, work) };
     // Opened first: what is wrong with it should not come to light after the run.
     let bucket = Bucket::open(address)?;
@@ -253,6 +254,8 @@ mod tests {
             assert!(said(check_place(Path::new(other))).contains("give a folder, or s3://bucket/prefix"), "{other}");
             assert!(said(check_local(Path::new(other))).contains("give a path on this machine"), "{other}");
         }
+        let made = releasing(Path::new("s3://b/c"), Some(Path::new("gs://b")), &Silent, |_, _| panic!("made"));
+        assert!(said(made.map(drop)).contains("gs://b: an address cannot be written to here"));
         assert!(check_place(Path::new("s3://b/c")).is_ok() && check_local(Path::new("s3://b/c")).is_err());
         for check in [check_place, check_local] {
             assert!(check(Path::new("release")).is_ok());
