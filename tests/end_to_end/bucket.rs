@@ -97,8 +97,8 @@ fn val_a_bucket_is_cache_and_place_of_a_release() {
     // The same release again is no change.
     succeeds(&server.call(path, &merge));
     succeeds(&server.call(path, &["run", "study.toml", "-o", "s3://terrains/small", "--quiet"]));
-    // Another one is refused, and nothing of it is uploaded.
-    write(path, "study.toml", &small_study().replace("seed = 7", "seed = 8"));
+    // Another one is refused for what is at the address, not for the copy in the work area, and nothing of it is uploaded.
+    write(path, "study.toml", &small_study().replace("name = \"small\"", "name = \"other\""));
     let call = server.call(path, &["run", "study.toml", "-o", "s3://terrains/small", "--quiet"]);
     assert!(
         call.code == 2 && call.stderr.contains("another release is there already"),

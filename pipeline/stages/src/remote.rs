@@ -54,28 +54,42 @@ pub fn check_local(output: &Path) -> Result<(), Error> {
     Ok(())
 }
 
-/// Makes a release: in its folder, or in the work area and then in an object store. `make` gets the folder and the work area.
+/// Makes a release: in its folder, or in the work area and then in an object store. `make` gets the folder, the work area, and whether to
+/// replace what is in the folder.
 ///
 /// # Errors
 /// Those of `make`; a store that fails; another release at the address.
 pub fn releasing(
     output: &Path,
     work: Option<&Path>,
+    replace: bool,
     progress: &dyn Progress,
-    make: impl FnOnce(&Path, Option<&Path>) -> Result<RunSummary, Error>,
+    make: impl FnOnce(&Path, Option<&Path>, bool) -> Result<RunSummary, Error>,
 ) -> Result<RunSummary, Error> {
     check_place(output)?;
     work.map_or(Ok(()), check_local)?;
-    let Some(address) = address(output) else { return make(output, work) };
+    let Some(address) = address(output) else { return make(output, work, replace) };
     // Opened first: what is wrong with it should not come to light after the run.
     let bucket = Bucket::open(address)?;
     let work = work.map_or_else(|| default_work(&local_name(address)), Path::to_owned);
-    // Marks the folder as a work area, and refuses any other.
-    drop(Cache::open(&work)?);
-    let folder = work.join("release");
-    let summary = make(&folder, Some(&work))?;
-    upload(&Release::open(&folder)?, &bucket, progress)?;
+    let summary = releasing_to(&bucket, &work, progress, make)?;
     Ok(RunSummary { output: output.to_owned(), ..summary })
+}
+
+/// Makes a release in the work area and uploads it.
+fn releasing_to(
+    bucket: &Bucket,
+    work: &Path,
+    progress: &dyn Progress,
+    make: impl FnOnce(&Path, Option<&Path>, bool) -> Result<RunSummary, Error>,
+) -> Result<RunSummary, Error> {
+    // Marks the folder as a work area, and refuses any other.
+    drop(Cache::open(work)?);
+    let folder = work.join("release");
+    // What an earlier run left in the work area is a copy: what is at the address decides, and is never replaced.
+    let summary = make(&folder, Some(work), true)?;
+    upload(&Release::open(&folder)?, bucket, progress)?;
+    Ok(summary)
 }
 
 /// Name of the local release that an address stands for: its last name and a part of the address's hash, so that neither a folder of that
@@ -174,6 +188,7 @@ mod tests {
     use crate::runner::progress::Silent;
     use sastrugi_schemas::manifest::Origin;
     use sastrugi_store::release::{Head, ReleaseBuilder, verify};
+    use std::collections::BTreeMap;
 
     fn release(folder: &Path, text: &str) -> Release {
         let dest = folder.join("release");
@@ -233,6 +248,33 @@ mod tests {
         assert_eq!(bucket.list("").unwrap().len(), 4);
     }
 
+    /// The copy that an earlier run left in the work area does not stand in the way; the release at the address does.
+    #[test]
+    fn val_only_what_is_at_the_address_is_kept() {
+        let work = tempfile::tempdir().unwrap();
+        let bucket = Bucket::in_memory("s3://bucket/demo").unwrap();
+        let run = |text: &str| {
+            releasing_to(&bucket, work.path(), &Silent, |folder, _, replace| {
+                assert!(replace && folder == work.path().join("release"));
+                release(work.path(), text);
+                Ok(RunSummary {
+                    output: folder.to_owned(),
+                    items: 1,
+                    computed: 1,
+                    failures: Vec::new(),
+                    notes: Vec::new(),
+                    failed_in: BTreeMap::new(),
+                    cache: None,
+                })
+            })
+        };
+        run("# Demo").unwrap();
+        let before = bucket.list("").unwrap();
+        let refused = run("# Other").unwrap_err();
+        assert!(matches!(&refused, Error::Usage(why) if why.contains("another release is there already")), "{refused}");
+        assert_eq!(bucket.list("").unwrap(), before);
+    }
+
     #[test]
     fn val_addresses_of_releases() {
         assert_eq!(address(Path::new("s3://bucket/a")), Some("s3://bucket/a"));
@@ -254,7 +296,8 @@ mod tests {
             assert!(said(check_place(Path::new(other))).contains("give a folder, or s3://bucket/prefix"), "{other}");
             assert!(said(check_local(Path::new(other))).contains("give a path on this machine"), "{other}");
         }
-        let made = releasing(Path::new("s3://b/c"), Some(Path::new("gs://b")), &Silent, |_, _| panic!("made"));
+        let made =
+            releasing(Path::new("s3://b/c"), Some(Path::new("gs://b")), false, &Silent, |_, _, _| panic!("made"));
         assert!(said(made.map(drop)).contains("gs://b: an address cannot be written to here"));
         assert!(check_place(Path::new("s3://b/c")).is_ok() && check_local(Path::new("s3://b/c")).is_err());
         for check in [check_place, check_local] {

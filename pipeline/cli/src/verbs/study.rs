@@ -62,9 +62,11 @@ pub fn run(args: &Run, common: &Common) -> Verdict {
     let request = RunRequest { output, work: work.as_deref(), part, purpose: None, replace: args.replace, limits };
     finish_run(common, |reporter| match (args.ancestors, sharing) {
         (Some(count), Some(sharing)) => Ok(studies::run_ancestors(&loaded, count, &request, sharing, reporter)?),
-        (_, sharing) => Ok(remote::releasing(output, work.as_deref(), reporter, |output, work| {
-            studies::run_sharing(&loaded, &RunRequest { output, work, ..request }, sharing, reporter)
-        })?),
+        (_, sharing) => {
+            Ok(remote::releasing(output, work.as_deref(), args.replace, reporter, |output, work, replace| {
+                studies::run_sharing(&loaded, &RunRequest { output, work, replace, ..request }, sharing, reporter)
+            })?)
+        }
     })
 }
 
@@ -88,8 +90,8 @@ fn print_warnings(doubts: &[String], common: &Common) {
 /// `merge`.
 pub fn merge(args: &Merge, common: &Common) -> Verdict {
     finish_run(common, |reporter| {
-        Ok(remote::releasing(&args.output, None, reporter, |output, _| {
-            studies::merge(&args.shards, output, args.replace, reporter)
+        Ok(remote::releasing(&args.output, None, args.replace, reporter, |output, _, replace| {
+            studies::merge(&args.shards, output, replace, reporter)
         })?)
     })
 }
