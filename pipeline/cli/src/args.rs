@@ -274,6 +274,24 @@ impl Verb {
             _ => None,
         }
     }
+
+    /// Every file and folder that the verb writes, except releases, which may lie in an object store, and reports.
+    pub fn outputs(&self) -> Vec<&Path> {
+        let study = match self {
+            Self::Init(args) => Some(args.output.as_path()),
+            _ => None,
+        };
+        let more = match self {
+            Self::Fit(args) => {
+                let FitShown { plot, csv, local, .. } = &args.shown;
+                vec![&args.table, &args.difference, &args.map, &args.background, plot, csv, local]
+            }
+            Self::Roughness(args) => vec![&args.rms_map],
+            _ => Vec::new(),
+        };
+        let more = more.into_iter().flatten().map(PathBuf::as_path);
+        self.output_file().into_iter().chain(study).chain(more).collect()
+    }
 }
 
 /// Release folder and work area.

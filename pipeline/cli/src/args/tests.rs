@@ -99,3 +99,18 @@ fn val_output_files_of_verbs() {
         assert_eq!(output(call), None, "{call}");
     }
 }
+
+/// What is checked before a verb works: all of its outputs, but not a release.
+#[test]
+fn val_all_outputs_of_verbs() {
+    let outputs = |call: &str| {
+        let arguments = Arguments::try_parse_from(words(call)).unwrap_or_else(|e| panic!("{call}: {e}"));
+        let names = arguments.verb.outputs().into_iter().map(|path| path.display().to_string());
+        names.collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(outputs("sastrugi init -o a.toml"), "a.toml");
+    let fit = "sastrugi fit a.tif --minus b.tif -o o --table t --difference d --map m --background b --plot p --csv c --local l";
+    assert_eq!(outputs(fit), "o t d m b p c l");
+    assert_eq!(outputs("sastrugi roughness a.tif --classes c --band 1:2 --rms-map r"), "c r");
+    assert_eq!(outputs("sastrugi run study.toml -o s3://b/c"), "");
+}

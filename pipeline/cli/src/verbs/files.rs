@@ -6,7 +6,6 @@ use crate::args::{self, Common, Convert, Info, Target};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use sastrugi_stages::operations::dem::to_metres;
-use sastrugi_stages::remote::check_local;
 use sastrugi_stages::studies;
 use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
 use sastrugi_store::dem::simulators::{self, Fit};
@@ -27,7 +26,6 @@ fn failure(error: DemError) -> Failure {
 
 /// `convert`.
 pub fn convert(args: &Convert, common: &Common) -> Verdict {
-    check_local(&args.output)?;
     if args.target == Some(Target::Lerobot) {
         return lerobot::convert(args, common);
     }

@@ -21,6 +21,7 @@ mod study;
 use crate::Verdict;
 use crate::args::{self, Arguments, Compress, Verb, Writing};
 use crate::failure::Failure;
+use sastrugi_stages::remote::check_local;
 use sastrugi_stages::verbs::{Reading, numbers};
 use sastrugi_store::atomic;
 use sastrugi_store::dem::points::GridSettings;
@@ -30,6 +31,8 @@ use std::path::Path;
 /// Runs the verb.
 pub fn dispatch(arguments: &Arguments) -> Verdict {
     let common = &arguments.common;
+    // Before any work, which a wrong output would waste.
+    arguments.verb.outputs().into_iter().try_for_each(check_local)?;
     arguments.verb.output_file().into_iter().for_each(atomic::clear_leftovers);
     match &arguments.verb {
         Verb::Init(args) => init::init(args, common),
