@@ -3,6 +3,7 @@
 
 use crate::error::Error;
 use std::fs;
+use std::path::Path;
 
 /// Refuses work that needs more memory than this process can get; `what` names it.
 ///
@@ -28,8 +29,8 @@ fn available() -> Option<u64> {
     least(&read("/proc/meminfo")?, &read("/proc/self/status")?, &read("/proc/self/limits")?, &limits)
 }
 
-/// Files with the memory limit of a control group, from a line such as `0::/job` or `4:memory:/job`. In a container the group may be
-/// visible as the root only.
+/// Files with the memory limits of a control group and of those that contain it, which limit it too, from a line such as `0::/job/step` or
+/// `4:memory:/job`. In a container the group may be visible as the root only.
 fn group_limits(line: &str) -> Vec<String> {
     let mut fields = line.splitn(3, ':').skip(1);
     let (Some(controllers), Some(group)) = (fields.next(), fields.next()) else { return Vec::new() };
@@ -38,11 +39,12 @@ fn group_limits(line: &str) -> Vec<String> {
         "memory" => ("/sys/fs/cgroup/memory", "memory.limit_in_bytes"),
         _ => return Vec::new(),
     };
-    [group.trim_end_matches('/'), ""].map(|group| format!("{root}{group}/{file}")).to_vec()
+    let groups = Path::new(group).ancestors().map(|group| group.to_string_lossy());
+    groups.map(|group| format!("{root}{}/{file}", group.trim_end_matches('/'))).collect()
 }
 
-/// The least of what the machine has available and what the limits of the process leave, from the texts of `/proc` and of the limits of
-/// its control groups. What other processes of the group hold is not counted, because most of it may be file cache.
+/// The least of what the machine has available, with swap, and what the limits of the process leave, from the texts of `/proc` and of the
+/// limits of its control groups. What other processes of the group hold is not counted, because most of it may be file cache.
 fn least(meminfo: &str, status: &str, limits: &str, groups: &[String]) -> Option<u64> {
     let number = |text: &str, name: &str| -> Option<u64> {
         let rest = text.lines().find_map(|line| line.strip_prefix(name))?;
@@ -53,7 +55,9 @@ fn least(meminfo: &str, status: &str, limits: &str, groups: &[String]) -> Option
     let address_space = number(limits, "Max address space").map(|limit| limit.saturating_sub(reserved));
     let group = groups.iter().filter_map(|limit| limit.trim().parse::<u64>().ok()).min();
     let group = group.map(|limit| limit.saturating_sub(resident));
-    [kib(meminfo, "MemAvailable:"), address_space, group].into_iter().flatten().min()
+    let swap = kib(meminfo, "SwapFree:").unwrap_or(0);
+    let machine = kib(meminfo, "MemAvailable:").map(|memory| memory.saturating_add(swap));
+    [machine, address_space, group].into_iter().flatten().min()
 }
 
 #[cfg(test)]
@@ -73,6 +77,8 @@ mod tests {
             let groups: Vec<String> = groups.iter().map(|&text| text.to_owned()).collect();
             least(meminfo, status, &limits(soft), &groups).unwrap()
         };
+        let swap = format!("{meminfo}SwapTotal:  900 kB\nSwapFree:   500 kB\n");
+        assert_eq!(least(&swap, status, &limits("unlimited"), &[]), Some(3500 << 10));
         assert_eq!(of("unlimited", &[]), 3000 << 10);
         assert_eq!(of("2048000", &[]), 1000 << 10);
         assert_eq!(of("1000", &[]), 0);
@@ -83,6 +89,10 @@ mod tests {
     #[test]
     fn val_limits_of_control_groups() {
         assert_eq!(group_limits("0::/job"), ["/sys/fs/cgroup/job/memory.max", "/sys/fs/cgroup/memory.max"]);
+        let nested =
+            ["/job/step/task", "/job/step", "/job", ""].map(|group| format!("/sys/fs/cgroup{group}/memory.max"));
+        assert_eq!(group_limits("0::/job/step/task"), nested);
+        assert_eq!(group_limits("0::/"), ["/sys/fs/cgroup/memory.max"]);
         let old = ["/sys/fs/cgroup/memory/job/memory.limit_in_bytes", "/sys/fs/cgroup/memory/memory.limit_in_bytes"];
         assert_eq!(group_limits("4:memory:/job"), old);
         assert!(group_limits("3:cpuset:/").is_empty() && group_limits("").is_empty());
