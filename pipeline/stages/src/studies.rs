@@ -521,6 +521,10 @@ mod tests {
         }
         fs::write(path("shard/study.toml"), text.replace("\"x\"", "\"y\"")).unwrap();
         assert!(check("shard", None, Some("1/2")).contains("is a shard of the study `y`; choose another folder"));
+        fs::write(path("shard/study.toml"), "[study\n").unwrap();
+        assert_eq!(check("shard", None, Some("1/2")), "", "damaged");
+        fs::remove_file(path("shard/study.toml")).unwrap();
+        assert_eq!(check("shard", None, Some("1/2")), "", "incomplete");
         fs::write(path("shard").join(release::SHARD), "{}").unwrap();
         assert!(check("shard", None, Some("1/2")).contains("is neither empty nor a sastrugi shard"));
         assert!(check("release", None, Some("1/2")).contains("is not empty and not a sastrugi shard"));

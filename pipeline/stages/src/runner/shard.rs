@@ -195,13 +195,12 @@ fn check_occupant(
 ) -> Result<(), Error> {
     let Some(there) = there.filter(|_| !replace) else { return Ok(()) };
     let Part { index, count } = there.part;
-    let name = head_of(target).map(|head| head.name).unwrap_or_default();
-    let what = if there.part != part {
-        format!("shard {index} of {count}")
-    } else if name != study.head.name {
-        format!("a shard of the study `{name}`")
-    } else {
-        return Ok(());
+    // A shard whose study is missing or damaged cannot be merged, and nothing but this run mends it.
+    let other = head_of(target).ok().map(|head| head.name).filter(|name| *name != study.head.name);
+    let what = match other {
+        _ if there.part != part => format!("shard {index} of {count}"),
+        Some(name) => format!("a shard of the study `{name}`"),
+        None => return Ok(()),
     };
     let advice = "choose another folder with -o, or use --replace to replace it";
     Err(Error::Usage(format!("{} is {what}; {advice}", target.display())))
