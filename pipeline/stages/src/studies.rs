@@ -494,7 +494,6 @@ mod tests {
         for name in ["file", "foreign/thesis.txt"] {
             fs::write(path(name), "precious").unwrap();
         }
-        fs::write(path("release").join(release::MANIFEST), "").unwrap();
         let description = r#"{ "part": { "index": 1, "count": 2 }, "program": "sastrugi", "study_sha256": "", "items": [], "failures": [] }"#;
         fs::write(path("shard").join(release::SHARD), description).unwrap();
         let limits = Limits { workers: 1, memory_bytes: 1 << 20, beyond: true };
@@ -502,6 +501,8 @@ mod tests {
             "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"a\"\nkind = \"mavs\"\n";
         fs::write(path("shard/study.toml"), text).unwrap();
         let study = Study::parse(text, Path::new(""), &registry::section_names()).unwrap();
+        let builder = ReleaseBuilder::beside(&path("release"), head(&study, text)).unwrap();
+        builder.seal(&path("release")).unwrap();
         let check = |output: &str, work: Option<&str>, part: Option<&str>| {
             let (output, work) = (path(output), work.map(path));
             let part = part.map(|text| Part::parse(text).unwrap());

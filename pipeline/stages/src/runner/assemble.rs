@@ -16,7 +16,7 @@ use crate::job::ItemRef;
 use crate::splits::Splits;
 use crate::study::Study;
 use sastrugi_schemas::manifest::{Artifact, FailedItem, ItemNote, Origin};
-use sastrugi_store::release::{self, Head, Incoming, ReleaseBuilder, for_each_artifact};
+use sastrugi_store::release::{self, Head, Incoming, MANIFEST, ReleaseBuilder, ReleaseError, for_each_artifact};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -112,18 +112,26 @@ impl Contents<'_> {
     }
 }
 
-/// Refuses a destination with a release of another study, by name, unless it may be replaced.
+/// Refuses a destination with a release of another study, by name, or with one that cannot be read, as it is damaged or of a later version,
+/// unless it may be replaced.
 ///
 /// # Errors
-/// Such a destination.
+/// Such a destination; a folder with another `manifest.json`, in any case.
 pub fn check_other_study(study: &Study, dest: &Path, replace: bool) -> Result<(), Error> {
+    let advice = "choose another folder with -o, or use --replace to replace it";
     match for_each_artifact(dest, drop) {
-        Ok(there) if there.name != study.head.name && !replace => Err(Error::Usage(format!(
-            "{} is a release of the study `{}`; choose another folder with -o, or use --replace to replace it",
-            dest.display(),
-            there.name
-        ))),
-        _ => Ok(()),
+        Ok(there) if there.name != study.head.name && !replace => {
+            Err(Error::Usage(format!("{} is a release of the study `{}`; {advice}", dest.display(), there.name)))
+        }
+        Ok(_) => Ok(()),
+        Err(why @ ReleaseError::NotARelease { .. }) => match release::may_be_one(dest) {
+            true if replace => Ok(()),
+            true => Err(Error::Usage(format!("{why}; {advice}"))),
+            // Many programs have a manifest.json; nothing says that this one is ours.
+            false if dest.join(MANIFEST).is_file() => Err(ReleaseError::Occupied { path: dest.to_owned() }.into()),
+            false => Ok(()),
+        },
+        Err(other) => Err(other.into()),
     }
 }
 
@@ -267,6 +275,7 @@ fn files_below(root: &Path, folder: &Path) -> Result<Vec<String>, Error> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::registry;
 
     #[test]
     fn val_one_writer_per_destination() {
@@ -278,6 +287,42 @@ mod tests {
         drop(first);
         drop(DestinationLock::take(&dest).unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    /// A release that is damaged or of a later version is replaced only on request, and a folder that another program made never.
+    #[test]
+    fn val_a_release_that_cannot_be_read_is_kept() {
+        let folder = tempfile::tempdir().unwrap();
+        let dest = folder.path().join("release");
+        let text = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n";
+        let study = Study::parse(text, Path::new(""), &registry::section_names()).unwrap();
+        let seal = || ReleaseBuilder::beside(&dest, head(&study, text)).and_then(|builder| builder.seal(&dest));
+        let said = |replace| check_other_study(&study, &dest, replace).err().map(|e| e.to_string()).unwrap_or_default();
+        seal().unwrap();
+        assert_eq!(said(false), "");
+        let manifest = std::fs::read_to_string(dest.join(MANIFEST)).unwrap();
+        let newer = manifest.replace("\"format\": 1", "\"format\": 2");
+        for (text, why) in
+            [("{", "cannot be parsed"), (newer.as_str(), "is of sastrugi format 2, expected sastrugi format 1")]
+        {
+            std::fs::write(dest.join(MANIFEST), text).unwrap();
+            let refused = said(false);
+            assert!(refused.contains(why) && refused.ends_with("or use --replace to replace it"), "{refused}");
+            assert_eq!(said(true), "");
+            seal().unwrap();
+            assert_eq!(said(false), "");
+        }
+        std::fs::write(dest.join(MANIFEST), "{}").unwrap();
+        std::fs::remove_file(dest.join(release::SUMS)).unwrap();
+        for replace in [false, true] {
+            assert!(
+                said(replace).ends_with("not a sastrugi release; choose another folder with -o"),
+                "{}",
+                said(replace)
+            );
+        }
+        assert!(matches!(seal(), Err(ReleaseError::Occupied { .. })));
+        assert_eq!(std::fs::read_to_string(dest.join(MANIFEST)).unwrap(), "{}");
     }
 
     #[test]

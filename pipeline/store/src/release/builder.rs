@@ -341,11 +341,17 @@ pub(super) fn write_sums<'a>(
     manifest.into_iter().try_for_each(|(name, own)| writeln!(out, "{own}  {name}"))
 }
 
+/// True for a folder with manifest and checksums, which a release has even if it is damaged or of a later version.
+pub fn may_be_one(folder: &Path) -> bool {
+    [MANIFEST, SUMS].iter().all(|name| folder.join(name).is_file())
+}
+
 /// Refuses a destination that holds files that are not a release.
 fn check_dest(dest: &Path) -> Result<(), ReleaseError> {
     let occupied = || ReleaseError::Occupied { path: dest.to_owned() };
     match fs::read_dir(dest).map(|mut entries| entries.next().is_none()) {
         Ok(true) => Ok(()),
+        Ok(false) if may_be_one(dest) => Ok(()),
         Ok(false) => for_each_artifact(dest, drop).map(drop).map_err(|_| occupied()),
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(()),
         Err(e) if e.kind() == ErrorKind::NotADirectory => Err(occupied()),
