@@ -156,11 +156,19 @@ fn in_plain_words(message: String) -> String {
         return format!("has the unknown value `{found}`; known: {}", known.trim_start_matches("one of "));
     }
     let length = message.strip_prefix("invalid length ").and_then(|rest| rest.split_once(", expected "));
-    match length.map(|(found, expected)| (found, expected.strip_prefix("an array of length "), expected)) {
-        Some((found, Some(values), _)) => format!("must be a list of {values} values, got {found}"),
-        Some((found, None, "fewer elements in array")) => format!("must be a shorter list, got {found} values"),
-        _ => message,
+    match length {
+        Some((found, "fewer elements in array")) => format!("must be a shorter list, got {found} values"),
+        Some((found, expected)) => match expected.rsplit_once(' ').filter(|_| is_list(expected)) {
+            Some((_, values)) => format!("must be a list of {values} values, got {found}"),
+            None => message,
+        },
+        None => message,
     }
+}
+
+/// True for a list of so many values that serde expected.
+fn is_list(expected: &str) -> bool {
+    expected.starts_with("an array of length ") || expected.starts_with("a tuple of size ")
 }
 
 /// A type that serde expected.
@@ -176,8 +184,10 @@ fn type_in_words(expected: &str) -> &str {
         "a boolean" => "true or false",
         "a sequence" => "a list",
         "a map" => "a table",
+        "string or map" | "map with a single key" => "one of its words, in quotes",
         other if other.starts_with("struct ") => "a table",
-        other if other.starts_with("an array of length ") => "a list",
+        other if other.starts_with("internally tagged enum ") => "a table with `kind`",
+        other if is_list(other) => "a list",
         other => other,
     }
 }
@@ -301,6 +311,15 @@ mod tests {
         assert_eq!(message(item("window", json!(["x"]))), "`window.0` must be a number, got \"x\"");
         let word = read_parameters::<Word>(&json!({"word": "on"})).unwrap_err().to_string();
         assert_eq!(word, "`word` has the unknown value `on`; known: `one`, `two`, `three`");
+        for (value, found) in [(json!(5), "5"), (json!({}), "a table")] {
+            let word = read_parameters::<Word>(&json!({"word": value})).unwrap_err().to_string();
+            assert_eq!(word, format!("`word` must be one of its words, in quotes, got {found}"));
+        }
+        let tagged = read_parameters::<Tagged>(&json!(5)).unwrap_err().to_string();
+        assert_eq!(tagged, "must be a table with `kind`, got 5");
+        let pair = |value: Value| read_parameters::<(f64, f64)>(&value).unwrap_err().to_string();
+        assert_eq!(pair(json!("x")), "must be a list, got \"x\"");
+        assert_eq!(pair(json!([1.0])), "must be a list of 2 values, got 1");
         let layers = json!({"layers": [[1.0]]});
         let short = read_parameters::<Layers>(&layers).unwrap_err().to_string();
         assert_eq!(short, "`layers.0` must be a list of 2 values, got 1");
@@ -322,6 +341,12 @@ mod tests {
         One,
         Two,
         Three,
+    }
+
+    #[derive(Debug, Deserialize)]
+    #[serde(tag = "kind")]
+    enum Tagged {
+        Only,
     }
 
     #[derive(Debug, Deserialize)]
