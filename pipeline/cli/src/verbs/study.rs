@@ -180,7 +180,9 @@ fn failed(summary: &RunSummary) -> String {
     }
     if !skipped.is_empty() {
         let named: Vec<String> = skipped.iter().take(SKIPPED_MAX).map(|f| f.item.to_string()).collect();
-        text.push_str(&format!("\n  skipped because of these: {}", named.join(", ")));
+        let their = if skipped.len() == 1 { "its" } else { "their" };
+        let count = counted(skipped.len() as u64, "item");
+        text.push_str(&format!("\n  {count} not run because {their} input failed: {}", named.join(", ")));
         if skipped.len() > SKIPPED_MAX {
             text.push_str(&format!(" and {} more", skipped.len() - SKIPPED_MAX));
         }
@@ -404,10 +406,12 @@ mod tests {
             "no-such-release: 1 item, 1 computed, 8 failed, 2 s",
             "failed items (parameters in manifest.json):",
             "  shard 3, fit/plane: the surface is flat",
-            "  skipped because of these: fit/a, fit/b, fit/c, fit/d, fit/e and 2 more",
+            "  7 items not run because their input failed: fit/a, fit/b, fit/c, fit/d, fit/e and 2 more",
             "notes:",
             "  fit/snow: short range",
         ];
         assert_eq!(told(&summary, "2 s"), lines.join("\n"));
+        summary.failures.truncate(2);
+        assert!(told(&summary, "2 s").contains("\n  1 item not run because its input failed: fit/a\n"));
     }
 }
