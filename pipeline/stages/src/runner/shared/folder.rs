@@ -226,10 +226,14 @@ fn mark(root: &Path) -> Result<(), Error> {
     atomic::write(&root.join(MARK), MARK_TEXT.as_bytes()).map_err(|e| unusable(root, e))
 }
 
-/// A failure of the file system that says what the folder is for.
+/// A failure of the file system that says what the folder is for. Its number decides whether a retry can help, so the error itself is judged.
 fn unusable(root: &Path, error: io::Error) -> Error {
-    let kind = error.kind();
-    Error::at(root, io::Error::new(kind, format!("cannot be used as shared cache: {}", words(&error))))
+    let why = format!("{}: cannot be used as shared cache: {}", root.display(), words(&error));
+    match Error::at(root, error) {
+        Error::Retry(_) => Error::Retry(why),
+        Error::Input(_) => Error::Input(why),
+        _ => Error::Failed(why),
+    }
 }
 
 fn words(error: &io::Error) -> String {
@@ -247,4 +251,22 @@ fn is_refused(error: &io::Error) -> bool {
 /// True if a folder cannot be renamed because its new name belongs to a folder with files.
 fn is_taken(error: &io::Error) -> bool {
     matches!(error.kind(), ErrorKind::DirectoryNotEmpty | ErrorKind::AlreadyExists)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Too many open files may pass; a missing permission does not.
+    #[test]
+    fn val_what_makes_a_cache_unusable_decides() {
+        let of = |number| unusable(Path::new("cache"), io::Error::from_raw_os_error(number));
+        let (open_files, permission) = (of(24), of(13));
+        let said = "cache: cannot be used as shared cache: ";
+        assert!(matches!(&open_files, Error::Retry(why) if why.starts_with(said)), "{open_files}");
+        assert!(
+            matches!(&permission, Error::Failed(why) if *why == format!("{said}permission denied")),
+            "{permission}"
+        );
+    }
 }
