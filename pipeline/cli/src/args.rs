@@ -53,8 +53,9 @@ pub enum Verb {
         sastrugi run study.toml --ancestors 3 --cache cache\n  \
         sastrugi run study.toml -o part1 --shard 1/3 --cache cache\n  \
         sastrugi run study.toml -o s3://terrains/snow\n\n\
-        For s3:// set AWS_ACCESS_KEY_ID, AWS_SECRET_ACCESS_KEY, AWS_REGION and AWS_ENDPOINT_URL. The release\n\
-        is assembled in the work area and uploaded, its manifest last."
+        For s3://, AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY or the machine's role give access; AWS_REGION\n\
+        and AWS_ENDPOINT_URL choose another region or store. The release is assembled in the work area and\n\
+        uploaded, its manifest last."
     )]
     Run(Run),
     /// Show what a run would compute, its cost, and why each stale item is stale.
