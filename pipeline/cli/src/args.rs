@@ -826,7 +826,7 @@ pub enum Obstacles {
 /// `traverse`.
 #[derive(Debug, Args)]
 pub struct Traverse {
-    /// DEM with cells no larger than a wheel and room for the missions: 35 m, 5 m from every edge.
+    /// DEM with cells no larger than the wheel radius, and room for the missions: 35 m, 5 m from every edge.
     pub dem: PathBuf,
     /// Vehicle (see `kinds`), or your own vehicle file (.toml with a table `parameters`).
     #[arg(long, value_name = "V", default_value = "husky_a200")]
