@@ -18,7 +18,7 @@ def terrain(kind: str, seed: int = 0, *, inputs: Mapping[str, Any] | None = None
 
     kind: name of a generator (`sastrugi kinds`): multifractal, weierstrass_mandelbrot, planetary, compose ...
     seed: of the random streams; the same kind, seed and parameters give the same heights.
-    inputs: heightfields, arrays or files that the parameters name, by that name; other names are files.
+    inputs: heightfields or files that the parameters name, by that name; other names are files.
     parameters: those of the generator; tables as dicts.
 
     Raises SastrugiError (2) for an unknown kind or parameter, with the nearest known one.
@@ -41,6 +41,8 @@ def elaborate(dem: Any, seed: int = 0, **parameters: Any) -> Heightfield:
     dem: a file or a Heightfield, in metres.
     parameters: those of the generator: size_px or size_m, cell_m, origin_m (the south-west sample in the DEM's coordinates) ...
 
+    Notes on how a file was read are issued as warnings.
+
     >>> from sastrugi import Fit
     >>> hills = Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(120.0, 2.0, seed=2)
     >>> fine = elaborate(
@@ -48,8 +50,7 @@ def elaborate(dem: Any, seed: int = 0, **parameters: Any) -> Heightfield:
     >>> fine.shape
     (48, 64)
     """
-    if isinstance(dem, (str, os.PathLike)):
-        return terrain("elaborate", seed, dem=dem, **parameters)
+    # A file is read here and not by the generator, which would not say how it was read.
     return terrain("elaborate", seed, inputs={"dem": heights_of(dem)}, dem="dem", **parameters)
 
 

@@ -96,10 +96,12 @@ def test_one_statement_of_each_parameter():
 def test_notes_on_reading_are_warnings(tmp_path):
     """A file that states no cell size is read with an assumed one, which decides the numbers."""
     np.save(tmp_path / "site.npy", snow().texture(16.0, 0.1, seed=1).values)
+    window = {"size_px": [64, 48], "cell_m": 0.25, "origin_m": [50.0, 50.0], "basic_spacing_m": 0.25, "hurst": 0.7, "roughness_m": 0.01}
     for measure in [
         lambda: sastrugi.roughness(tmp_path / "site.npy"),
         lambda: sastrugi.fit(tmp_path / "site.npy", outer_scale=10.0, model="exponential", bootstrap=0),
         lambda: sastrugi.coregister(tmp_path / "site.npy", tmp_path / "site.npy"),
+        lambda: sastrugi.elaborate(tmp_path / "site.npy", **window),
     ]:
         with pytest.warns(UserWarning, match="no cell size") as issued:
             measure()
