@@ -30,7 +30,10 @@ def terrain(kind: str, seed: int = 0, *, inputs: Mapping[str, Any] | None = None
     Traceback (most recent call last):
     sastrugi._errors.SastrugiError: `multifractal` has no parameter `size_pxx`; did you mean `size_px`?
     """
-    given = {name: heights_of(dem) for name, dem in (inputs or {}).items()}
+    given: dict[str, Heightfield] = {}
+    # Not a comprehension: before Python 3.12 it is a call of its own, and warnings would name this line.
+    for name, dem in (inputs or {}).items():
+        given[name] = heights_of(dem)
     parts, maps, info = _native.terrain(kind, to_json(parameters), seed_of(seed), given)
     return Heightfield(*parts, maps=maps, notes=json.loads(info)["notes"])
 

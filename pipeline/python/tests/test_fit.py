@@ -102,6 +102,7 @@ def test_notes_on_reading_are_warnings(tmp_path):
         lambda: sastrugi.fit(tmp_path / "site.npy", outer_scale=10.0, model="exponential", bootstrap=0),
         lambda: sastrugi.coregister(tmp_path / "site.npy", tmp_path / "site.npy"),
         lambda: sastrugi.elaborate(tmp_path / "site.npy", **window),
+        lambda: sastrugi.terrain("elaborate", inputs={"site": tmp_path / "site.npy"}, dem="site", **window),
     ]:
         with pytest.warns(UserWarning, match="no cell size") as issued:
             measure()
