@@ -124,9 +124,9 @@ def test_plot():
 def test_textures_that_repeat_a_site_say_what_they_need():
     site = snow().texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)
     found = sastrugi.fit(site, outer_scale=1.0, bootstrap=0)
-    with pytest.raises(sastrugi.SastrugiError, match="fit the DEM with --statistics"):
+    with pytest.raises(sastrugi.SastrugiError, match="fit the DEM with `statistics=True`"):
         found.texture(8.0, method="modulated")
-    with pytest.raises(sastrugi.SastrugiError, match="give the DEM of the fit with --exemplar"):
+    with pytest.raises(sastrugi.SastrugiError, match="give the DEM of the fit as `exemplar`"):
         found.texture(8.0, method="quilting")
     with pytest.raises(sastrugi.SastrugiError, match="keeps the directions of the site"):
         found.texture(8.0, method="quilting", exemplar=site, ratio=0.5)

@@ -106,6 +106,21 @@ def test_other_threads_run_meanwhile():
     assert counted > 20 * took, f"{counted} ticks in {took:.2f} s"
 
 
+def test_options_of_the_program_are_arguments_here(study, release, tmp_path):
+    other, file = tmp_path / "other.toml", tmp_path / "file"
+    other.write_text(STUDY.replace('name = "small"', 'name = "other"'))
+    file.write_text("")
+    for call, said in [
+        (lambda: sastrugi.run(other, release.path), "is a release of the study `small`; choose another folder, or use `replace=True` to replace it"),
+        (lambda: sastrugi.run(study, file), "is a file; `output` must be a folder"),
+        (lambda: sastrugi.run(study, tmp_path / "a", work=tmp_path / "a" / "work"), "is replaced; choose another `work`"),
+        (lambda: sastrugi.run(study, tmp_path), "is not empty and not a sastrugi release; choose another folder"),
+    ]:
+        with pytest.raises(sastrugi.SastrugiError) as refused:
+            call()
+        assert str(refused.value).endswith(said) and refused.value.code == 2
+
+
 def test_errors_of_studies_name_their_places(tmp_path):
     (tmp_path / "study.toml").write_text(STUDY.replace("seed = 7", "sead = 7"))
     with pytest.raises(sastrugi.SastrugiError, match="unknown key `sead` in study") as refused:
