@@ -85,7 +85,7 @@ impl Study {
         let unknown = self.root.keys().filter(|k| !known().any(|s| s == *k));
         let refuse = |unknown: &String| {
             let span = self.text.span(std::slice::from_ref(unknown), true);
-            if !self.root.get(unknown).is_some_and(|value| value.is_object() || value.is_array()) {
+            if !self.root.get(unknown).is_some_and(is_section) {
                 let message =
                     format!("the key `{unknown}` is outside every section; put it below its section, such as [study]");
                 return StudyError::at(span, message);
@@ -96,6 +96,12 @@ impl Study {
         };
         unknown.map(refuse).collect()
     }
+}
+
+/// True for what TOML writes as `[name]` or `[[name]]`.
+fn is_section(value: &Value) -> bool {
+    let is_list = |list: &Vec<Value>| !list.is_empty() && list.iter().all(Value::is_object);
+    value.is_object() || value.as_array().is_some_and(is_list)
 }
 
 /// Reads the head; if that fails, returns a partial head with which the items can be checked.
@@ -458,5 +464,7 @@ mod tests {
         at(&format!("{HEAD}[[terain]]\nid = \"a\"\n"), "unknown section `terain`", "terain");
         at(&format!("{HEAD}[extra]\n"), "unknown section", "extra");
         at(&format!("extra = 1\n{HEAD}"), "outside every section", "extra");
+        at(&format!("split = [0.8, 0.2]\n{HEAD}"), "outside every section", "split");
+        at(&format!("extra = [{{ id = \"a\" }}]\n{HEAD}"), "unknown section", "extra");
     }
 }
