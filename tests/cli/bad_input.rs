@@ -634,7 +634,7 @@ fn val_unreadable_files_are_named_in_plain_words() {
     let folder = area();
     let path = folder.path();
     std::fs::create_dir(path.join("folder")).unwrap();
-    for (name, words) in [("none", "none: no such file\n"), ("folder", "folder: is a folder, not a file\n")] {
+    for (name, words) in [("none", "none: no such file\n"), ("folder", "folder is a folder, not a file\n")] {
         refused(path, &["run", name], INPUT, &[words]);
         refused(path, &["plan", name], INPUT, &[words]);
         refused(path, &["texture", name, "--size", "8x8", "--cell", "0.1", "-o", "a.tif"], INPUT, &[words]);

@@ -179,6 +179,6 @@ fn val_a_panic_of_a_decoder_is_not_printed() {
     let seed = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/seeds/points/index_out_of_bounds.laz");
     fs::copy(seed, folder.path().join("cloud.laz")).unwrap();
     let call = sastrugi_in(folder.path(), &["info", "cloud.laz"]);
-    ends_with(&call, 65, "cloud.laz: is damaged: its points cannot be decoded");
+    ends_with(&call, 65, "cloud.laz is damaged: its points cannot be decoded");
     assert_eq!(call.stderr.trim_end().lines().count(), 1, "{}", call.stderr);
 }

@@ -42,12 +42,12 @@ pub enum Error {
 impl Error {
     /// Input that cannot be read.
     pub fn unreadable(path: &Path, error: &std::io::Error) -> Self {
-        let reason = match error.kind() {
-            std::io::ErrorKind::NotFound => "no such file".to_owned(),
-            std::io::ErrorKind::IsADirectory => "is a folder, not a file".to_owned(),
-            _ => error.to_string(),
-        };
-        Self::Input(format!("{}: {reason}", path.display()))
+        let path = path.display();
+        Self::Input(match error.kind() {
+            std::io::ErrorKind::NotFound => format!("{path}: no such file"),
+            std::io::ErrorKind::IsADirectory => format!("{path} is a folder, not a file"),
+            _ => format!("{path}: {error}"),
+        })
     }
 
     /// A failure on this machine.
@@ -66,7 +66,7 @@ impl Error {
     /// The same for a file; one that is not a regular file is unusable input.
     pub fn at(path: &Path, error: std::io::Error) -> Self {
         let words = match error.kind() {
-            std::io::ErrorKind::IsADirectory => format!("{}: is a folder; name a file", path.display()),
+            std::io::ErrorKind::IsADirectory => format!("{} is a folder; name a file", path.display()),
             _ => format!("{}: {error}", path.display()),
         };
         if error.kind() == std::io::ErrorKind::InvalidInput {
@@ -192,6 +192,6 @@ mod tests {
             assert!(kind == expected && found.to_string().starts_with("a/b.tif: "), "{kind}: {found}");
         }
         let folder = Error::at(path, IoError::from(ErrorKind::IsADirectory));
-        assert_eq!(folder.to_string(), "a/b.tif: is a folder; name a file");
+        assert_eq!(folder.to_string(), "a/b.tif is a folder; name a file");
     }
 }

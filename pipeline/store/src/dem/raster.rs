@@ -103,7 +103,7 @@ pub enum DemError {
 
 /// What is wrong with a file; a reason that begins with its verb has the file as its subject.
 fn sentence(path: &Path, reason: &str) -> String {
-    let is_predicate = ["claims ", "has ", "holds "].iter().any(|verb| reason.starts_with(verb));
+    let is_predicate = ["claims ", "has ", "holds ", "is "].iter().any(|verb| reason.starts_with(verb));
     let colon = if is_predicate { "" } else { ":" };
     format!("{}{colon} {reason}", path.display())
 }

@@ -339,6 +339,15 @@ fn val_unusable_ascii_grids_are_refused_with_the_reason() {
     assert!(refusal("a.txt", b"hello").contains("not a supported raster"));
 }
 
+/// A reason that begins with its verb has the file as its subject, without a colon between them.
+#[test]
+fn val_a_folder_is_not_a_raster() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    std::fs::create_dir(&path).unwrap();
+    assert_eq!(read(&path).unwrap_err().to_string(), format!("{} is a folder, not a raster", path.display()));
+}
+
 #[test]
 fn val_centres_and_uneven_cells_of_ascii_grids() {
     let text = "NROWS 2\nNCOLS 3\nXLLCENTER 10.5\nYLLCENTER 20.5\nDX 1\nDY 2\n1 2 3\n4 5 6.5\n";
