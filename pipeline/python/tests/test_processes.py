@@ -1,5 +1,6 @@
 """What happens at the limits of a process: too little memory, and forks."""
 
+import os
 import subprocess
 import sys
 
@@ -15,7 +16,9 @@ def refusal(call):
 
 def said(code):
     """What a Python process of its own prints; fails if it does not end in order within a minute."""
-    done = subprocess.run([sys.executable, "-c", PRELUDE + code], capture_output=True, text=True, timeout=60)
+    # Each thread reserves address space: with those of many cores nothing would be left below the limit of a test.
+    environment = {**os.environ, "OPENBLAS_NUM_THREADS": "1", "RAYON_NUM_THREADS": "2"}
+    done = subprocess.run([sys.executable, "-c", PRELUDE + code], capture_output=True, text=True, timeout=60, env=environment)
     assert done.returncode == 0, f"{done.returncode}: {done.stderr}"
     return done.stdout
 
