@@ -230,6 +230,8 @@ fn val_an_extrapolated_texture_is_warned_of() {
     let warning = "sastrugi: warning: most of the variance comes from the model";
     assert!(call.code == 0 && call.stderr.starts_with(warning), "{} {}", call.code, call.stderr);
     assert!(!call.stdout.contains("most of the variance"), "{}", call.stdout);
+    let quiet = sastrugi_in(path, &[&texture[..], &["--quiet"]].concat());
+    assert!(quiet.code == 0 && quiet.stderr.starts_with(warning), "{} {}", quiet.code, quiet.stderr);
     let residual = sastrugi_in(path, &[&texture[..], &["--covariance", "residual"]].concat());
     assert!(residual.code == 0 && !residual.stderr.contains("warning"), "{} {}", residual.code, residual.stderr);
 }

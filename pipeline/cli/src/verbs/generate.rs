@@ -59,10 +59,9 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         options: options(&args.writing, &args.output)?,
     };
     let made = verbs::texture::texture(&request)?;
+    // Also with --quiet: a warning says that the texture is hardly what was measured.
     let warnings = made["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str);
-    if !common.quiet {
-        warnings.for_each(|warning| warn(&format!("sastrugi: warning: {warning}")));
-    }
+    warnings.for_each(|warning| warn(&format!("sastrugi: warning: {warning}")));
     print_summary(common, &made)
 }
 
