@@ -53,7 +53,7 @@ pub fn run(args: &Run, common: &Common) -> Verdict {
     let loaded = loaded::load(&args.study)?;
     print_warnings(&loaded.doubts, common);
     let Place { output, work } = &args.place;
-    if remote::address(output).is_some() && (part.is_some() || args.ancestors.is_some()) {
+    if part.is_some() && remote::address(output).is_some() {
         return Err(Failure::usage(
             "a shard is a folder; merge writes the release to an object store: choose a folder with -o",
         ));
