@@ -76,7 +76,11 @@ fn val_refusals() {
         (&["--set", "class_factors=[1.0, -2.0, 3.0]"], 2, "`class_factors.1` is -2"),
         (&["--set", "plan_cell_m=300"], 65, "leaves fewer than two planning cells"),
         (&["--set", "max_down_deg=3"], 65, "no route from start to goal"),
-        (&["--method", "dijkstra"], 2, "`method` has the unknown value `dijkstra`; known: `grid`, `roadmap`, `theta_star`, `anytime`"),
+        (
+            &["--method", "dijkstra"],
+            2,
+            "`method` has the unknown value `dijkstra`; known: `grid`, `roadmap`, `theta_star`, `anytime`",
+        ),
         (&["--vehicle", "tank"], 2, "is `tank`; it must"),
         (&["--obstacles", "nothing.geojson"], 65, "nothing.geojson: no such file"),
     ] {

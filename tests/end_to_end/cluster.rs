@@ -258,7 +258,7 @@ fn val_a_cache_that_is_only_read() {
     };
     refused(&["--cache-read-only"], 2, "--cache");
     // Ancestors go to the cache, not to a release.
-    refused(&["--ancestors", "3", "--cache", "cache"], 2, "cannot be used with '--output");
+    refused(&["--ancestors", "3", "--cache", "cache"], 2, "cannot be used with '--ancestors");
     refused(&["--cache", "nowhere", "--cache-read-only"], 65, "not a shared cache; the folder is missing or empty");
     refused(&["--cache", "release"], 2, "neither empty nor a shared cache");
     refused(&["--cache", "new/cache"], 2, "inside the output folder");

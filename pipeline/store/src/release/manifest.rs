@@ -31,8 +31,8 @@ use std::path::Path;
 /// ```
 ///
 /// # Errors
-/// [`ReleaseError::NotARelease`] if the folder has no manifest of this format, or if it lists an invalid path. A path that is listed twice is
-/// not noticed.
+/// [`ReleaseError::NotARelease`] if the folder has no manifest of this format, or if it lists an invalid path, a path twice, or paths out of
+/// order.
 pub fn for_each_artifact(folder: &Path, f: impl FnMut(Artifact)) -> Result<Manifest, ReleaseError> {
     let path = folder.join(MANIFEST);
     let file = crate::file::open(&path).map_err(unread(folder, &path))?;
@@ -96,8 +96,14 @@ impl<'de, F: FnMut(Artifact)> Visitor<'de> for Files<'_, F> {
     }
 
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
+        let mut before = String::new();
         while let Some(artifact) = list.next_element::<Artifact>()? {
             check_path(&artifact.path).map_err(|e| A::Error::custom(format!("it lists an invalid path: {e}")))?;
+            // Files are sorted by path, so one that is listed twice shows without a set of all.
+            if artifact.path <= before {
+                return Err(A::Error::custom(format!("it lists \"{}\" twice or out of order", artifact.path)));
+            }
+            before.clone_from(&artifact.path);
             (self.0)(artifact);
         }
         Ok(())

@@ -111,6 +111,7 @@ fn val_hostile_folders_are_refused() {
     let second = Release::open(&rebuilt(&dest, &manifest)).unwrap().manifest().artifacts[1].path.clone();
     fs::write(dest.join(MANIFEST), manifest.replacen(&second, &first, 1)).unwrap();
     assert!(Release::open(&dest).unwrap_err().to_string().contains("twice"));
+    assert!(for_each_artifact(&dest, drop).unwrap_err().to_string().contains("twice"));
     // Without a manifest the checksums are used.
     let sums = fs::read_to_string(dest.join(SUMS)).unwrap();
     fs::remove_file(dest.join(MANIFEST)).unwrap();
