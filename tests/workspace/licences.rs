@@ -158,10 +158,10 @@ fn list(value: &Value) -> &[Value] {
 
 /// Crates of others in our programs and modules: all that they reach other than through build scripts and macros. Sorted by name.
 pub fn linked(graph: &Graph) -> Vec<&Package> {
-    // The programs of the tests stay here.
+    // The programs of the tests and of the benches stay here.
     let ships = |package: &Package| {
         let is_program = ["bin", "cdylib"].iter().any(|kind| package.kinds.contains(*kind));
-        package.is_ours && package.name != "sastrugi-tests" && is_program
+        package.is_ours && !["sastrugi-tests", "sastrugi-benches"].contains(&package.name.as_str()) && is_program
     };
     let mut waiting: Vec<&String> = graph.iter().filter(|(_, package)| ships(package)).map(|(id, _)| id).collect();
     let mut reached = BTreeSet::new();
