@@ -19,17 +19,20 @@ fn write_table<R: Record + Sync>(builder: &mut ReleaseBuilder, name: &str, rows:
     builder.write_tables(vec![part], fill).unwrap();
 }
 
-/// A release that will be `dest`, not sealed.
-fn assembled(dest: &Path) -> ReleaseBuilder {
-    let (data, shelf) = made_up::parts(2, 40);
-    let head = Head {
+fn head() -> Head {
+    Head {
         name: "made-up".into(),
         study_sha256: "0".repeat(64),
         seed: 7,
         version: "0.1.0".into(),
         license: "CC-BY-4.0".into(),
-    };
-    let mut builder = ReleaseBuilder::beside(dest, head).unwrap();
+    }
+}
+
+/// A release that will be `dest`, not sealed.
+fn assembled(dest: &Path) -> ReleaseBuilder {
+    let (data, shelf) = made_up::parts(2, 40);
+    let mut builder = ReleaseBuilder::beside(dest, head()).unwrap();
     let folder = builder.staging().to_owned();
     for (path, grid) in &shelf.grids {
         dem::write(&folder.join(path), grid, &Crs::default(), &Default::default()).unwrap();
@@ -97,14 +100,7 @@ fn prop_missions_of_several_files_are_in_order() {
     let folder = tempfile::tempdir().unwrap();
     let missions = made_up::parts(2, 24).0.missions;
     let stored = |name: &str, files: usize| {
-        let head = Head {
-            name: "made-up".into(),
-            study_sha256: "0".repeat(64),
-            seed: 7,
-            version: "0.1.0".into(),
-            license: "CC-BY-4.0".into(),
-        };
-        let mut builder = ReleaseBuilder::beside(&folder.path().join(name), head).unwrap();
+        let mut builder = ReleaseBuilder::beside(&folder.path().join(name), head()).unwrap();
         for file in 0..files {
             let rows = missions.iter().enumerate().filter(|(k, _)| k % files == file).map(|(_, m)| m.clone()).collect();
             write_table(&mut builder, &format!("{file:04}"), rows);
