@@ -523,16 +523,35 @@ fn val_wheel_envelops_a_bump() {
     }
 }
 
-/// Culling contacts by the ceiling leaves the result bit for bit the same, here with wheels and belly on rough ground.
+/// Culling contacts by ceiling and clearance leaves the result bit for bit the same, here with wheels and belly on rough ground.
 #[test]
 fn prop_culling_changes_no_bit() {
     for (name, missions) in [("husky_a200", 6), (OTHERS[0], 2), (OTHERS[1], 2)] {
         let (vehicle, settings) = prepared(|p| (p.vehicle, p.timeout_s) = (name.to_owned(), 12.0));
         let ground = Ground::new(&ROUGH, &vehicle).unwrap();
-        let plain = ground.clone().without_ceiling();
+        let plain = ground.clone().without_culling();
         for index in 0..missions {
             let [with, without] = [&ground, &plain].map(|g| drive(g, &vehicle, &settings, &crossing(index)).unwrap());
             assert_eq!(with, without);
+        }
+    }
+}
+
+/// The same where missions leave the terrain: ground without data is met in the same step.
+#[test]
+fn prop_culling_meets_the_edge_in_the_same_step() {
+    let dem = rough(0.004, 1);
+    for name in ["husky_a200", OTHERS[0], OTHERS[1]] {
+        let (vehicle, settings) = prepared(|p| p.vehicle = name.to_owned());
+        let ground = Ground::new(&dem, &vehicle).unwrap();
+        let plain = ground.clone().without_culling();
+        for index in 0..8 {
+            let (sin, cos) = libm::sincos(index as f64 * 0.77 + 0.1);
+            let [start_m, goal_m] = [15.0, 40.0].map(|radius_m| [21.0 + radius_m * cos, 21.0 + radius_m * sin]);
+            let mission = Mission::between(index, start_m, goal_m);
+            let [with, without] = [&ground, &plain].map(|g| drive(g, &vehicle, &settings, &mission).unwrap());
+            assert_eq!(outcome(&with).kind, EventKind::OutOfBounds, "{name} {index}");
+            assert_eq!(with, without, "{name} {index}");
         }
     }
 }
