@@ -21,7 +21,6 @@ use crate::parquet::{self, TableError};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, Manifest, PROGRAM};
 use sastrugi_schemas::tables::in_order;
-use std::collections::BTreeSet;
 use std::io;
 use std::path::{Path, PathBuf};
 
@@ -124,7 +123,8 @@ impl Release {
     /// Opens a release without checking its files (see [`verify`]).
     ///
     /// # Errors
-    /// [`ReleaseError::NotARelease`] if the folder has no sastrugi manifest.
+    /// [`ReleaseError::NotARelease`] if the folder has no sastrugi manifest, or if that lists an invalid path, a path twice, or paths out of
+    /// order.
     pub fn open(folder: &Path) -> Result<Self, ReleaseError> {
         let path = folder.join(MANIFEST);
         let text = crate::file::read(&path).map_err(unread(folder, &path))?;
@@ -214,14 +214,19 @@ fn unread(folder: &Path, path: &Path) -> impl FnOnce(io::Error) -> ReleaseError 
 fn parse_manifest(bytes: &[u8]) -> Result<Manifest, String> {
     let manifest: Manifest = serde_json::from_slice(bytes).map_err(|e| format!("{MANIFEST} cannot be parsed: {e}"))?;
     check_head(&manifest)?;
-    let mut paths = BTreeSet::new();
+    let mut before = "";
     for Artifact { path, .. } in &manifest.artifacts {
-        check_path(path).map_err(|e| format!("{MANIFEST} lists an invalid path: {e}"))?;
-        if !paths.insert(path) {
-            return Err(format!("{MANIFEST} lists \"{path}\" twice"));
-        }
+        check_listed(path, before).map_err(|reason| format!("{MANIFEST} {reason}"))?;
+        before = path;
     }
     Ok(manifest)
+}
+
+/// Checks a path of a manifest's list of files, given the one before it. Files are sorted by path, so one that is listed twice shows without
+/// a set of all.
+fn check_listed(path: &str, before: &str) -> Result<(), String> {
+    check_path(path).map_err(|e| format!("lists an invalid path: {e}"))?;
+    if path <= before { Err(format!("lists \"{path}\" twice or out of order")) } else { Ok(()) }
 }
 
 /// Checks a manifest except for its list of files.

@@ -1,6 +1,6 @@
 //! The manifest of a release with very many files, read without holding the list of them.
 
-use super::{MANIFEST, ReleaseError, check_head, check_path, unread};
+use super::{MANIFEST, ReleaseError, check_head, check_listed, unread};
 use sastrugi_schemas::manifest::{Artifact, Manifest};
 use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
@@ -98,11 +98,7 @@ impl<'de, F: FnMut(Artifact)> Visitor<'de> for Files<'_, F> {
     fn visit_seq<A: SeqAccess<'de>>(self, mut list: A) -> Result<(), A::Error> {
         let mut before = String::new();
         while let Some(artifact) = list.next_element::<Artifact>()? {
-            check_path(&artifact.path).map_err(|e| A::Error::custom(format!("it lists an invalid path: {e}")))?;
-            // Files are sorted by path, so one that is listed twice shows without a set of all.
-            if artifact.path <= before {
-                return Err(A::Error::custom(format!("it lists \"{}\" twice or out of order", artifact.path)));
-            }
+            check_listed(&artifact.path, &before).map_err(|reason| A::Error::custom(format!("it {reason}")))?;
             before.clone_from(&artifact.path);
             (self.0)(artifact);
         }

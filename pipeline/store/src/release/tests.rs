@@ -91,7 +91,7 @@ fn flip(path: &Path, at: u64) {
     file.write_all(&[byte[0] ^ 1]).unwrap();
 }
 
-/// Paths outside the release are never accessed, whatever its lists contain; a list has each file once; an empty folder is extra.
+/// Paths outside the release are never accessed, whatever its lists contain; a list has each file once, in order; an empty folder is extra.
 #[test]
 fn val_hostile_folders_are_refused() {
     let root = tempfile::tempdir().unwrap();
@@ -112,6 +112,13 @@ fn val_hostile_folders_are_refused() {
     fs::write(dest.join(MANIFEST), manifest.replacen(&second, &first, 1)).unwrap();
     assert!(Release::open(&dest).unwrap_err().to_string().contains("twice"));
     assert!(for_each_artifact(&dest, drop).unwrap_err().to_string().contains("twice"));
+    let mut reversed: serde_json::Value = serde_json::from_str(&manifest).unwrap();
+    reversed["artifacts"].as_array_mut().unwrap().reverse();
+    fs::write(dest.join(MANIFEST), reversed.to_string()).unwrap();
+    assert!(Release::open(&dest).unwrap_err().to_string().contains("out of order"));
+    assert!(for_each_artifact(&dest, drop).unwrap_err().to_string().contains("out of order"));
+    let problems = verify(&dest).unwrap().problems;
+    assert!(problems.iter().any(|p| p.path == MANIFEST && p.message.contains("out of order")), "{problems:?}");
     // Without a manifest the checksums are used.
     let sums = fs::read_to_string(dest.join(SUMS)).unwrap();
     fs::remove_file(dest.join(MANIFEST)).unwrap();

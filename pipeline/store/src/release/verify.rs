@@ -153,10 +153,8 @@ fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, ReleaseError> {
 /// The bytes of `SHA256SUMS` for a manifest.
 fn sums_of(manifest: &Manifest, manifest_sha256: &str) -> io::Result<Vec<u8>> {
     let files = manifest.artifacts.iter().map(|artifact| (artifact.path.as_str(), artifact.sha256.as_str()));
-    let mut files: Vec<(&str, &str)> = files.collect();
-    files.sort_unstable();
     let mut text = Vec::new();
-    write_sums(&mut text, files.into_iter(), manifest_sha256)?;
+    write_sums(&mut text, files, manifest_sha256)?;
     Ok(text)
 }
 
