@@ -275,6 +275,25 @@ fn val_missing_files_are_input_errors() {
     refused(folder.path(), &["run", "study.toml"], INPUT, &["gone.tif", "no such file"]);
 }
 
+/// A folder that is not a release is refused as such, although the output lies inside it, in one line.
+#[test]
+fn val_other_folders_are_not_called_releases() {
+    let folder = area();
+    std::fs::write(folder.path().join("diary.txt"), "mine").unwrap();
+    let verbs: [&[&str]; 4] = [
+        &["report", ".", "-o", "page"],
+        &["pack", ".", "-o", "a.tar"],
+        &["convert", ".", "dataset", "--for", "lerobot"],
+        &["verify", "."],
+    ];
+    for arguments in verbs {
+        let call = sastrugi_in(folder.path(), arguments);
+        let is_refused = call.code == INPUT && call.stderr.contains(".: not a sastrugi release: it has n");
+        assert!(is_refused && call.stderr.lines().count() == 1, "{arguments:?}: {} {}", call.code, call.stderr);
+        assert_eq!(listing(folder.path()), ["diary.txt"], "{arguments:?}");
+    }
+}
+
 #[test]
 fn val_bad_calls_are_usage_errors() {
     let folder = area();

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::remote::check_local;
 use crate::runner::progress::Progress;
-use crate::studies::{head_of, resolved};
+use crate::studies::{check_outside, head_of};
 use crate::verification::{Difference, differences};
 use sastrugi_store::release::{self, Packed, Release};
 use serde::Serialize;
@@ -55,11 +55,8 @@ pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Pac
 
 fn check_output(folder: &Path, output: &Path) -> Result<(), Error> {
     check_local(output)?;
-    if resolved(output).starts_with(resolved(folder)) {
-        let message =
-            "the archive cannot be written into the release, which is sealed; choose a file outside it with -o";
-        return Err(Error::Usage(message.to_owned()));
-    }
+    let refusal = "the archive cannot be written into the release, which is sealed; choose a file outside it with -o";
+    check_outside(folder, output, refusal)?;
     if output.is_dir() {
         return Err(Error::Usage(format!("{} is a folder; -o must be a file", output.display())));
     }

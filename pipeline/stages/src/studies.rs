@@ -262,6 +262,18 @@ pub fn head_of(release: &Path) -> Result<StudyHead, Error> {
     Ok(study.head)
 }
 
+/// Refuses an output inside a release, which is sealed. A folder that is not a release is refused as such.
+///
+/// # Errors
+/// Such an output, with the message `refusal`; a release that cannot be read.
+pub fn check_outside(release: &Path, output: &Path, refusal: &str) -> Result<(), Error> {
+    if !resolved(output).starts_with(resolved(release)) {
+        return Ok(());
+    }
+    release::for_each_artifact(release, drop)?;
+    Err(Error::Usage(refusal.to_owned()))
+}
+
 /// A path with links and dots resolved as far as it exists.
 pub fn resolved(path: &Path) -> PathBuf {
     let absolute = std::path::absolute(path).unwrap_or_else(|_| path.to_owned());

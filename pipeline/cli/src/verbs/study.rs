@@ -343,12 +343,9 @@ fn parse_recompute(text: &str) -> Result<Recompute, Failure> {
 pub fn report(args: &Report, common: &Common) -> Verdict {
     let output = args.output.clone().unwrap_or_else(|| default_report(&args.release));
     remote::check_local(&output)?;
-    let within = |release: &PathBuf| studies::resolved(&output).starts_with(studies::resolved(release));
-    if [&args.release].into_iter().chain(&args.against).any(within) {
-        let message =
-            "the report cannot be written into the release, which is sealed; choose a folder outside it with -o";
-        return Err(Failure::usage(message));
-    }
+    let refusal = "the report cannot be written into the release, which is sealed; choose a folder outside it with -o";
+    let mut releases = [&args.release].into_iter().chain(&args.against);
+    releases.try_for_each(|release| studies::check_outside(release, &output, refusal))?;
     let companions = Companions { against: args.against.clone(), logs: args.logs.clone() };
     let reporter = Reporter::new(common.quiet);
     let summary = sastrugi_report::render_with(&args.release, &companions, &output, &|step| reporter.step(step));

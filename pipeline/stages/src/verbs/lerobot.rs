@@ -11,7 +11,7 @@ use crate::error::Error;
 use crate::operations::dem::input_error;
 use crate::remote::check_local;
 use crate::splits::{OTHER, PARTS};
-use crate::studies::resolved;
+use crate::studies::check_outside;
 use sastrugi_numeric::{Grid, PatchShape, relative_height_patch};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::Manifest;
@@ -131,11 +131,9 @@ pub struct Converted {
 /// within the release, or that holds other files.
 pub fn convert(release: &Path, output: &Path, settings: &Settings) -> Result<Converted, Error> {
     check_local(output)?;
+    let refusal = "the dataset cannot be written into the release, which is sealed; choose a folder outside it";
+    check_outside(release, output, &format!("{}: {refusal}", output.display()))?;
     let opened = Release::open(release)?;
-    if resolved(output).starts_with(resolved(release)) {
-        let message = "the dataset cannot be written into the release, which is sealed; choose a folder outside it";
-        return Err(Error::Usage(format!("{}: {message}", output.display())));
-    }
     lerobot::check_folder(output).map_err(refused)?;
     let chosen = Chosen::of(&opened, settings)?;
     let mut export =
