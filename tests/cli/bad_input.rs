@@ -275,14 +275,15 @@ fn val_missing_files_are_input_errors() {
     refused(folder.path(), &["run", "study.toml"], INPUT, &["gone.tif", "no such file"]);
 }
 
-/// A folder that is not a release is refused as such, although the output lies inside it, in one line.
+/// A folder that is not a release is refused as such, although the output lies inside it, and before any progress is shown.
 #[test]
 fn val_other_folders_are_not_called_releases() {
     let folder = area();
     std::fs::write(folder.path().join("diary.txt"), "mine").unwrap();
-    let verbs: [&[&str]; 4] = [
+    let verbs: [&[&str]; 5] = [
         &["report", ".", "-o", "page"],
         &["pack", ".", "-o", "a.tar"],
+        &["pack", ".", "-o", "../no-release.tar"],
         &["convert", ".", "dataset", "--for", "lerobot"],
         &["verify", "."],
     ];

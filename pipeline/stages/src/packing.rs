@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::remote::check_local;
 use crate::runner::progress::Progress;
 use crate::studies::{check_outside, head_of};
-use crate::verification::{Difference, differences};
+use crate::verification::{Difference, checked, differences};
 use sastrugi_store::release::{self, Packed, Release};
 use serde::Serialize;
 use std::cell::Cell;
@@ -31,8 +31,7 @@ pub struct Packing {
 /// A folder that is not a release; an output inside it or that is a folder; failures of the machine.
 pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Packing, Error> {
     check_output(folder, output)?;
-    progress.phase("checking files");
-    let report = release::verify(folder)?;
+    let report = checked(folder, progress)?;
     let mut packing =
         Packing { output: output.to_owned(), files: 0, bytes: 0, sha256: None, differences: differences(&report) };
     if !packing.differences.is_empty() {

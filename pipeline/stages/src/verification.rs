@@ -67,8 +67,7 @@ pub fn verify(
     limits: Limits,
     progress: &dyn Progress,
 ) -> Result<Verification, Error> {
-    progress.phase("checking files");
-    let report = release::verify(folder)?;
+    let report = checked(folder, progress)?;
     let mut verification = Verification {
         files: report.files,
         bytes: report.bytes,
@@ -95,6 +94,16 @@ pub fn verify(
         }
     }
     Ok(verification)
+}
+
+/// Checks the files of a release. A folder that is not one is refused before any progress is shown.
+///
+/// # Errors
+/// Such a folder; failures of the machine.
+pub(crate) fn checked(folder: &Path, progress: &dyn Progress) -> Result<VerifyReport, Error> {
+    release::check_lists(folder)?;
+    progress.phase("checking files");
+    Ok(release::verify(folder)?)
 }
 
 /// Problems with a release's files.

@@ -14,7 +14,7 @@ pub use builder::{Head, Incoming, PartWriter, ReleaseBuilder, Staging, TablePart
 pub use listed::Listed;
 pub use manifest::for_each_artifact;
 pub use pack::{Packed, pack};
-pub use verify::{Problem, ProblemKind, VerifyReport, verify};
+pub use verify::{Problem, ProblemKind, VerifyReport, check_lists, verify};
 
 use crate::digest;
 use crate::parquet::{self, TableError};

@@ -91,11 +91,9 @@ pub enum ProblemKind {
 /// # }
 /// ```
 pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
+    check_lists(folder)?;
     let manifest_text = read_if_there(&folder.join(MANIFEST))?;
     let sums_text = read_if_there(&folder.join(SUMS))?;
-    if manifest_text.is_none() && sums_text.is_none() {
-        return Err(ReleaseError::not_a_release(folder, format!("it has neither {MANIFEST} nor {SUMS}")));
-    }
     let mut report = VerifyReport::default();
     let mut problem = |path: &str, kind, message: String| {
         report.problems.push(Problem { path: path.to_owned(), kind, message });
@@ -142,9 +140,26 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
     Ok(report)
 }
 
+/// Refuses a folder with neither manifest nor checksums, where there is nothing to verify.
+///
+/// # Errors
+/// [`ReleaseError::NotARelease`] for such a folder; the file system failed.
+pub fn check_lists(folder: &Path) -> Result<(), ReleaseError> {
+    let is_there = |name: &str| if_there(&folder.join(name), Path::metadata).map(|found| found.is_some());
+    if is_there(MANIFEST)? || is_there(SUMS)? {
+        return Ok(());
+    }
+    Err(ReleaseError::not_a_release(folder, format!("it has neither {MANIFEST} nor {SUMS}")))
+}
+
 fn read_if_there(path: &Path) -> Result<Option<Vec<u8>>, ReleaseError> {
-    match crate::file::read(path) {
-        Ok(bytes) => Ok(Some(bytes)),
+    if_there(path, crate::file::read)
+}
+
+/// What `read` finds at a path; `None` if nothing is there.
+fn if_there<T>(path: &Path, read: impl FnOnce(&Path) -> io::Result<T>) -> Result<Option<T>, ReleaseError> {
+    match read(path) {
+        Ok(found) => Ok(Some(found)),
         Err(e) if matches!(e.kind(), io::ErrorKind::NotFound | io::ErrorKind::NotADirectory) => Ok(None),
         Err(e) => Err(ReleaseError::io(path)(e)),
     }
