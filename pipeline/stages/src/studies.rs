@@ -7,6 +7,7 @@ use crate::registry;
 use crate::remote::check_local;
 use crate::runner::assemble::{Contents, assemble, check_other_study};
 use crate::runner::cache::Cache;
+use crate::runner::damage::Changed;
 use crate::runner::division::{Division, common_ancestors, divide};
 use crate::runner::execute::{Execution, Failure, Limits, execute};
 use crate::runner::plan::{PlanSummary, plan};
@@ -128,6 +129,7 @@ pub fn run_sharing(
                 text: &loaded.released,
                 splits: &loaded.splits,
                 results,
+                on_changed: Changed::remove,
                 failures: &execution.failures,
                 replace: request.replace,
             };
@@ -359,6 +361,7 @@ pub fn merge(shards: &[PathBuf], output: &Path, replace: bool, progress: &dyn Pr
         text: &joined.study,
         splits: &joined.splits,
         results: joined.results,
+        on_changed: shard::refuse_changed,
         failures: &joined.failures,
         replace,
     };

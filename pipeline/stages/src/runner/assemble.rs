@@ -30,6 +30,8 @@ pub struct Contents<'a> {
     pub splits: &'a Splits,
     /// Folders of the results, parents before children.
     pub results: Vec<PathBuf>,
+    /// What is done about results that changed; an error if there are any.
+    pub on_changed: fn(Changed) -> Result<(), Error>,
     /// Items without a result.
     pub failures: &'a [Failure],
     /// Whether a release of another study, or one of the same study with fewer failed items, may be replaced.
@@ -40,7 +42,7 @@ pub struct Contents<'a> {
 ///
 /// # Errors
 /// A destination that is not a sastrugi release, is one of another study, or has fewer failed items of the same study; results that cannot
-/// be read, or that changed, which are removed; an I/O error.
+/// be read, or that changed ([`Contents::on_changed`]); an I/O error.
 pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -> Result<Vec<ItemNote>, Error> {
     let mut sources = Sources::of(contents.study)?;
     let _lock = DestinationLock::take(dest)?;
@@ -58,7 +60,7 @@ pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -
     }
     progress.phase("writing tables");
     let written = fragments.write(&mut builder, contents.splits, &changed);
-    changed.remove()?;
+    (contents.on_changed)(changed)?;
     written?;
     add_documents(&mut builder, contents, &sources)?;
     progress.phase("writing the report");

@@ -1,4 +1,4 @@
-//! Results in the work area that changed after they were written.
+//! Results that changed after they were written.
 
 use crate::error::Error;
 use crate::job::ItemRef;
@@ -19,18 +19,19 @@ impl Changed {
         found.entry(folder.to_owned()).or_insert_with(|| format!("{item}: {file}"));
     }
 
-    /// Removes these results, so that the next run recomputes them.
+    /// These results by folder, each with its item and the first file that changed.
+    pub fn into_found(self) -> BTreeMap<PathBuf, String> {
+        self.0.into_inner().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Removes these results of a work area, so that the next run recomputes them.
     ///
     /// # Errors
     /// Any such result; the first is named.
     pub fn remove(self) -> Result<(), Error> {
-        let found = self.0.into_inner().unwrap_or_else(PoisonError::into_inner);
+        let found = self.into_found();
         let Some((folder, what)) = found.first_key_value() else { return Ok(()) };
-        let others = match found.len() - 1 {
-            0 => String::new(),
-            1 => ", and so was 1 other result".to_owned(),
-            n => format!(", and so were {n} other results"),
-        };
+        let others = and_others(found.len());
         let left: Vec<&PathBuf> = found.keys().filter(|folder| fs::remove_dir_all(folder).is_err()).collect();
         let advice = match (left.as_slice(), found.len()) {
             ([], 1) => "that result was removed; run again".to_owned(),
@@ -41,6 +42,15 @@ impl Changed {
             }
         };
         Err(Error::Failed(format!("{what} was changed in the work area {}{others}; {advice}", folder.display())))
+    }
+}
+
+/// The clause on all results but the first that is named.
+pub(super) fn and_others(results: usize) -> String {
+    match results {
+        0 | 1 => String::new(),
+        2 => ", and so was 1 other result".to_owned(),
+        n => format!(", and so were {} other results", n - 1),
     }
 }
 

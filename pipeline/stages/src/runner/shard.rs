@@ -5,7 +5,7 @@
 
 use super::assemble::{DestinationLock, fewer_items};
 use super::cache::{Cache, Record, StoredFile, copy_result, load_record};
-use super::damage::Changed;
+use super::damage::{Changed, and_others};
 use super::execute::Failure;
 use super::graph::Graph;
 use crate::error::Error;
@@ -220,6 +220,11 @@ fn item_folder(shard: &Path, item: &ItemRef) -> PathBuf {
     shard.join("items").join(&item.stage).join(&item.id)
 }
 
+/// The shard that the folder of a result lies in.
+fn shard_folder(result: &Path) -> PathBuf {
+    result.ancestors().nth(3).unwrap_or(result).to_owned()
+}
+
 /// Merged shards: the study, and the folder of each result.
 pub struct Joined {
     /// Text of the study.
@@ -330,6 +335,29 @@ fn results(shards: &[Placed<'_>], failures: &BTreeMap<ItemRef, Failure>) -> Resu
     };
     let problems: Vec<String> = missing.iter().map(problem).collect();
     if problems.is_empty() { Ok(results) } else { Err(Error::Input(problems.join("; "))) }
+}
+
+/// Refuses results of shards that changed while they were merged. They stay in place, since a shard is replaced as a whole.
+///
+/// # Errors
+/// Any such result; each shard is named with its first one and what to run again.
+pub fn refuse_changed(changed: Changed) -> Result<(), Error> {
+    let mut shards: BTreeMap<PathBuf, Vec<String>> = BTreeMap::new();
+    for (result, what) in changed.into_found() {
+        shards.entry(shard_folder(&result)).or_default().push(what);
+    }
+    let mut problems = Vec::new();
+    for (folder, results) in &shards {
+        let Part { index, count } = read(folder)?.part;
+        problems.push(format!(
+            "shard {index} ({}): {} was changed while it was merged{}; {}",
+            folder.display(),
+            results.first().map_or("", String::as_str),
+            and_others(results.len()),
+            mend(&[index], count)
+        ));
+    }
+    if problems.is_empty() { Ok(()) } else { Err(Error::Input(problems.join("; "))) }
 }
 
 /// What to do about missing or damaged shards.
@@ -528,6 +556,31 @@ mod tests {
             let items = vec![(ItemRef::new("terrain", id), "0".repeat(32))];
             assert!(Description { items, ..description(1, 1) }.check().is_err(), "{id}");
         }
+    }
+
+    /// Results that change while they are merged stay where they are; each shard is named with what to run again.
+    #[test]
+    fn val_shards_that_change_late_are_named() {
+        let area = tempfile::tempdir().unwrap();
+        let folder = |index: u32| area.path().join(format!("part-{index}"));
+        let changed = Changed::default();
+        for (index, id) in [(1, "a"), (3, "b"), (3, "c")] {
+            let item = ItemRef::new("fit", id);
+            let result = item_folder(&folder(index), &item);
+            fs::create_dir_all(&result).unwrap();
+            description(index, 3).write(&folder(index).join(DESCRIPTION)).unwrap();
+            changed.note(&result, &item, "x.tif");
+        }
+        let error = refuse_changed(changed).unwrap_err();
+        let problem = |index: u32, what: &str| {
+            let place = folder(index).display().to_string();
+            format!("shard {index} ({place}): fit/{what}; {}", mend(&[index], 3))
+        };
+        let first = problem(1, "a: x.tif was changed while it was merged");
+        let second = problem(3, "b: x.tif was changed while it was merged, and so was 1 other result");
+        assert_eq!(error.to_string(), format!("{first}; {second}"));
+        assert!(matches!(error, Error::Input(_)) && item_folder(&folder(1), &ItemRef::new("fit", "a")).is_dir());
+        refuse_changed(Changed::default()).unwrap();
     }
 
     /// A shard is not replaced by the same one with more failed items.
