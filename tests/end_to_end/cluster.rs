@@ -225,6 +225,30 @@ fn val_damaged_entries_are_never_used() {
     assert_eq!(differing(&whole, &sums(&path.join("third"))), [""; 0]);
 }
 
+/// A result of the ancestors that changed in their work area is computed and published by the same run, which needs no retry.
+#[test]
+fn val_changed_ancestors_are_computed_again() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "study.toml", &small_study());
+    let ancestors = |cache| json(path, &["run", "study.toml", "--ancestors", "3", "--work", "work", "--cache", cache]);
+    let all = computed(&ancestors("first"));
+    assert!(all > 0);
+
+    let below = |folder: PathBuf| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let results = below(path.join("work/items")).flat_map(below).flat_map(below);
+    let product = results.flat_map(below).filter(|file| !file.ends_with("record.json")).min().unwrap();
+    let mut bytes = fs::read(&product).unwrap();
+    let middle = bytes.len() / 2;
+    bytes[middle] ^= 1;
+    fs::write(&product, bytes).unwrap();
+    let Value::Object(cache) = ancestors("second")["cache"].take() else { panic!("no cache") };
+    let item = product.ancestors().nth(2).unwrap().strip_prefix(path.join("work/items")).unwrap();
+    assert_eq!(cache["changed"], serde_json::json!([item.display().to_string()]));
+    assert_eq!((cache["published"].as_u64(), &cache["problems"]), (Some(all), &serde_json::json!([])));
+    assert_eq!(entries(&path.join("second")).len() as u64, all);
+}
+
 /// Another study finds what it has in common with the first, and its release is the one that it makes by itself.
 #[test]
 fn val_studies_share_what_they_have_in_common() {

@@ -192,12 +192,15 @@ fn failed(summary: &RunSummary) -> String {
 
 /// What a run did with its shared cache.
 fn used(tally: &Tally) -> String {
-    let Tally { fetched, published, damaged, read_only, problems } = tally;
+    let Tally { fetched, published, damaged, changed, read_only, problems } = tally;
     let published = if *read_only { "only read".to_owned() } else { format!("{published} published to it") };
     let mut text = format!("\n  shared cache: {} copied from it, {published}", counted(*fetched as u64, "item"));
     if !damaged.is_empty() {
         let outcome = if *read_only { "computed" } else { "replaced" };
         text.push_str(&format!(", damaged and {outcome}: {}", damaged.len()));
+    }
+    if !changed.is_empty() {
+        text.push_str(&format!(", changed in the work area and computed again: {}", changed.len()));
     }
     problems.iter().take(NOTES_MAX).for_each(|problem| text.push_str(&format!("\n  shared cache: {problem}")));
     text
@@ -410,5 +413,8 @@ mod tests {
         assert_eq!(told(&summary, "2 s"), lines.join("\n"));
         summary.failures.truncate(2);
         assert!(told(&summary, "2 s").contains("\n  1 item not run because its input failed: fit/a\n"));
+        summary.cache = Some(Tally { published: 2, changed: ["fit/b".to_owned()].into(), ..Tally::default() });
+        let shared = "\n  shared cache: 0 items copied from it, 2 published to it, changed in the work area and computed again: 1\n";
+        assert!(told(&summary, "2 s").contains(shared));
     }
 }

@@ -152,10 +152,17 @@ impl Cache {
         Some(record)
     }
 
-    /// Offers a result to the shared cache.
+    /// Offers a result that was just computed to the shared cache.
     pub fn publish(&self, record: &Record) {
         if let Some(sharing) = &self.sharing {
             sharing.publish(record, &self.result_folder(&record.item, &record.key));
+        }
+    }
+
+    /// Offers a result of an earlier run to the shared cache. One that changed since is removed instead.
+    pub fn publish_earlier(&self, record: &Record) {
+        if let Some(sharing) = &self.sharing {
+            sharing.publish_earlier(record, &self.result_folder(&record.item, &record.key));
         }
     }
 

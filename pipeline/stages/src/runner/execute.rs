@@ -103,7 +103,7 @@ pub fn execute(
     if cache.shared().is_some() {
         // First, because a result that changed is removed instead, and then has to be computed.
         let records = needed.par_iter().filter_map(|&p| cache.load(&graph.node(p).item, graph.key(p)));
-        records.for_each(|record| cache.publish(&record));
+        records.for_each(|record| cache.publish_earlier(&record));
     }
     let (ready, missing): (Vec<usize>, Vec<usize>) =
         needed.iter().partition(|&&p| cache.holds(&graph.node(p).item, graph.key(p)));

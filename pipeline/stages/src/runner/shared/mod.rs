@@ -119,6 +119,8 @@ pub struct Tally {
     pub published: usize,
     /// Items whose entries were damaged; they were computed.
     pub damaged: BTreeSet<String>,
+    /// Items whose results in the work area had changed after they were written; they were computed again.
+    pub changed: BTreeSet<String>,
     /// Whether it was only read.
     pub read_only: bool,
     /// Why it could not be read or written: the first reasons, each once.
@@ -179,12 +181,29 @@ impl Sharing {
         }
     }
 
-    /// Offers a result in a work area to the cache.
+    /// Offers a result that was just computed to the cache.
     pub fn publish(&self, record: &Record, folder: &Path) {
+        if !self.place.is_read_only() {
+            self.count(self.place.publish(&name_of(&record.key), record, folder));
+        }
+    }
+
+    /// Offers a result of an earlier run to the cache. One that changed since is removed instead, and then this run computes it again.
+    pub fn publish_earlier(&self, record: &Record, folder: &Path) {
         if self.place.is_read_only() {
             return;
         }
-        if self.note(self.place.publish(&name_of(&record.key), record, folder)) == Some(true) {
+        match self.place.publish(&name_of(&record.key), record, folder) {
+            Err(_) if !folder.exists() => {
+                self.lock().changed.insert(record.item.to_string());
+            }
+            published => self.count(published),
+        }
+    }
+
+    /// Counts a result that was published, or keeps the reason why it was not.
+    fn count(&self, published: Result<bool, Error>) {
+        if self.note(published) == Some(true) {
             self.lock().published += 1;
         }
     }
