@@ -2,7 +2,7 @@
 
 use sastrugi_tests::{area, called, program, rows, sastrugi_in, small_study, sums, write};
 use std::fs;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use std::process::Command;
 
 const STUDY: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
@@ -122,6 +122,34 @@ fn val_pipes_and_devices_are_refused_as_input() {
         let call = run(path, &[]);
         assert!(call.code == 65 && call.stderr.contains(name), "{name}: {} {}", call.code, call.stderr);
     }
+}
+
+/// A pipe in place of a file of a work area holds nothing up: a result without its record is computed again, a mark is refused.
+#[cfg(unix)]
+#[test]
+fn val_pipes_in_a_work_area_are_not_read() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    assert_eq!(run(path, &[]).code, 0);
+    let whole = sums(&path.join("release"));
+    let piped = |file: &Path| {
+        fs::remove_file(file).unwrap();
+        assert!(Command::new("mkfifo").arg(file).status().unwrap().success());
+    };
+    let below = |folder: PathBuf| fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path());
+    let results: Vec<PathBuf> = below(path.join("release.work/items")).flat_map(below).flat_map(below).collect();
+    assert!(results.len() >= 2, "{results:?}");
+    results.iter().for_each(|result| piped(&result.join("record.json")));
+    piped(&path.join("release.work/timings.json"));
+    let call = run(path, &["--json"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let summary: serde_json::Value = serde_json::from_str(&call.stdout).unwrap();
+    assert_eq!(summary["computed"].as_u64(), Some(results.len() as u64));
+    assert_eq!(sums(&path.join("release")), whole);
+    piped(&path.join("release.work/CACHEDIR.TAG"));
+    let call = run(path, &[]);
+    assert!(call.code == 1 && call.stderr.contains("CACHEDIR.TAG: is a pipe"), "{} {}", call.code, call.stderr);
 }
 
 /// Out of memory, the call exits with the code for temporary failures and leaves nothing that looks complete.

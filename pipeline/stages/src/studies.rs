@@ -302,7 +302,7 @@ fn all_failed(failures: &[Failure]) -> Error {
 /// Records the wall time of every item that ran, for information; no result depends on it.
 fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
     let path = cache.folder().join("timings.json");
-    let earlier = fs::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
+    let earlier = sastrugi_store::file::read(&path).ok().and_then(|bytes| serde_json::from_slice(&bytes).ok());
     let mut seconds: BTreeMap<String, f64> = earlier.unwrap_or_default();
     seconds.extend(execution.seconds.clone());
     let text = serde_json::to_vec_pretty(&seconds).map_err(Error::failed)?;

@@ -8,7 +8,7 @@
 use super::record;
 use super::{LibraryError, TileKey};
 use crate::samples::Samples;
-use sastrugi_store::atomic;
+use sastrugi_store::{atomic, file};
 use std::fs::{self, File, TryLockError};
 use std::io;
 use std::path::{Path, PathBuf};
@@ -79,7 +79,7 @@ impl Disk {
             atomic::write(&folder.join(CACHE_TAG), CACHE_TAG_TEXT.as_bytes()).map_err(at(folder))?;
             atomic::write(&marker, MARKER_TEXT.as_bytes()).map_err(at(&marker))?;
         }
-        if fs::read(&marker).map_err(at(&marker))? != MARKER_TEXT.as_bytes() {
+        if file::read(&marker).map_err(at(&marker))? != MARKER_TEXT.as_bytes() {
             return Err(LibraryError::Version(folder.to_owned()));
         }
         atomic::clear_leftovers(&marker);
@@ -115,7 +115,7 @@ impl Disk {
     /// The tile of a key, if it has an intact record.
     pub fn read(&self, key: &TileKey) -> Option<Samples> {
         let path = self.path(key);
-        let bytes = fs::read(&path).ok()?;
+        let bytes = file::read(&path).ok()?;
         let tile = record::decode(&key.text, &bytes);
         if tile.is_none() {
             self.damaged.fetch_add(1, Ordering::Relaxed);

@@ -11,8 +11,8 @@ use super::shared::Sharing;
 use crate::error::Error;
 use crate::job::{ItemRef, Outcome, Product};
 use sastrugi_store::atomic::{self, Draft};
-use sastrugi_store::digest;
 use sastrugi_store::release::check_path;
+use sastrugi_store::{digest, file};
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
 use std::fs::{self, File};
@@ -311,7 +311,7 @@ impl Cache {
 fn mark(folder: &Path) -> Result<(), CacheError> {
     fs::create_dir_all(folder).map_err(io_error("cannot create the work area", folder))?;
     let path = folder.join(MARK);
-    match fs::read(&path) {
+    match file::read(&path) {
         Ok(text) if text == MARK_TEXT.as_bytes() => return Ok(()),
         Ok(_) => return Err(CacheError::NotOurs(folder.to_owned())),
         Err(e) if e.kind() == io::ErrorKind::NotFound => {}
@@ -400,7 +400,7 @@ pub fn copy_result(record: &Record, from: &Path, to: &Path, changed: &Changed) -
 }
 
 fn read_json<T: DeserializeOwned>(path: &Path) -> Option<T> {
-    serde_json::from_slice(&fs::read(path).ok()?).ok()
+    serde_json::from_slice(&file::read(path).ok()?).ok()
 }
 
 /// True if all files are in the folder itself and have the recorded sizes.

@@ -216,7 +216,7 @@ fn marked(root: &Path) -> Result<bool, Error> {
     };
     if found.contains(OsStr::new(MARK)) {
         let path = root.join(MARK);
-        let text = fs::read(&path).map_err(|e| unusable(root, e))?;
+        let text = file::read(&path).map_err(|e| unusable(root, e))?;
         return if text == MARK_TEXT.as_bytes() { Ok(true) } else { Err(refused()) };
     }
     if found.iter().all(|name| atomic::is_temporary(name)) { Ok(false) } else { Err(refused()) }
