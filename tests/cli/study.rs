@@ -110,6 +110,14 @@ fn val_doubts_are_told_before_the_run() {
         &heavy,
         &["traverse \"husky\": chassis.mass_kg is changed to 80 but inertia_kg_m2 still belongs"],
     );
+    let small = text.replace("size_px = [1009, 1009]", "size_px = [600, 600]");
+    told(
+        "small.toml",
+        &small,
+        &[
+            "missions \"straight\" on \"d2.30-0001\" and on 9 more: cannot place missions of 35 m: the terrain is 30.00 x 30.00 m",
+        ],
+    );
     // Two weak claims of one family, and a strong one beside an equivalence, which Holm's steps leave alone.
     let mixed = text.replace("count = 5", "count = 4")
         + "\n[[hypothesis]]\nid = \"as-fast\"\nstatistic = \"time_s\"\ngroups = [\"smooth\", \"rough\"]\ntest = \"equivalence\"\nmargin = 2.0\n";

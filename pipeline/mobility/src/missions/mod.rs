@@ -212,6 +212,20 @@ pub fn draw_missions(
     (0..settings.count()).map(|index| field.draw(index, streams)).collect()
 }
 
+/// Checks that a terrain can hold the missions at some heading.
+///
+/// # Errors
+/// [`MissionError::LongerThanTerrain`] otherwise.
+pub fn check_size(terrain: &Geometry, settings: &MissionSettings) -> Result<(), MissionError> {
+    let (length_m, border_m) = (settings.length_m(), settings.border_m());
+    let [inside_x_m, inside_y_m] = terrain.size().map(|extent| extent - 2.0 * border_m);
+    let diagonal_m = (inside_x_m * inside_x_m + inside_y_m * inside_y_m).sqrt();
+    if inside_x_m > 0.0 && inside_y_m > 0.0 && diagonal_m > length_m {
+        return Ok(());
+    }
+    Err(MissionError::LongerThanTerrain { length_m, border_m, inside_x_m, inside_y_m })
+}
+
 /// The part of a class map on which missions may lie.
 struct Field<'a> {
     classes: &'a Grid<u8>,
@@ -224,12 +238,8 @@ struct Field<'a> {
 
 impl<'a> Field<'a> {
     fn new(classes: &'a Grid<u8>, settings: &'a MissionSettings, cells: StartCells) -> Result<Self, MissionError> {
-        let [inside_x_m, inside_y_m] = classes.geometry.size().map(|extent| extent - 2.0 * settings.border_m());
-        let (length_m, border_m) = (settings.length_m(), settings.border_m());
-        let diagonal_m = (inside_x_m * inside_x_m + inside_y_m * inside_y_m).sqrt();
-        if !(inside_x_m > 0.0 && inside_y_m > 0.0 && diagonal_m > length_m) {
-            return Err(MissionError::LongerThanTerrain { length_m, border_m, inside_x_m, inside_y_m });
-        }
+        check_size(&classes.geometry, settings)?;
+        let border_m = settings.border_m();
         let inside: Vec<usize> =
             (0..classes.values.len()).filter(|&k| is_inside(&classes.geometry, border_m, centre(classes, k))).collect();
         let low: Vec<usize> = inside.iter().copied().filter(|&k| is_low(classes, k)).collect();

@@ -9,7 +9,9 @@ use crate::operations::drawn::{Drawn, Lines};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
-use sastrugi_mobility::missions::{MissionError, MissionParameters, MissionSettings, StartCells, draw_missions};
+use sastrugi_mobility::missions::{
+    MissionError, MissionParameters, MissionSettings, StartCells, check_size, draw_missions,
+};
 use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_roughness::shares;
 use sastrugi_schemas::Kind;
@@ -89,6 +91,8 @@ pub fn add(
     let of = |id: String| Arc::new(lines(builder, &envelope.id, &rules, id));
     let lines: Vec<Arc<Lines>> = heightfields.into_iter().map(of).collect();
     check_geometry(builder, entry, &lines)?;
+    let doubt = doubt_of_size(builder, &envelope.id, &lines, &settings);
+    builder.doubts.extend(doubt);
     for one in &lines {
         let words = format!("{}@{}", envelope.id, one.word);
         let streams = builder.streams(STAGE, &words, envelope.seed, one.shared.unwrap_or(0));
@@ -124,6 +128,25 @@ fn lines(builder: &Builder<'_>, missions: &str, rules: &Arc<Value>, heightfield:
         shared,
         heightfield,
     }
+}
+
+/// A warning about heightfields that are too small for the missions, as far as this is known before the run: all their missions will fail.
+fn doubt_of_size(
+    builder: &Builder<'_>,
+    missions: &str,
+    lines: &[Arc<Lines>],
+    settings: &MissionSettings,
+) -> Option<String> {
+    let mut small = lines.iter().filter_map(|one| {
+        let geometry = builder.heightfields.get(&one.heightfield)?.expected?;
+        Some((&one.heightfield, check_size(&geometry, settings).err()?))
+    });
+    let (id, error) = small.next()?;
+    let others = match small.count() {
+        0 => String::new(),
+        n => format!(" and on {n} more"),
+    };
+    Some(format!("missions \"{missions}\" on \"{id}\"{others}: cannot {error}"))
 }
 
 /// Refuses heightfields that share draws but have different cells, as far as this is known before the run.
