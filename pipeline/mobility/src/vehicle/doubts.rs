@@ -30,11 +30,12 @@ pub(crate) fn doubts(vehicle: &VehicleParameters, base: Option<&VehicleParameter
 fn clearance(vehicle: &VehicleParameters) -> Option<String> {
     let (chassis, wheels) = (&vehicle.chassis, &vehicle.wheels);
     let clearance_m = chassis.bottom_z_m - (wheels.axle_z_m - wheels.radius_m);
+    let side = if clearance_m < 0.0 { "below" } else { "above" };
     (clearance_m <= sag_m(vehicle)).then(|| {
         format!(
-            "the bottom plate is {:.3} m above the lowest point of the wheels and the tyres sink by {:.3} m, so the vehicle will \
+            "the bottom plate is {:.3} m {side} the lowest point of the wheels and the tyres sink by {:.3} m, so the vehicle will \
              rest on its belly in every mission: chassis.bottom_z_m = {}, wheels.axle_z_m = {}, wheels.radius_m = {}",
-            clearance_m, sag_m(vehicle), chassis.bottom_z_m, wheels.axle_z_m, wheels.radius_m
+            clearance_m.abs(), sag_m(vehicle), chassis.bottom_z_m, wheels.axle_z_m, wheels.radius_m
         )
     })
 }
@@ -155,7 +156,14 @@ mod tests {
         );
         one(json!({ "chassis": { "size_m": [1.1, 0.6, 0.25] } }), "size_m is changed");
         one(json!({ "wheels": { "radius_m": 0.15 } }), "spin_inertia_kg_m2 = 0.0297");
-        one(json!({ "wheels": { "axle_z_m": 0.17 } }), "rest on its belly");
+        one(
+            json!({ "wheels": { "axle_z_m": 0.165 } }),
+            "the bottom plate is 0.000 m above the lowest point of the wheels",
+        );
+        one(
+            json!({ "wheels": { "axle_z_m": 0.3 } }),
+            "the bottom plate is 0.135 m below the lowest point of the wheels",
+        );
         one(json!({ "tyre": { "stiffness_n_m": 3000.0 } }), "the tyres sink by 0.046 m");
         one(json!({ "chassis": { "inertia_kg_m2": [0.6, 0.6, 2.0] } }), "is not physical");
         one(json!({ "chassis": { "inertia_kg_m2": [60.0, 170.0, 200.0] } }), "a solid box of that mass and size");

@@ -30,7 +30,7 @@ impl UnknownKey {
 }
 
 /// Synonyms that users may try, and the key they mean.
-const SYNONYMS: [(&[&str], &str); 21] = [
+const SYNONYMS: [(&[&str], &str); 24] = [
     (&["author", "authors", "people"], "creators"),
     (&["institution", "institutions", "affiliation"], "organizations"),
     (&["tags", "subjects"], "keywords"),
@@ -52,6 +52,9 @@ const SYNONYMS: [(&[&str], &str); 21] = [
     (&["outer_scale", "detrend", "detrending", "window_m"], "outer_scale_m"),
     (&["summary", "abstract"], "description"),
     (&["terrain", "surface", "surfaces"], "terrains"),
+    (&["base", "terrain", "surface"], "onto"),
+    (&["surface", "raster", "site"], "dem"),
+    (&["surface", "terrain", "dem", "operand"], "of"),
 ];
 
 /// The candidate nearest to `word` in spelling, if it is close enough (Jaro-Winkler similarity above 0.75).
@@ -213,5 +216,19 @@ mod tests {
         assert_eq!(unknown(json!({"optional": {"sigma": 1}}))[0].0, "optional.sigma");
         assert_eq!(unknown(json!({"list": [{"sigma_px": 1}, {"x": 1}]})), one("list.1.x", None));
         assert_eq!(unknown(json!({"x": 1, "low": {"y": 1}, "list": [{"z": 1}]})).len(), 3);
+    }
+
+    /// A surface has another key in every section; only keys of that section are suggested.
+    #[test]
+    fn val_synonyms_of_each_section() {
+        let meant = |key: &str, known: &[&str]| {
+            let known = known.iter().map(|key| (*key).to_owned()).collect();
+            UnknownKey { path: vec![key.to_owned()], known }.nearest().map(str::to_owned)
+        };
+        for known in [["terrains", "of"], ["fit", "onto"], ["cell_m", "dem"], ["kind", "of"]] {
+            let expected = if known[0] == "terrains" { "terrains" } else { known[1] };
+            assert_eq!(meant("surface", &known).as_deref(), Some(expected));
+        }
+        assert_eq!(meant("surface", &["count", "seed"]), None);
     }
 }
