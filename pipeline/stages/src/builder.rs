@@ -393,7 +393,7 @@ pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterat
     let known: Vec<&str> = known.map(String::as_str).collect();
     let nearest = crate::study::keys::nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
     let list = if known.is_empty() {
-        format!("the study defines no id that `{key}` can name; add its section")
+        format!("no table before this one defines an id that `{key}` can name; add one, or move it above")
     } else {
         format!("known: {}", known.join(", "))
     };

@@ -614,6 +614,16 @@ mod tests {
             let refused = load_text(&format!("{STUDY}\n{tables}"), "study", Path::new("")).err().unwrap().to_string();
             assert!(refused.contains(missing), "{refused}");
         }
+        // Surfaces of one section refer to those above them.
+        let head = STUDY.split_once("[[terrain]]").unwrap().0;
+        let text = format!(
+            "{head}[[terrain]]\nid = \"c\"\nkind = \"compose\"\nsize_px = [64, 64]\nprocesses = [{{ of = \"g\" }}]\n\
+             [[terrain]]\nid = \"g\"\nkind = \"gap\"\nsize_px = [64, 64]\n"
+        );
+        let Err(Error::Study { refusals: Refusals(errors), .. }) = load_text(&text, "study", Path::new("")) else {
+            panic!("the study is not refused")
+        };
+        assert!(errors[0].help.as_ref().is_some_and(|help| help.ends_with("add one, or move it above")), "{errors:?}");
         // What follows from another error is not told.
         let wrong = fit("snow", "site") + "[[dem]]\nid = \"site\"\npath = \"site.tif\"\n";
         let refused = load_text(&format!("{STUDY}\n{wrong}"), "study", Path::new("")).err().unwrap().to_string();
