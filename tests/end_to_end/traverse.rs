@@ -287,7 +287,7 @@ fn val_traverse_states_why_it_refuses() {
     let steep = "has low roughness; every cell is steeper than [roughness] low_max: use a smoother terrain";
     refused(&ascii(0.1, |row, col| f64::from((row + col) % 2)), &short, steep);
     // Spikes 0.8 m apart, between which no disc of the closing fits.
-    let spikes = |row: u32, col: u32| if row % 8 == 0 && col % 8 == 0 { 1.0 } else { 0.0 };
+    let spikes = |row: u32, col: u32| if row.is_multiple_of(8) && col.is_multiple_of(8) { 1.0 } else { 0.0 };
     let closed = "was low before closing with [roughness] closing_radius_m = 0.57 m: reduce the radius";
     refused(&ascii(0.1, spikes), &short, closed);
     refused(&ascii(0.1, |_, _| -9999.0), &short, "none of the 96 x 96 cells holds data");
