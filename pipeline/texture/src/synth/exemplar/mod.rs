@@ -4,7 +4,8 @@
 //! The first cells lie on a wide grid, farther apart than the residual is correlated, and are drawn from the site at random. Cells between them follow on grids
 //! of half the spacing, down to every cell (`sampling.rs`). Each takes its detail from the place of the site whose neighbourhood is most like its own
 //! known one: `neighbours` cells, nearest first. Compared are the places that continue a neighbour as the site does, and places at
-//! random: `scan` on the widest grid, an eighth of that on each finer one. Long waves are thus searched widely, fine ones follow them.
+//! random: `scan` on grids of 8 cells and wider, an eighth of that on each finer one, at least 8. Long waves are thus searched widely, fine ones
+//! follow them.
 //!
 //! A cell gets the detail of its place (its height above the weighted mean of the neighbourhood) on the level of its own neighbourhood. Heights as
 //! they are, the rule of the sources, took a third of the standard deviation from two real sites: no place fits a wide neighbourhood well, and a flat one
@@ -23,7 +24,8 @@
 //! * Ashikhmin 2001, Synthesizing natural textures, I3D, 217, doi:10.1145/364338.364405: places that continue a neighbour.
 //!
 //! Departures: details instead of heights; grids instead of a random path, so that cells of one pass may be computed on any number of threads;
-//! places at random are compared instead of all, by transforms, for each cell.
+//! places at random are compared instead of all, by transforms, for each cell; the single best of them is taken, where Gravey and Mariethoz draw
+//! one of the k best.
 //!
 //! # Limits
 //! * Features wider than a few spacings are not seen as a whole. [`super::quilting`] keeps them up to the width of a patch.
@@ -33,8 +35,10 @@
 //! * A gap in the site costs only the places whose neighbourhood it covers by more than 30 %. The DEM licence extends to the texture.
 //!
 //! # Cost
-//! Per cell of the finest grid `neighbours` places of `neighbours` cells, and with the default `scan` about half as much again for all wider grids
-//! together. Memory: 12 bytes per cell of the site, 40 per cell of the texture.
+//! For each cell of the texture `neighbours` places that continue a neighbour, and with the default `scan` at most 55 at random (23 for first cells
+//! 8 apart), each compared at `neighbours` cells: places at random are not in the processor's cache, so 1024 x 1024 cells from as large a site
+//! take 20 to 40 s (estimated from a sixteenth of them). Memory: 20 bytes per cell of the site, 48 per cell of the texture (14, and up to 32 for the
+//! offsets at which the widest grid seeks its neighbours).
 
 pub mod sampling;
 
@@ -57,6 +61,8 @@ const SPACING_LENGTHS: usize = 2;
 const OPERATIONS_PER_CELL: f64 = 100.0;
 /// Fewest cells with data in a site.
 const PLACES_MIN: usize = 1000;
+/// Grids that the cost counts; wider ones have hardly any cells.
+const GRIDS_MAX: usize = 16;
 
 /// Raw parameters of direct sampling, without those of its tile.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -68,7 +74,8 @@ pub struct ExemplarParameters {
     pub spacing_m: Option<f64>,
     /// Known cells around a cell that are compared, in [4, 64]. Default 12.
     pub neighbours: u32,
-    /// Places compared at random for each cell of the widest grid, at most 100 000; an eighth on each finer one. Default 2000.
+    /// Places compared at random for each cell of grids of 8 cells and wider, in [1, 100 000]; an eighth on each finer one, at least 8. Default
+    /// 2000.
     pub scan: u32,
     /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
@@ -91,7 +98,7 @@ impl ResidualParameters for ExemplarParameters {
 
     fn check(&self) -> Result<(), ParameterError> {
         self.spacing_m.map(|m| ParameterError::positive("spacing_m", m)).transpose()?;
-        for (key, value, low, high) in [("neighbours", self.neighbours, 4, 64), ("scan", self.scan, 0, 100_000)] {
+        for (key, value, low, high) in [("neighbours", self.neighbours, 4, 64), ("scan", self.scan, 1, 100_000)] {
             if !(low..=high).contains(&value) {
                 return Err(ParameterError::new(key, format!("is {value}; it must lie in [{low}, {high}]")));
             }
@@ -129,8 +136,13 @@ impl ResidualKernel for Sampler {
 impl ExemplarParameters {
     /// Cost of a tile of `cells` from a site of `places` cells.
     fn cost(&self, places: u64, cells: u64) -> Cost {
-        let compared = f64::from(self.neighbours) * (1.5 * f64::from(self.neighbours));
-        Cost { memory_bytes: 12 * places + 40 * cells, operations: OPERATIONS_PER_CELL * compared * cells as f64 }
+        // Three quarters of the cells of a grid are not on the next wider one.
+        let at_random =
+            |spacing: usize| 0.75 / (spacing * spacing) as f64 * sampling::scan_at(self.scan as usize, spacing) as f64;
+        let at_random: f64 = (0..GRIDS_MAX).map(|k| at_random(1 << k)).sum();
+        let neighbours = f64::from(self.neighbours);
+        let compared = neighbours * (neighbours + at_random);
+        Cost { memory_bytes: 20 * places + 48 * cells, operations: OPERATIONS_PER_CELL * compared * cells as f64 }
     }
 
     /// Spacing of the first cells, a power of 2, cells: at most half of the tile's shorter side.
@@ -172,7 +184,7 @@ pub fn synthesise(
 ) -> Result<Collage, SynthesisError> {
     measured.check(&tile.geometry, NAME)?;
     let site = &measured.residual;
-    let places: Vec<usize> = (0..site.values.len()).filter(|&k| site.values[k].is_finite()).collect();
+    let places: Vec<u32> = (0..site.values.len() as u32).filter(|&k| site.values[k as usize].is_finite()).collect();
     if places.len() < PLACES_MIN {
         let side_m = site.geometry.mean_cell();
         return Err(SynthesisError::FewPlaces { method: NAME, places: places.len(), least: PLACES_MIN, side_m });
@@ -183,10 +195,11 @@ pub fn synthesise(
     let mut first = streams.stream("first");
     for row in (0..shape[0]).step_by(spacing) {
         for col in (0..shape[1]).step_by(spacing) {
-            let source = places[first.below(places.len() as u64) as usize];
+            let source = places[first.below(places.len() as u64) as usize] as usize;
             field.put(row * shape[1] + col, source, site.values[source]);
         }
     }
+    drop(places);
     let sampling =
         Sampling { neighbours: parameters.neighbours as usize, scan: parameters.scan as usize, spacing: spacing / 2 };
     let all = vec![true; shape[0] * shape[1]];

@@ -9,6 +9,9 @@
 //! the site, mismatch and level are 0 and the cell is a copy. Two neighbourhoods that have nothing in common have a mismatch of 1, whatever their
 //! roughness; without the division a flat place would fit a rough neighbourhood better than another rough one.
 //!
+//! Where no place has data for enough of a neighbourhood, the cell becomes the weighted mean of its neighbours: a height drawn from the site would
+//! stand out by up to the site's relief.
+//!
 //! Unknown cells are visited on grids of spacing 2^k, 2^(k-1) ... 1, each in four passes: every second cell of both axes; the centres between them;
 //! the rest of every second row; the rest of the columns. Cells of one pass do not see each other, so that they may be computed in any order.
 
@@ -23,11 +26,15 @@ const LEAST_VARIANCE: f64 = 1e-6;
 /// Share of a neighbourhood's weight for which a place must have data.
 const DATA_SHARE: f64 = 0.7;
 /// Neighbours are sought within this many spacings of the grid.
-const REACH: i64 = 4;
+const REACH: usize = 4;
+/// On grids of at least this spacing, cells, all the stated places are compared at random.
+const FULL_SPACING: usize = 8;
+/// Fewest places that are compared at random, if as many are stated.
+const SCAN_MIN: usize = 8;
 
 /// Neighbours, places at random, and widest grid for gaps.
 const GAP_NEIGHBOURS: usize = 12;
-const GAP_SCAN: usize = 64;
+const GAP_SCAN: usize = 512;
 const GAP_SPACING: usize = 4;
 
 /// A field in which some cells are known.
@@ -47,8 +54,7 @@ pub struct Field {
 pub struct Sampling {
     /// Most neighbours that are compared.
     pub neighbours: usize,
-    /// Places compared at random for each cell of the widest grid, besides those that continue a neighbour; an eighth of that on each finer
-    /// grid, which has four times the cells.
+    /// Places compared at random for each cell of wide grids, besides those that continue a neighbour; see [`scan_at`].
     pub scan: usize,
     /// Widest spacing of the grids, a power of 2, cells.
     pub spacing: usize,
@@ -80,18 +86,26 @@ struct Exemplar<'a> {
     variance_m2: f64,
 }
 
+/// Places compared at random for each cell of a grid of `spacing` cells: `scan` from a spacing of 8 on; on finer grids, which have four times
+/// the cells each, fewer by the cube of the spacing, but at least 8.
+pub fn scan_at(scan: usize, spacing: usize) -> usize {
+    let spacing = spacing.min(FULL_SPACING);
+    (scan * spacing.pow(3) / FULL_SPACING.pow(3)).clamp(scan.min(SCAN_MIN), scan)
+}
+
 /// Fills the unknown cells that `wanted` marks.
 pub fn fill(field: &mut Field, wanted: &[bool], site: &Grid, sampling: Sampling, counter: Counter) {
     let exemplar = Exemplar::new(site);
     let [rows, cols] = field.shape;
     let mut open: Vec<bool> = wanted.iter().zip(&field.heights_m).map(|(&w, z)| w && z.is_nan()).collect();
-    let (mut spacing, mut scan) = (sampling.spacing, sampling.scan);
+    let mut spacing = sampling.spacing;
     while spacing > 0 {
-        let offsets = offsets(REACH * spacing as i64);
-        for [south, east] in [[0, 0], [1, 1], [0, 1], [1, 0]] {
-            let lines = (south * spacing..rows).step_by(2 * spacing);
-            let cells: Vec<usize> = lines
-                .flat_map(|r| (east * spacing..cols).step_by(2 * spacing).map(move |c| r * cols + c))
+        let offsets = offsets(REACH * spacing, field.reach());
+        let scan = scan_at(sampling.scan, spacing);
+        for shift in [[0, 0], [1, 1], [0, 1], [1, 0]] {
+            let cells: Vec<usize> = (shift[0] * spacing..rows)
+                .step_by(2 * spacing)
+                .flat_map(|r| (shift[1] * spacing..cols).step_by(2 * spacing).map(move |c| r * cols + c))
                 .filter(|&cell| open[cell])
                 .collect();
             let known = &*field;
@@ -105,7 +119,7 @@ pub fn fill(field: &mut Field, wanted: &[bool], site: &Grid, sampling: Sampling,
                 field.put(cell, sample.source, sample.height_m);
             }
         }
-        (spacing, scan) = (spacing / 2, scan / 8);
+        spacing /= 2;
     }
 }
 
@@ -128,12 +142,14 @@ pub fn closed(site: &Grid, width: usize, streams: &Streams) -> Field {
     field
 }
 
-/// Offsets within a radius, nearest first.
-fn offsets(radius: i64) -> Vec<[i64; 2]> {
-    let square = |[r, c]: &[i64; 2]| r * r + c * c;
-    let all = (-radius..=radius).flat_map(|r| (-radius..=radius).map(move |c| [r, c]));
-    let mut near: Vec<[i64; 2]> = all.filter(|d| (1..=radius * radius).contains(&square(d))).collect();
-    near.sort_by_key(|d| (square(d), *d));
+/// Offsets within a radius, at most `reach` rows and columns away, nearest first.
+fn offsets(radius: usize, reach: [usize; 2]) -> Vec<[i32; 2]> {
+    let [down, across] = reach.map(|most| most.min(radius) as i32);
+    let square = |d: &[i32; 2]| d.iter().map(|&k| i64::from(k) * i64::from(k)).sum::<i64>();
+    let farthest = (radius * radius) as i64;
+    let all = (-down..=down).flat_map(|r| (-across..=across).map(move |c| [r, c]));
+    let mut near: Vec<[i32; 2]> = all.filter(|d| (1..=farthest).contains(&square(d))).collect();
+    near.sort_unstable_by_key(|d| (square(d), *d));
     near
 }
 
@@ -162,9 +178,10 @@ impl Field {
     }
 
     /// The known cells nearest to `cell`.
-    fn neighbours(&self, cell: usize, offsets: &[[i64; 2]], most: usize) -> Vec<Neighbour> {
+    fn neighbours(&self, cell: usize, offsets: &[[i32; 2]], most: usize) -> Vec<Neighbour> {
         let at = [cell / self.shape[1], cell % self.shape[1]];
-        let known = offsets.iter().filter_map(|&offset| {
+        let known = offsets.iter().filter_map(|offset| {
+            let offset = offset.map(i64::from);
             let [row, col] = [self.reached(0, at[0], offset[0])?, self.reached(1, at[1], offset[1])?];
             let k = row * self.shape[1] + col;
             let height_m = Some(self.heights_m[k]).filter(|z| !z.is_nan())?;
@@ -182,6 +199,11 @@ impl Field {
             false => (0..side).contains(&target).then_some(target as usize),
         }
     }
+
+    /// Rows and columns from a cell to the farthest ones; on a torus, around either side.
+    fn reach(&self) -> [usize; 2] {
+        self.shape.map(|side| if self.is_torus { side / 2 } else { side - 1 })
+    }
 }
 
 impl<'a> Exemplar<'a> {
@@ -192,8 +214,8 @@ impl<'a> Exemplar<'a> {
         Self { grid, places, variance_m2: sums::mean(&squares) }
     }
 
-    /// The best sample among the places that continue a neighbour, and `scan` places at random. A cell without neighbours, or whose
-    /// neighbourhood the site lacks, takes a place at random.
+    /// The best sample among the places that continue a neighbour, and `scan` places at random. A cell without neighbours takes a place at random;
+    /// one whose neighbourhood the site lacks, the mean of its neighbours.
     fn best(&self, neighbours: &[Neighbour], scan: usize, counter: Counter) -> Sample {
         let cols = self.grid.cols();
         let place = |k: usize| [(k / cols) as i64, (k % cols) as i64];
@@ -208,7 +230,10 @@ impl<'a> Exemplar<'a> {
         });
         let drawn = (0..scan).map(|k| place(draw(k)));
         let any = draw(scan);
-        let start = Sample { source: any, height_m: self.grid.values[any], mismatch: f64::INFINITY };
+        let mut known = Sums::default();
+        neighbours.iter().for_each(|n| known.add(n.weight, n.height_m));
+        let height_m = if neighbours.is_empty() { self.grid.values[any] } else { known.mean() };
+        let start = Sample { source: any, height_m, mismatch: f64::INFINITY };
         let samples = continued.chain(drawn).filter_map(|at| self.compare(at, neighbours));
         samples.fold(start, |best, sample| if sample.mismatch < best.mismatch { sample } else { best })
     }
@@ -286,9 +311,38 @@ mod tests {
 
     #[test]
     fn val_offsets_are_nearest_first() {
-        let near = offsets(2);
+        let near = offsets(2, [9, 9]);
         assert_eq!(near[..4], [[-1, 0], [0, -1], [0, 1], [1, 0]]);
         assert_eq!((near.len(), near[11]), (12, [2, 0]));
+        // A strip of two rows.
+        assert_eq!(offsets(2, [1, 9]).len(), 10);
+        let field = |is_torus: bool| Field::new([5, 8], is_torus).reach();
+        assert_eq!((field(true), field(false)), ([2, 4], [4, 7]));
+    }
+
+    /// By hand: all places from a spacing of 8 on, then an eighth for each halving, at least 8 or all of them; for a spacing of 64 at most 55 places for
+    /// each cell of the finest grid.
+    #[test]
+    fn val_places_by_spacing() {
+        assert_eq!([64, 8, 4, 2, 1].map(|spacing| scan_at(2000, spacing)), [2000, 2000, 250, 31, 8]);
+        assert_eq!([1 << 40, 8, 4, 1].map(|spacing| scan_at(20, spacing)), [20, 20, 8, 8]);
+        assert_eq!([16, 4, 1].map(|spacing| scan_at(1, spacing)), [1, 1, 1]);
+        let grids = [32, 16, 8, 4, 2, 1];
+        let total: f64 = grids.iter().map(|&s| 0.75 / (s * s) as f64 * scan_at(2000, s) as f64).sum();
+        assert!((50.0..55.0).contains(&total), "{total}");
+    }
+
+    /// A neighbourhood that no place of the site has: its only neighbours lie farther apart than the site is wide.
+    #[test]
+    fn val_a_cell_without_a_place_is_the_mean_of_its_neighbours() {
+        let exemplar_site = noise(5, 5);
+        let exemplar = Exemplar::new(&exemplar_site);
+        let of = |offset: [i64; 2], height_m: f64, weight: f64| Neighbour { offset, height_m, weight, source: 12 };
+        let sample = exemplar.best(&[of([0, -9], 100.0, 3.0), of([0, 9], 104.0, 1.0)], 50, counter());
+        assert_eq!((sample.height_m, sample.mismatch), (101.0, f64::INFINITY));
+        // Without neighbours, any height of the site will do.
+        let alone = exemplar.best(&[], 50, counter());
+        assert_eq!(alone.height_m, exemplar_site.values[alone.source]);
     }
 
     /// A hole cut into a site is filled with the very heights that were there, although other places were compared: those that
@@ -332,8 +386,9 @@ mod tests {
         let mut site = noise(9, 10);
         site.values[33..37].fill(f64::NAN);
         let known = noise(12, 12);
-        let neighbours: Vec<Neighbour> = offsets(2)
+        let neighbours: Vec<Neighbour> = offsets(2, [2, 2])
             .into_iter()
+            .map(|offset| offset.map(i64::from))
             .enumerate()
             .map(|(k, offset)| Neighbour { offset, height_m: known.values[k], weight: 1.0 / (1 + k) as f64, source: 0 })
             .collect();
