@@ -235,6 +235,19 @@ pub enum SynthesisError {
         /// Half of the tile's shorter side, m.
         limit_m: f64,
     },
+    /// The first cells of a direct sampling do not fit on a periodic tile.
+    #[error(
+        "first cells {spacing} m apart do not fit twice on the periodic tile, whose shorter side is {side} m; enlarge the tile, or set \
+         periodic = false",
+        spacing = to_micrometres(*.spacing_m),
+        side = to_micrometres(*.side_m)
+    )]
+    SpacingTooWide {
+        /// Spacing of the first cells, m.
+        spacing_m: f64,
+        /// Shorter side of the tile, m.
+        side_m: f64,
+    },
     /// Patches without room for an overlap.
     #[error(
         "`patch_m` is {patch}, too narrow for an overlap that can be cut; it must be at least {least} m",

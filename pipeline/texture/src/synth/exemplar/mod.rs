@@ -47,7 +47,7 @@ use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
 use super::{Cost, SynthesisError};
 use sampling::{Field, Sampling};
-use sastrugi_numeric::{Counter, Streams};
+use sastrugi_numeric::{Counter, Geometry, Streams};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -69,7 +69,7 @@ const GRIDS_MAX: usize = 16;
 #[serde(deny_unknown_fields, default)]
 pub struct ExemplarParameters {
     /// Least spacing of the first cells, which are drawn at random, m; rounded up to a power of 2 in cells. Default: twice the lag at which the
-    /// residual's correlation is 1/e.
+    /// residual's correlation is 1/e. On a periodic tile they are nearer, down to half of that, where only so two fit on each side.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub spacing_m: Option<f64>,
     /// Known cells around a cell that are compared, in [4, 64]. Default 12.
@@ -145,19 +145,28 @@ impl ExemplarParameters {
         Cost { memory_bytes: 20 * places + 48 * cells, operations: OPERATIONS_PER_CELL * compared * cells as f64 }
     }
 
-    /// Spacing of the first cells, a power of 2, cells: at most half of the tile's shorter side.
-    fn spacing(&self, measured: &Measured, tile: &Tile) -> usize {
-        let cell_m = measured.residual.geometry.cell;
+    /// Spacing of the first cells, a power of 2, cells.
+    fn spacing(&self, measured: &Measured, tile: &Tile) -> Result<usize, SynthesisError> {
+        let Geometry { rows, cols, cell: [dx, dy], .. } = tile.geometry;
         let wanted = match self.spacing_m {
-            Some(m) => (m / cell_m[0].min(cell_m[1])).ceil() as usize,
+            Some(m) => (m / dx.min(dy)).ceil() as usize,
             None => {
                 let [south, east] = measured.correlation_cells();
                 SPACING_LENGTHS * south.max(east)
             }
         };
-        let most = (tile.geometry.rows.min(tile.geometry.cols) / 2).max(2);
-        let spacing = wanted.clamp(2, most).next_power_of_two();
-        if spacing > most { spacing / 2 } else { spacing }
+        // Beyond the longer side there is one first cell, however far apart they are.
+        let spacing = wanted.min(rows.max(cols)).max(2).next_power_of_two();
+        if !tile.periodic {
+            return Ok(spacing);
+        }
+        let (shorter, side_m) = if rows < cols { (rows, dy) } else { (cols, dx) };
+        let fitting = spacing.min(1 << (shorter / 2).max(2).ilog2());
+        if 2 * fitting < wanted {
+            let [spacing_m, side_m] = [wanted, shorter].map(|cells| cells as f64 * side_m);
+            return Err(SynthesisError::SpacingTooWide { spacing_m, side_m });
+        }
+        Ok(fitting)
     }
 }
 
@@ -175,7 +184,7 @@ pub fn kind() -> Kind {
 /// A texture sampled from a measured residual. Streams: `first`, `places`.
 ///
 /// # Errors
-/// Cells that are not the site's; a site with less than 1000 cells of data.
+/// Cells that are not the site's; a site with less than 1000 cells of data; first cells too far apart for a periodic tile.
 pub fn synthesise(
     measured: &Measured,
     tile: &Tile,
@@ -184,13 +193,13 @@ pub fn synthesise(
 ) -> Result<Collage, SynthesisError> {
     measured.check(&tile.geometry, NAME)?;
     let site = &measured.residual;
+    let spacing = parameters.spacing(measured, tile)?;
     let places: Vec<u32> = (0..site.values.len() as u32).filter(|&k| site.values[k as usize].is_finite()).collect();
     if places.len() < PLACES_MIN {
         let side_m = site.geometry.mean_cell();
         return Err(SynthesisError::FewPlaces { method: NAME, places: places.len(), least: PLACES_MIN, side_m });
     }
     let shape = [tile.geometry.rows, tile.geometry.cols];
-    let spacing = parameters.spacing(measured, tile);
     let mut field = Field::new(shape, tile.periodic);
     let mut first = streams.stream("first");
     for row in (0..shape[0]).step_by(spacing) {

@@ -128,16 +128,22 @@ fn prop_threads_change_no_bit() {
     assert_ne!(bits(&alone), bits(&made(&site, &tile(90, 100, true), 8)));
 }
 
-/// By hand: a correlation length of 5 cells gives 10, rounded up to 16; a stated spacing replaces it; a small tile halves it.
+/// By hand: a correlation length of 5 cells gives 10, rounded up to 16; a stated spacing replaces it. On a periodic tile it is the largest power
+/// of 2 that fits twice, if it is at least half of what is wanted; without `periodic`, the tile's width has no effect.
 #[test]
 fn val_spacing_by_hand() {
     let measured = Measured { residual: gaussian_low_pass(&noise(300, 300, "smooth"), 2.4) };
     let base = ExemplarParameters::default();
-    assert_eq!(base.spacing(&measured, &tile(300, 300, true)), 16);
-    assert_eq!(base.spacing(&measured, &tile(20, 300, true)), 8);
-    assert_eq!(base.spacing(&measured, &tile(1, 300, true)), 2);
-    let wide = ExemplarParameters { spacing_m: Some(1.7), ..base };
-    assert_eq!(wide.spacing(&measured, &tile(300, 300, true)), 32);
+    let of = |parameters: &ExemplarParameters, tile: &Tile| parameters.spacing(&measured, tile).ok();
+    assert_eq!(of(&base, &tile(300, 300, true)), Some(16));
+    assert_eq!(of(&base, &tile(20, 300, true)), Some(8));
+    assert_eq!(of(&base, &tile(15, 300, true)), None);
+    assert_eq!(of(&base, &tile(1, 300, false)), Some(16));
+    let wide = ExemplarParameters { spacing_m: Some(1.7), ..base.clone() };
+    assert_eq!(of(&wide, &tile(300, 300, true)), Some(32));
+    // As wide as the tile is long.
+    let widest = ExemplarParameters { spacing_m: Some(1e30), ..base };
+    assert_eq!(of(&widest, &tile(20, 100, false)), Some(128));
 }
 
 #[test]
@@ -149,6 +155,13 @@ fn val_refusals() {
     assert_eq!(key(ExemplarParameters { neighbours: 3, ..base() }).as_deref(), Some("neighbours"));
     assert_eq!(key(ExemplarParameters { scan: 100_001, ..base() }).as_deref(), Some("scan"));
     assert_eq!(key(ExemplarParameters { scan: 0, ..base() }).as_deref(), Some("scan"));
+    let wide = ExemplarParameters { spacing_m: Some(3.0), ..base() };
+    let large = Measured { residual: noise(50, 50, "large") };
+    let error = synthesise(&large, &tile(50, 20, true), &wide, &Streams::for_seed(1, "texture")).unwrap_err();
+    assert_eq!(
+        error.to_string(),
+        "first cells 3 m apart do not fit twice on the periodic tile, whose shorter side is 2 m; enlarge the tile, or set periodic = false"
+    );
     let measured = Measured { residual: noise(30, 30, "small") };
     let error = synthesise(&measured, &tile(50, 50, true), &base(), &Streams::for_seed(1, "texture")).unwrap_err();
     assert_eq!(
