@@ -202,8 +202,8 @@ pub fn synthesise(
     let shape = [tile.geometry.rows, tile.geometry.cols];
     let mut field = Field::new(shape, tile.periodic);
     let mut first = streams.stream("first");
-    for row in (0..shape[0]).step_by(spacing) {
-        for col in (0..shape[1]).step_by(spacing) {
+    for row in first_lines(shape[0], spacing, tile.periodic) {
+        for col in first_lines(shape[1], spacing, tile.periodic) {
             let source = places[first.below(places.len() as u64) as usize] as usize;
             field.put(row * shape[1] + col, source, site.values[source]);
         }
@@ -214,6 +214,11 @@ pub fn synthesise(
     let all = vec![true; shape[0] * shape[1]];
     sampling::fill(&mut field, &all, site, sampling, Counter::new(&mut streams.stream("places")));
     Ok(Collage::new(field.heights_m, &field.sources, shape, site))
+}
+
+/// Lines of the first cells, a spacing apart, also around the border of a periodic tile: two nearer ones would be unlike, with a step between them.
+fn first_lines(side: usize, spacing: usize, periodic: bool) -> impl Iterator<Item = usize> {
+    (0..side).step_by(spacing).filter(move |&line| line == 0 || !periodic || line + spacing <= side)
 }
 
 #[cfg(test)]

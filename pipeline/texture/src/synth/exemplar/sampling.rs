@@ -14,6 +14,8 @@
 //!
 //! Unknown cells are visited on grids of spacing 2^k, 2^(k-1) ... 1, each in four passes: every second cell of both axes; the centres between them;
 //! the rest of every second row; the rest of the columns. Cells of one pass do not see each other, so that they may be computed in any order.
+//! On a torus whose side is not a multiple of a grid's spacing, the last line of a pass has no line of the pass before it beyond the border: it
+//! follows the other lines, so that it sees both sides. Without that, steps across the border are twice those within.
 
 use crate::synth::measured::Holes;
 use rayon::prelude::*;
@@ -102,11 +104,13 @@ pub fn fill(field: &mut Field, wanted: &[bool], site: &Grid, sampling: Sampling,
     while spacing > 0 {
         let offsets = offsets(REACH * spacing, field.reach());
         let scan = scan_at(sampling.scan, spacing);
-        for shift in [[0, 0], [1, 1], [0, 1], [1, 0]] {
+        for (shift, late) in
+            [[0, 0], [1, 1], [0, 1], [1, 0]].into_iter().flat_map(|shift| [(shift, false), (shift, true)])
+        {
             let cells: Vec<usize> = (shift[0] * spacing..rows)
                 .step_by(2 * spacing)
                 .flat_map(|r| (shift[1] * spacing..cols).step_by(2 * spacing).map(move |c| r * cols + c))
-                .filter(|&cell| open[cell])
+                .filter(|&cell| open[cell] && field.is_late(cell, shift, spacing) == late)
                 .collect();
             let known = &*field;
             let sample = |&cell: &usize| {
@@ -203,6 +207,17 @@ impl Field {
     /// Rows and columns from a cell to the farthest ones; on a torus, around either side.
     fn reach(&self) -> [usize; 2] {
         self.shape.map(|side| if self.is_torus { side / 2 } else { side - 1 })
+    }
+
+    /// Whether the next line of the pass before lies beyond the border of a torus. In a pass, lines are `shift` spacings from every second line of
+    /// the grid.
+    fn is_late(&self, cell: usize, shift: [usize; 2], spacing: usize) -> bool {
+        let at = [cell / self.shape[1], cell % self.shape[1]];
+        let beyond = |axis: usize| {
+            let next = at[axis] + (2 - shift[axis]) * spacing;
+            at[axis] >= 2 * spacing && next > self.shape[axis]
+        };
+        self.is_torus && (beyond(0) || beyond(1))
     }
 }
 
@@ -330,6 +345,20 @@ mod tests {
         let grids = [32, 16, 8, 4, 2, 1];
         let total: f64 = grids.iter().map(|&s| 0.75 / (s * s) as f64 * scan_at(2000, s) as f64).sum();
         assert!((50.0..55.0).contains(&total), "{total}");
+    }
+
+    /// By hand, on a torus of 23 lines and a grid of 4: even lines are 0, 8, 16 and the next would be 24; odd ones are 4, 12, 20, of which the last
+    /// has no even line after it. On 24 lines, 20 has line 0.
+    #[test]
+    fn val_late_lines_by_hand() {
+        let late = |side: usize, shift: usize, is_torus: bool| {
+            let field = Field::new([side, 1], is_torus);
+            let lines = (shift * 4..side).step_by(8);
+            lines.filter(|&line| field.is_late(line, [shift, 0], 4)).collect::<Vec<usize>>()
+        };
+        assert_eq!((late(23, 0, true), late(23, 1, true)), (vec![16], vec![20]));
+        assert_eq!((late(24, 0, true), late(24, 1, true)), (Vec::new(), Vec::new()));
+        assert_eq!((late(23, 0, false), late(23, 1, false)), (Vec::new(), Vec::new()));
     }
 
     /// A neighbourhood that no place of the site has: its only neighbours lie farther apart than the site is wide.
