@@ -156,11 +156,11 @@ impl Holes {
     }
 
     /// First cells of the complete windows of a shape, every `step` cells each way, row by row.
-    pub(super) fn complete_windows(&self, shape: [usize; 2], step: usize) -> Vec<[usize; 2]> {
+    pub(super) fn complete_windows(&self, shape: [usize; 2], step: usize) -> impl Iterator<Item = [usize; 2]> {
         let sides = [self.counts.len() / self.cols - 1, self.cols - 1];
-        let starts = |axis: usize| (0..(sides[axis] + 1).saturating_sub(shape[axis])).step_by(step);
-        let all = starts(0).flat_map(|row| starts(1).map(move |col| [row, col]));
-        all.filter(|&at| self.is_complete(at, shape)).collect()
+        let starts = move |axis: usize| (0..(sides[axis] + 1).saturating_sub(shape[axis])).step_by(step);
+        let all = starts(0).flat_map(move |row| starts(1).map(move |col| [row, col]));
+        all.filter(move |&at| self.is_complete(at, shape))
     }
 }
 
@@ -267,7 +267,7 @@ mod tests {
                     }
                 }
             }
-            assert_eq!(holes.complete_windows(shape, step), expected, "{shape:?} {step}");
+            assert_eq!(holes.complete_windows(shape, step).collect::<Vec<_>>(), expected, "{shape:?} {step}");
         }
     }
 
