@@ -8,8 +8,9 @@ use super::survey::STRIP_CELLS;
 const STRIP_CELL_BYTES: u64 = 100;
 /// Bytes per cell of a replicate in progress: a surface on a torus of four times as many cells, its transforms, its residual.
 const REPLICATE_CELL_BYTES: u64 = 300;
-/// Bytes per cell of the part whose statistics are measured.
-const STATISTICS_CELL_BYTES: u64 = 200;
+/// Bytes per cell of the part whose statistics are measured, on any number of threads: the logarithms of 20 bands in single precision, and the
+/// filters and transforms of one or the covariance of their mean.
+const STATISTICS_CELL_BYTES: u64 = 180;
 /// Weights of partial windows, for two estimators: for each of up to 49 bins, 8 bytes per lag (one of each opposite pair) within
 /// the largest lag plus two half windows (1.5 windows).
 const WEIGHTS_BYTES: u64 = 2 * 49 * 8 * 9 / 2;

@@ -31,7 +31,8 @@ fn prop_statistics_scale_with_the_heights() {
     assert!(one.heights_m.iter().zip(&twice.heights_m).all(|(a, b)| 2.0 * a == *b));
     assert!((twice.covariance.variance() / one.covariance.variance() - 4.0).abs() < 1e-12);
     for (a, b) in one.wavelets.mean_log.iter().zip(&twice.wavelets.mean_log) {
-        assert!((b - a - std::f64::consts::LN_2).abs() < 1e-9);
+        // Logarithms are kept in single precision.
+        assert!((b - a - std::f64::consts::LN_2).abs() < 1e-6);
     }
     assert_eq!(one.modulation.log_variance, twice.modulation.log_variance);
 }

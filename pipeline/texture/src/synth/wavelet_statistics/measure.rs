@@ -30,26 +30,21 @@ pub fn measure(residual: &Grid, probabilities: &[f64], lag_max: usize) -> Wavele
     let masks = masks(residual, lag_max);
     let floor_m = FLOOR * sums::variance(&sums::finite(&residual.values)).sqrt();
     let logarithms = logarithms(residual, masks.len(), floor_m);
+    let cols = residual.cols();
+    // Of every band, on the cells of every octave.
+    let moments: Vec<Vec<[f64; 2]>> =
+        masks.iter().map(|mask| logarithms.iter().map(|l| moments(l, mask, cols)).collect()).collect();
     let count = logarithms.len();
-    let data = |band: usize, mask: &[bool]| -> Vec<f64> {
-        logarithms[band].iter().zip(mask).filter(|(_, here)| **here).map(|(l, _)| *l).collect()
-    };
-    let own: Vec<[f64; 2]> = (0..count)
-        .map(|band| {
-            let values = data(band, &masks[band / ORIENTATIONS]);
-            [sums::mean(&values), sums::variance(&values).sqrt()]
-        })
-        .collect();
-    let covariance = |a: usize, b: usize| {
-        let mask = &masks[a.max(b) / ORIENTATIONS];
-        correlation(&data(a, mask), &data(b, mask)) * own[a][1] * own[b][1]
-    };
-    let upper: Vec<f64> = (0..count * count)
-        .into_par_iter()
-        .map(|at| if at / count <= at % count { covariance(at / count, at % count) } else { 0.0 })
-        .collect();
-    let values =
-        (0..count * count).map(|at| upper[(at / count).min(at % count) * count + (at / count).max(at % count)]);
+    let own: Vec<[f64; 2]> = (0..count).map(|band| moments[band / ORIENTATIONS][band]).collect();
+    let mut values = vec![0.0; count * count];
+    for a in 0..count {
+        for b in a..count {
+            let coarser = b / ORIENTATIONS;
+            let of = [a, b].map(|band| (logarithms[band].as_slice(), moments[coarser][band]));
+            let covariance = correlation(of, &masks[coarser], cols) * own[a][1] * own[b][1];
+            (values[a * count + b], values[b * count + a]) = (covariance, covariance);
+        }
+    }
     let mean_log: Vec<f64> = own.iter().map(|[mean, _]| *mean).collect();
     let patches = masks.last().map(|mask| patches(residual, &logarithms, &mean_log, mask));
     Wavelets {
@@ -57,17 +52,15 @@ pub fn measure(residual: &Grid, probabilities: &[f64], lag_max: usize) -> Wavele
         octaves: masks.len() as u32,
         floor_m,
         mean_log,
-        covariance_log: positive(Symmetric { size: count, values: values.collect() }),
+        covariance_log: positive(Symmetric { size: count, values }),
         patches,
     }
 }
 
 /// Covariance by lag of the mean of all bands' logarithms about their means, on the cells of a mask.
-fn patches(residual: &Grid, logarithms: &[Vec<f64>], mean_log: &[f64], mask: &[bool]) -> LagCovariances {
-    let at = |k: usize| match mask[k] {
-        true => logarithms.iter().zip(mean_log).map(|(l, mean)| l[k] - mean).sum::<f64>() / mean_log.len() as f64,
-        false => f64::NAN,
-    };
+fn patches(residual: &Grid, logarithms: &[Vec<f32>], mean_log: &[f64], mask: &[bool]) -> LagCovariances {
+    let off = |k: usize| logarithms.iter().zip(mean_log).map(move |(l, mean)| f64::from(l[k]) - mean);
+    let at = |k: usize| if mask[k] { off(k).sum::<f64>() / mean_log.len() as f64 } else { f64::NAN };
     let common = Grid::new(residual.geometry, (0..mask.len()).into_par_iter().map(at).collect());
     let centre = sums::mean(&sums::finite(&common.values));
     let lag_max = [residual.rows(), residual.cols()].map(|n| (n / 3).min(PATCH_LAG_MAX));
@@ -107,8 +100,8 @@ fn clear(z: &Grid, distance: usize) -> Vec<bool> {
     (0..rows * cols).map(|k| is_clear(k / cols, k % cols)).collect()
 }
 
-/// Logarithms of the magnitudes of each band at the cells of the raster.
-fn logarithms(residual: &Grid, octaves: usize, floor_m: f64) -> Vec<Vec<f64>> {
+/// Logarithms of the magnitudes of each band at the cells of the raster. Single precision is far finer than the statistics.
+fn logarithms(residual: &Grid, octaves: usize, floor_m: f64) -> Vec<Vec<f32>> {
     let (rows, cols) = (residual.rows(), residual.cols());
     let [height, width] = [rows, cols].map(|n| smooth_length(n + (1 << octaves)));
     let mut field = vec![0.0; height * width];
@@ -122,19 +115,37 @@ fn logarithms(residual: &Grid, octaves: usize, floor_m: f64) -> Vec<Vec<f64>> {
             let found = bands.band(&spectrum, band);
             let at = |k: usize| {
                 let at = k / cols * width + k % cols;
-                super::logarithm(found.real[at], found.imaginary[at], floor_m)
+                super::logarithm(found.real[at], found.imaginary[at], floor_m) as f32
             };
             (0..rows * cols).into_par_iter().map(at).collect()
         })
         .collect()
 }
 
-/// Pearson's correlation; 0 if one side does not vary.
-fn correlation(a: &[f64], b: &[f64]) -> f64 {
-    let (mean_a, mean_b) = (sums::mean(a), sums::mean(b));
-    let product: Vec<f64> = a.iter().zip(b).map(|(x, y)| (x - mean_a) * (y - mean_b)).collect();
-    let size = (sums::variance(a) * sums::variance(b)).sqrt();
-    if size > 0.0 { (sums::mean(&product) / size).clamp(-1.0, 1.0) } else { 0.0 }
+/// Mean and standard deviation of a field on the cells of a mask, in rows of `cols`.
+fn moments(field: &[f32], mask: &[bool], cols: usize) -> [f64; 2] {
+    let mean = mean_over(mask, cols, |k| f64::from(field[k]));
+    let variance = mean_over(mask, cols, |k| (f64::from(field[k]) - mean) * (f64::from(field[k]) - mean));
+    [mean, variance.sqrt()]
+}
+
+/// Pearson's correlation of two fields on the cells of a mask, on which they have these means and standard deviations; 0 if one does not vary.
+fn correlation(of: [(&[f32], [f64; 2]); 2], mask: &[bool], cols: usize) -> f64 {
+    let [(a, [mean_a, sd_a]), (b, [mean_b, sd_b])] = of;
+    let size = sd_a * sd_b;
+    let product = mean_over(mask, cols, |k| (f64::from(a[k]) - mean_a) * (f64::from(b[k]) - mean_b));
+    if size > 0.0 { (product / size).clamp(-1.0, 1.0) } else { 0.0 }
+}
+
+/// Mean of a function over the cells of a mask, in rows of `cols`, which are added in order.
+fn mean_over(mask: &[bool], cols: usize, of: impl Fn(usize) -> f64 + Sync) -> f64 {
+    let of_row = |(row, line): (usize, &[bool])| {
+        let cells = line.iter().enumerate().filter(|(_, here)| **here).map(|(col, _)| of(row * cols + col));
+        cells.fold((0.0, 0_usize), |(sum, count), value| (sum + value, count + 1))
+    };
+    let rows: Vec<(f64, usize)> = mask.par_chunks(cols).enumerate().map(of_row).collect();
+    let count: usize = rows.iter().map(|(_, count)| count).sum();
+    sums::sum(&rows.iter().map(|(sum, _)| *sum).collect::<Vec<f64>>()) / count as f64
 }
 
 /// The nearest covariance without negative eigenvalues; those of different masks may leave some.
