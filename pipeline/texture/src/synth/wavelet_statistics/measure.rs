@@ -1,11 +1,16 @@
 //! Wavelet statistics of a masked residual.
 //!
-//! Cells without data are 0 for the transforms, with an empty margin around the raster; a magnitude counts only where the cells within `2^j`
-//! of it (octave j) all have data, so that the edges of holes do not count as texture. A covariance between octaves is the
-//! correlation on the cells of the coarser one, with the standard deviations of each.
+//! A magnitude counts only where the cells within `2^j` of it (octave j) all have data. Wavelets reach farther, though weakly: on ground whose
+//! short waves are weak a step at the edge of a hole or of the raster is seen everywhere. So cells without data, and a margin that joins the opposite
+//! sides of the raster, are filled smoothly first (`filling.rs`). Measured on smooth ground (amplitudes that fall with the fourth power of the
+//! frequency, 512 x 512 cells; error of the mean logarithm of the finest octave): with 0 in holes and margin 0.27, and 0.82 with a
+//! fifth of the cells in holes 40 wide; filled 0.02 and 0.06.
+//!
+//! A covariance between octaves is the correlation on the cells of the coarser one, with the standard deviations of each.
 
 use super::bands::{Bands, ORIENTATIONS};
 use super::differences;
+use super::filling::filled;
 use super::symmetric::Symmetric;
 use crate::synth::statistics::lags;
 use rayon::prelude::*;
@@ -104,12 +109,12 @@ fn clear(z: &Grid, distance: usize) -> Vec<bool> {
 fn logarithms(residual: &Grid, octaves: usize, floor_m: f64) -> Vec<Vec<f32>> {
     let (rows, cols) = (residual.rows(), residual.cols());
     let [height, width] = [rows, cols].map(|n| smooth_length(n + (1 << octaves)));
-    let mut field = vec![0.0; height * width];
+    let mut field = vec![f64::NAN; height * width];
     for (r, line) in field.chunks_exact_mut(width).take(rows).enumerate() {
-        line.iter_mut().zip(residual.row(r)).for_each(|(out, z)| *out = if z.is_finite() { *z } else { 0.0 });
+        line.iter_mut().zip(residual.row(r)).filter(|(_, z)| z.is_finite()).for_each(|(out, z)| *out = *z);
     }
     let bands = Bands::new([height, width], octaves);
-    let spectrum = bands.fft().forward(&field);
+    let spectrum = bands.fft().forward(&filled(field, [height, width]));
     (0..bands.count())
         .map(|band| {
             let found = bands.band(&spectrum, band);
@@ -161,6 +166,7 @@ fn positive(covariance: Symmetric) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sastrugi_numeric::fft::RealFft2;
     use sastrugi_numeric::{Geometry, Streams};
 
     fn noise(rows: usize, cols: usize) -> Grid {
@@ -210,6 +216,39 @@ mod tests {
             b.mean_log
         );
         assert!(a.check().is_ok() && b.check().is_ok());
+    }
+
+    /// On ground whose short waves are weak, so that a step at an edge would be seen everywhere: a crop of a torus, a fifth of it in holes, against
+    /// the same cells of the torus, which has no edge. What is left is the change of curvature at the edges: 0.09 in the finest octave in an
+    /// independent program; 0.9 to 1.0 with 0 in holes and margin.
+    #[test]
+    fn val_edges_do_not_count_on_smooth_ground() {
+        let (side, crop) = (320, 256);
+        let fft = RealFft2::new(side, side);
+        let gain = |k: usize| {
+            let f = |k: usize| 2.0 * k.min(side - k) as f64 / side as f64;
+            let size = f(k / side) * f(k / side) + f(k % side) * f(k % side);
+            1.0 / (1.0 + size / 0.01) / (1.0 + size / 0.01)
+        };
+        let mut spectrum = fft.forward(&noise(side, side).values);
+        spectrum.values.iter_mut().enumerate().for_each(|(k, v)| *v *= gain(k));
+        let torus = Grid::new(Geometry::square(side, side, 1.0), fft.inverse(spectrum));
+        let mut holed = torus.window(0, 0, crop, crop);
+        let is_hole = |k: &usize| (k / crop / 40 + k % crop / 40) % 5 == 4;
+        (0..crop * crop).filter(is_hole).for_each(|k| holed.values[k] = f64::NAN);
+        let found = measure(&holed, &crate::synth::statistics::tails::probabilities(), 8);
+        assert_eq!(found.octaves, 3);
+        let bands = Bands::new([side, side], 3);
+        let spectrum = bands.fft().forward(&torus.values);
+        let masks = masks(&holed, 8);
+        for (band, mean) in found.mean_log.iter().enumerate() {
+            let whole = bands.band(&spectrum, band);
+            let truth = mean_over(&masks[band / ORIENTATIONS], crop, |k| {
+                let at = k / crop * side + k % crop;
+                super::super::logarithm(whole.real[at], whole.imaginary[at], found.floor_m)
+            });
+            assert!((mean - truth).abs() < 0.2, "{band}: {mean} {truth}");
+        }
     }
 
     /// Too few cells away from holes leave no octave, and the section is still valid.

@@ -48,6 +48,7 @@
 
 mod bands;
 mod differences;
+mod filling;
 mod measure;
 mod symmetric;
 mod target;
