@@ -158,7 +158,7 @@ class Fit:
         source = self._content.get("source") or {}
         if source.get("minus") or source.get("masks"):
             raise SastrugiError("the fit has masks or is of a difference; give the heights that it used as `exemplar`", USAGE)
-        return Heightfield.read(exemplar, window=source.get("window"))
+        return Heightfield.read(exemplar, cell=self._content.get("cell_m"), window=source.get("window"))
 
     def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
         """Draws the measured covariance and the model, both as detrending and trimming leave them, by lag. Needs matplotlib."""

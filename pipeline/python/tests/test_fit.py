@@ -121,7 +121,7 @@ def test_plot():
         snow().plot()
 
 
-def test_textures_that_repeat_a_site_say_what_they_need():
+def test_textures_that_repeat_a_site_say_what_they_need(tmp_path):
     site = snow().texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)
     found = sastrugi.fit(site, outer_scale=1.0, bootstrap=0)
     with pytest.raises(sastrugi.SastrugiError, match="fit the DEM with `statistics=True`"):
@@ -130,6 +130,13 @@ def test_textures_that_repeat_a_site_say_what_they_need():
         found.texture(8.0, method="quilting")
     with pytest.raises(sastrugi.SastrugiError, match="keeps the directions of the site"):
         found.texture(8.0, method="quilting", exemplar=site, ratio=0.5)
+    # Other heights with the same cells are not those of the fit.
+    other = snow().texture(16.0, 0.1, seed=2, phase="gaussian", periodic=False)
+    with pytest.raises(sastrugi.SastrugiError, match="does not give the residual of the fit"):
+        found.texture(8.0, method="quilting", exemplar=other)
+    # A file that states no cell size is read with that of the fit.
+    np.save(tmp_path / "site.npy", site.values)
+    assert found.texture(8.0, method="quilting", exemplar=tmp_path / "site.npy").shape == (80, 80)
     masked = Fit({**found.to_dict(), "source": {"file": "a.tif", "sha256": "", "window": None, "masks": [{"file": "m", "sha256": "", "excludes": True}]}})
     with pytest.raises(sastrugi.SastrugiError, match="the fit has masks or is of a difference"):
         masked.texture(8.0, method="quilting", exemplar="a.tif")

@@ -150,6 +150,18 @@ pub fn residual(heights: &dyn Heights, settings: &FitSettings) -> Result<Grid, F
     Ok(Grid::new(case.geometry, case.residual()?))
 }
 
+/// The residual as [`residual()`] computes it, and quantiles of its heights as a fit states them, m.
+pub(crate) fn residual_with_quantiles(
+    heights: &dyn Heights,
+    settings: &FitSettings,
+) -> Result<(Grid, Vec<f64>), FitError> {
+    let case = Case::new(heights, settings)?;
+    let residual = Grid::new(case.geometry, case.residual()?);
+    let (rows, cols) = middle(&case);
+    let quantiles_m = quantiles_m(&residual.window(rows.start, cols.start, rows.len(), cols.len()).values);
+    Ok((residual, quantiles_m))
+}
+
 /// The statistics of a residual, for lags of up to one and a half windows.
 fn statistics_of(case: &Case, residual: &Grid) -> Result<Statistics, FitError> {
     if case.heights.are_profiles() {

@@ -9,7 +9,7 @@
 
 use super::SynthesisError;
 use super::to_micrometres;
-use crate::fit::{FitError, FitSettings, Heights, residual};
+use crate::fit::{FitError, FitSettings, Heights, residual_with_quantiles};
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, sums};
 use sastrugi_schemas::ParameterError;
@@ -18,6 +18,8 @@ use std::f64::consts::E;
 
 /// Relative difference of cell sizes that counts as rounding.
 const CELL_TOLERANCE: f64 = 1e-6;
+/// Largest difference between quantiles of the residual and those that the fit states, over their root mean square.
+const QUANTILE_TOLERANCE: f64 = 1e-3;
 /// Heights this close are the same, m.
 const COPY_TOLERANCE_M: f64 = 1e-9;
 /// Lags of the correlation reach this share of a side of the site.
@@ -68,7 +70,8 @@ impl Measured {
     /// The residual of the DEM of a fit, computed as the fit did.
     ///
     /// # Errors
-    /// A fit without settings; a DEM with other cells than the fit's, or without a residual.
+    /// A fit without settings; a DEM with other cells than the fit's, or without a residual; one whose residual has other heights than the fit states,
+    /// such as that of another part, with other masks, or gridded by another statistic.
     pub fn of_fit(heights: &dyn Heights, fit: &FitFile) -> Result<Self, FitError> {
         let own_m = heights.geometry().cell;
         if let Some(cell_m) = fit.cell_m.filter(|m| (0..2).any(|k| (m[k] - own_m[k]).abs() > CELL_TOLERANCE * m[k])) {
@@ -78,7 +81,9 @@ impl Measured {
             );
             return Err(ParameterError::new("exemplar", message).into());
         }
-        Ok(Self { residual: residual(heights, &FitSettings::of_fit(fit)?)? })
+        let (residual, quantiles_m) = residual_with_quantiles(heights, &FitSettings::of_fit(fit)?)?;
+        check_quantiles(&quantiles_m, &fit.height_quantiles_m)?;
+        Ok(Self { residual })
     }
 
     /// Refuses a texture whose cells are not those of the site.
@@ -120,6 +125,20 @@ impl Measured {
         let count: usize = rows.iter().map(|(_, count)| count).sum();
         sums::sum(&rows.iter().map(|(sum, _)| *sum).collect::<Vec<_>>()) / count as f64
     }
+}
+
+/// Refuses a residual that is not the fit's, by quantiles of its heights; a fit may state none.
+fn check_quantiles(found_m: &[f64], fitted_m: &[f64]) -> Result<(), ParameterError> {
+    let squares: Vec<f64> = fitted_m.iter().map(|q| q * q).collect();
+    let limit_m = QUANTILE_TOLERANCE * sums::mean(&squares).sqrt();
+    let is_near = |(found, fitted): (&f64, &f64)| (found - fitted).abs() <= limit_m;
+    let is_same = found_m.len() == fitted_m.len() && found_m.iter().zip(fitted_m).all(is_near);
+    if fitted_m.is_empty() || is_same {
+        return Ok(());
+    }
+    let message =
+        "does not give the residual of the fit: other heights, masks or gridding; give the DEM as it was fitted";
+    Err(ParameterError::new("exemplar", message))
 }
 
 /// Counts of cells without data, by window.

@@ -447,6 +447,14 @@ mod tests {
         let other = Grid::new(Geometry::square(120, 120, 0.2), z.values.clone());
         let error = Measured::of_fit(&other, &plain).unwrap_err().to_string();
         assert!(error.starts_with("`exemplar` has cells of 0.2 m x 0.2 m"), "{error}");
+        // Nor is one of the same cells and other heights; how high it lies has no effect.
+        let rougher = z.map(|z| 1.01 * z);
+        let error = Measured::of_fit(&rougher, &plain).unwrap_err().to_string();
+        assert!(error.starts_with("`exemplar` does not give the residual of the fit"), "{error}");
+        assert!(Measured::of_fit(&z.map(|z| z + 100.0), &plain).is_ok());
+        // A fit that states no heights cannot tell.
+        let silent = FitFile { height_quantiles_m: Vec::new(), ..plain.clone() };
+        assert!(Measured::of_fit(&rougher, &silent).is_ok());
         let bare = FitFile { settings: Value::Null, ..plain };
         assert!(Measured::of_fit(&z, &bare).unwrap_err().to_string().starts_with("`settings` are missing"));
     }
