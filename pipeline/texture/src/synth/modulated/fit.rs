@@ -13,8 +13,10 @@ const LAG_MAX: usize = 64;
 /// Variances of the logarithm and ranges, cells, of the first candidates, beside 0.
 const LOG_VARIANCES: [f64; 7] = [0.1, 0.25, 0.45, 0.7, 1.0, 1.4, 1.9];
 const RANGES: [f64; 6] = [RANGE_CELLS_MIN, 3.0, 6.0, 12.0, 24.0, RANGE_CELLS_FITTED];
-/// Largest negative share of the spectrum of G that a candidate may have: it is the error of the covariance.
-const CLIP_SHARE_MAX: f64 = 0.04;
+/// Largest error of the covariance that a candidate may have, as a share of the variance,
+const ERROR_MAX: f64 = 0.05;
+/// and largest variance of its one-cell increments, over the measured one.
+const INCREMENT_RATIO_MAX: f64 = 1.1;
 /// Rounds of refinement: each moves to the best neighbour, or halves the steps.
 const ROUNDS: usize = 5;
 /// First steps of the refinement: of the variance, and of the logarithm of the range.
@@ -133,9 +135,11 @@ impl Search<'_> {
         let field = Grid::new(Geometry::square(SIDE, SIDE, 1.0), heights_m);
         let flatness: Vec<f64> = self.measured.iter().map(|(lag, _)| flatness_at(&field, *lag)).collect();
         let off = |(made, (_, wanted)): (&f64, &(usize, f64))| libm::log(made / wanted);
-        let misfit = match made.clip_share() {
-            share if share > CLIP_SHARE_MAX => f64::INFINITY,
-            _ => flatness.iter().zip(self.measured).map(off).map(|d| d * d).sum(),
+        let keeps_covariance =
+            made.covariance_error() <= ERROR_MAX && made.increment_ratio(self.covariance_m2) <= INCREMENT_RATIO_MAX;
+        let misfit = match keeps_covariance {
+            true => flatness.iter().zip(self.measured).map(off).map(|d| d * d).sum(),
+            false => f64::INFINITY,
         };
         Candidate { log_variance: *log_variance, range, flatness, misfit }
     }

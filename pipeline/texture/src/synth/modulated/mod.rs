@@ -6,7 +6,9 @@
 //! `C_z(h) = C_z(r(h), rho(h))`, without T simply `sigma^2 r(h) exp(-s^2 (1 - rho(h)))`
 //!
 //! (`transform.rs`). r is solved for at every lag, so that the covariance of z, with its anisotropy, is that of the residual. Negative
-//! eigenvalues of r are set to 0 and their share is reported ([`Modulated::clip_share`]).
+//! eigenvalues of r are set to 0 and the others scaled to unit variance: with c the share of the negative ones in the sum of all sizes
+//! ([`Modulated::clip_share`]), r changes by at most `2 c / (1 - 2 c)` at any lag, and the covariance of z by about that share of its variance.
+//! Smooth ground has the least room: with patches narrower than its waves, c = 0.02 raises the variance of one-cell increments by a fifth.
 //!
 //! | parameter | unit, range | meaning |
 //! |---|---|---|
@@ -16,7 +18,8 @@
 //! The fit ([`measure`]) matches the flatness `F(l) = <d^4> / <d^2>^2` of increments over lags of 1, 2, 4 ... cells. Without T it is known in
 //! closed form ([`flatness`]): one-cell increments have `3 exp(4 s^2)` where L is many cells, and F falls with lag as far as L. With T
 //! the same fields are synthesised for each candidate, from fixed random numbers, and the sum of squares of differences of `ln F` is
-//! minimised on a grid of s^2 and L that is then refined. Candidates that cost more than 4 % of the spectrum of G are left out.
+//! minimised on a grid of s^2 and L that is then refined. Candidates whose covariance would be off by more than 5 % of the variance, or whose
+//! one-cell increments would have more than 1.1 times their variance, are left out. Stated parameters may cost 10 % of the variance.
 //!
 //! Source: Castaing, Gagne and Hopfinger 1990, Physica D 46, 177 (log-normal amplitudes, flatness by scale); Mehler 1866; for fields with
 //! stochastic amplitude Bardossy and Horning 2016 discuss the alternatives. Departure: the monotone map outside the product.
@@ -41,7 +44,7 @@ use super::tile::{self, Tile};
 use super::{Cost, SynthesisError};
 use crate::synth::fft_ma::{Phase, random_column};
 use rayon::prelude::*;
-use sastrugi_numeric::fft::{Complex64, RealFft2, smooth_length};
+use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::statistics::Statistics;
 use sastrugi_schemas::{Kind, ParameterError};
@@ -64,6 +67,8 @@ const RANGE_SHARE_MAX: f64 = 0.25;
 const MARGIN_RANGES: f64 = 3.0;
 /// Longest range of the amplitude that a fit finds, in the longer side of a cell.
 const RANGE_CELLS_FITTED: f64 = 40.0;
+/// Largest error of the covariance, as a share of the variance, to which stated parameters may lead.
+const ERROR_MAX: f64 = 0.1;
 /// Bytes per torus cell at the peak.
 const BYTES_PER_CELL: u64 = 40;
 /// Square root of the smallest eigenvalue of W, relative to the largest, that is synthesised.
@@ -122,9 +127,9 @@ impl ResidualKernel for Modulated {
     }
 
     fn notes(&self) -> Vec<String> {
-        let share = self.clip_share;
+        let (share, error) = (self.clip_share, 100.0 * self.covariance_error());
         let note = format!(
-            "{share:.1e} of the spectrum was negative and set to 0; the covariance is off by at most that share of the variance"
+            "{share:.1e} of the spectrum was negative and set to 0: the covariance is off by up to about {error:.2} % of the variance"
         );
         (share > 0.0).then_some(note).into_iter().collect()
     }
@@ -135,6 +140,25 @@ impl ResidualKernel for Modulated {
 
     fn make(&self, streams: &Streams) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
         Ok((Modulated::make(self, streams), Vec::new()))
+    }
+}
+
+impl ModulatedParameters {
+    /// Refuses stated parameters that lead to an error of the covariance, as a share of the variance.
+    fn check_error(&self, error: f64) -> Result<(), ParameterError> {
+        let stated = [("log_variance", self.log_variance), ("range_m", self.range_m)];
+        match stated.into_iter().find_map(|(key, value)| Some((key, value?))) {
+            Some((key, value)) if error > ERROR_MAX => {
+                let message = format!(
+                    "is {value}, with which the covariance of the site would be off by up to {:.0} % of the variance, more than {:.0} %: \
+                     patches are too strong or too narrow for so smooth a site; lower `log_variance` or widen `range_m`",
+                    100.0 * error,
+                    100.0 * ERROR_MAX
+                );
+                Err(ParameterError::new(key, message))
+            }
+            _ => Ok(()),
+        }
     }
 }
 
@@ -176,7 +200,8 @@ impl Modulated {
     ///
     /// # Errors
     /// Statistics that are damaged; parameters out of range; a range of the amplitude shorter than 1.5 cells, or longer than a quarter of
-    /// a periodic texture's shorter side; a residual that is flat.
+    /// a periodic texture's shorter side; a stated variance or range with which the covariance cannot be kept within 10 % of the variance; a
+    /// residual that is flat.
     pub fn new(
         statistics: &Statistics,
         shape: [usize; 2],
@@ -201,7 +226,9 @@ impl Modulated {
         let transform = Transform::new(&statistics.probabilities, &statistics.heights_m, variance_m2, log_variance);
         let table = transform.normal_correlation();
         let covariance_m2 = spectrum::covariance_on_torus(statistics, torus);
-        Ok(Self::of_transform(&covariance_m2, [shape, torus], transform, &table, log_variance, range_cells))
+        let made = Self::of_transform(&covariance_m2, [shape, torus], transform, &table, log_variance, range_cells);
+        parameters.check_error(made.covariance_error())?;
+        Ok(made)
     }
 
     /// The texture with a covariance on the torus, m2.
@@ -217,9 +244,33 @@ impl Modulated {
         Self { shape, torus, transform, log_variance, magnitudes, range_cells, clip_share }
     }
 
-    /// Share of the spectrum of G that was negative and set to 0; the covariance is off by no more than this share of the variance of G.
+    /// Share of the spectrum of G that was negative and set to 0.
     pub fn clip_share(&self) -> f64 {
         self.clip_share
+    }
+
+    /// Largest change of the correlation of G by that; about the error of the covariance, as a share of the variance.
+    pub fn covariance_error(&self) -> f64 {
+        2.0 * self.clip_share / (1.0 - 2.0 * self.clip_share)
+    }
+
+    /// Variance of the increments over one cell, over that of a covariance on the torus: the larger of southwards and eastwards.
+    fn increment_ratio(&self, covariance_m2: &[f64]) -> f64 {
+        let [rows, cols] = self.torus;
+        let cells = (rows * cols) as f64;
+        let half = HalfSpectrum { rows, cols, values: Vec::new() };
+        let ratio = |axis: usize| {
+            let (side, lag) = if axis == 0 { (rows, cols) } else { (cols, 1) };
+            let mode = |k: usize| if axis == 0 { k % rows } else { k / rows };
+            let part = |(k, magnitude): (usize, &f64)| {
+                let wave = libm::cos(2.0 * PI * mode(k) as f64 / side as f64);
+                half.multiplicity(k / rows) * magnitude * magnitude * wave
+            };
+            let r = sums::sum(&self.magnitudes.iter().enumerate().map(part).collect::<Vec<f64>>()) / (cells * cells);
+            let rho = libm::exp(-1.0 / (self.range_cells[axis] * self.range_cells[axis]));
+            self.transform.increment(r, rho) / (2.0 * (1.0 - covariance_m2[lag] / covariance_m2[0]))
+        };
+        ratio(0).max(ratio(1))
     }
 
     /// One texture, rows times columns heights from the north-west, m. Draws from `field` and `amplitude` below `streams`.

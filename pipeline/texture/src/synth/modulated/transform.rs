@@ -18,8 +18,10 @@ const BOUND: f64 = 7.0;
 /// Tabulated heights on each side of 0, and the largest product, in standard deviations.
 const HALF_NODES: usize = 2048;
 const PRODUCT_MAX: f64 = 40.0;
-/// Tabulated correlations of the heights, and of W.
+/// Tabulated correlations of the heights, and of W, denser towards 1, where those of neighbouring cells lie.
 const CORRELATIONS: [usize; 2] = [257, 33];
+/// Range of these correlations: from -1, and from 0, to 1.
+const SPANS: [f64; 2] = [2.0, 1.0];
 /// Bisections of a correlation.
 const BISECTIONS: usize = 24;
 
@@ -71,6 +73,11 @@ impl Transform {
         polynomial(&self.at_amplitude_correlation(rho), r)
     }
 
+    /// Variance of the difference of two heights at a correlation `r` of G and `rho` of W, over that of the heights.
+    pub fn increment(&self, r: f64, rho: f64) -> f64 {
+        2.0 * (1.0 - polynomial(&self.at_amplitude_correlation(rho), r) / self.variance_m2)
+    }
+
     /// Coefficients of the covariance as a polynomial in r.
     fn at_amplitude_correlation(&self, rho: f64) -> Vec<f64> {
         (0..DEGREES[0]).map(|k| self.squares.iter().rev().fold(0.0, |sum, of_j| sum * rho + of_j[k])).collect()
@@ -80,11 +87,8 @@ impl Transform {
     pub fn normal_correlation(&self) -> NormalCorrelation {
         let [nodes, rows] = CORRELATIONS;
         let row = |i: usize| {
-            let coefficients = self.at_amplitude_correlation(i as f64 / (rows - 1) as f64);
-            let solved = move |k: usize| {
-                let wanted_m2 = (2.0 * k as f64 / (nodes - 1) as f64 - 1.0) * self.variance_m2;
-                solve(&coefficients, wanted_m2)
-            };
+            let coefficients = self.at_amplitude_correlation(node(i, rows, SPANS[1]));
+            let solved = |k: usize| solve(&coefficients, node(k, nodes, SPANS[0]) * self.variance_m2);
             (0..nodes).map(solved).collect::<Vec<f64>>()
         };
         NormalCorrelation { rows: (0..rows).map(row).collect() }
@@ -162,9 +166,23 @@ fn solve(coefficients: &[f64], wanted: f64) -> f64 {
     0.5 * (low + high)
 }
 
+/// The correlation at place `k` of `count`, the last of which is 1 and the first 1 less `span`: `1 - span t^2` for equally spaced t.
+pub fn node(k: usize, count: usize, span: f64) -> f64 {
+    let t = 1.0 - k as f64 / (count - 1) as f64;
+    1.0 - span * t * t
+}
+
+/// The place at or below a correlation, and the share of the step to the next.
+pub fn split(correlation: f64, count: usize, span: f64) -> (usize, f64) {
+    let t = ((1.0 - correlation) / span).clamp(0.0, 1.0).sqrt();
+    let low = (((1.0 - t) * (count - 1) as f64) as usize).min(count - 2);
+    let (below, above) = (node(low, count, span), node(low + 1, count, span));
+    (low, ((correlation - below) / (above - below)).clamp(0.0, 1.0))
+}
+
 /// The correlation of G by the correlation of the heights and that of W.
 pub struct NormalCorrelation {
-    /// For correlations of W from 0 to 1, values at correlations of the heights from -1 to 1.
+    /// For correlations of W from 0 to 1 ([`node`]), values at correlations of the heights from -1 to 1.
     rows: Vec<Vec<f64>>,
 }
 
@@ -172,13 +190,8 @@ impl NormalCorrelation {
     /// The correlation of G at a correlation `c` of the heights and `rho` of W, bilinear in the table.
     pub fn at(&self, c: f64, rho: f64) -> f64 {
         let [nodes, rows] = CORRELATIONS;
-        let split = |place: f64, last: usize| {
-            let place = place.clamp(0.0, last as f64);
-            let low = (place as usize).min(last - 1);
-            (low, place - low as f64)
-        };
-        let (k, along) = split(0.5 * (c + 1.0) * (nodes - 1) as f64, nodes - 1);
-        let (i, down) = split(rho * (rows - 1) as f64, rows - 1);
+        let (k, along) = split(c, nodes, SPANS[0]);
+        let (i, down) = split(rho, rows, SPANS[1]);
         let mix = |row: &[f64]| row[k] + (row[k + 1] - row[k]) * along;
         let (above, below) = (mix(&self.rows[i]), mix(&self.rows[i + 1]));
         above + (below - above) * down
