@@ -1,6 +1,7 @@
 //! The section `statistics` of a fit file: what methods need that reproduce more of a measured residual than its covariance.
 //!
-//! It holds statistics, never heights of cells: the DEM cannot be recovered from it. Its size does not depend on the DEM's: at most
+//! It holds statistics and extremes (the highest and lowest of heights and differences), no positions: no method is known to recover the DEM from
+//! them. It states fewer numbers ([`Statistics::numbers`]) than a quarter of the cells with data. Its size does not depend on the DEM's: at most
 //! [`LAGS_MAX`] lags along each axis, 129 probabilities and 32 bands, below 1 MB as JSON.
 
 use crate::ParameterError;
@@ -143,6 +144,16 @@ impl Statistics {
         self.wavelets.check().map_err(|e| e.within("statistics.wavelets"))
     }
 
+    /// Numbers that were measured: quantiles, covariances, and moments of wavelets.
+    pub fn numbers(&self) -> usize {
+        let Wavelets { differences, mean_log, patches, .. } = &self.wavelets;
+        let (quantiles, bands) = (self.probabilities.len(), mean_log.len());
+        let tables = [Some(&self.covariance), Some(&self.laplacian), patches.as_ref()];
+        let lags: usize = tables.into_iter().flatten().map(|table| table.values.len()).sum();
+        // A covariance between bands is symmetric.
+        (1 + differences.len()) * quantiles + lags + bands + bands * (bands + 1) / 2
+    }
+
     fn check_counts(&self) -> Result<(), ParameterError> {
         let wavelets = &self.wavelets;
         let cells = wavelets.differences.iter().map(|d| d.stencil.len()).max().unwrap_or(0);
@@ -271,6 +282,12 @@ mod tests {
         assert_eq!(again, small());
         assert!(again.check().is_ok());
         assert_eq!((again.covariance.variance(), again.covariance.inner()), (1.0, 3));
+    }
+
+    /// By hand: two times three quantiles; 6, 1 and 1 covariances; 4 means, and 10 covariances of them.
+    #[test]
+    fn val_numbers_by_hand() {
+        assert_eq!(small().numbers(), 6 + 8 + 14);
     }
 
     /// Each kind of damage is refused with the key of the damaged table.

@@ -353,11 +353,11 @@ mod tests {
 
     const METHODS: [&str; 4] = ["modulated", "wavelet_statistics", "quilting", "exemplar"];
 
-    /// A site of 12 m x 12 m with cells of 10 cm: a normal surface with ridges.
+    /// A site of 14 m x 14 m with cells of 10 cm: a normal surface with ridges.
     fn site() -> Grid {
         let parameters = [("sigma_m", 0.05), ("range_m", 0.3)].map(|(name, value)| (name.to_owned(), value)).into();
         let truth = FitFile { model: "exponential".to_owned(), parameters, ..FitFile::default() };
-        let size = json!({ "size_px": [120, 120], "phase": "gaussian", "periodic": false });
+        let size = json!({ "size_px": [140, 140], "phase": "gaussian", "periodic": false });
         let z = prepare("fft_ma", &size, &truth).unwrap().generate(&Streams::for_seed(1, "site")).unwrap().grid;
         z.map(|z| z.abs())
     }
@@ -368,7 +368,7 @@ mod tests {
         fit(z, &settings, &Streams::for_seed(1, "fit")).unwrap().fit
     }
 
-    /// Every method makes a texture of the size and cells asked for, with the residual's spread within a third (12 m hold some 100
+    /// Every method makes a texture of the size and cells asked for, with the residual's spread within a third (14 m hold some 130
     /// independent pieces, so the spread of a standard deviation is 10 %); repeated tiles are equal.
     #[test]
     fn val_every_method_makes_textures_of_a_fit() {
@@ -444,7 +444,7 @@ mod tests {
             assert_eq!(method(name, &seams).err().unwrap().key, "tile");
         }
         // A DEM of other cells is not that of the fit.
-        let other = Grid::new(Geometry::square(120, 120, 0.2), z.values.clone());
+        let other = Grid::new(Geometry::square(140, 140, 0.2), z.values.clone());
         let error = Measured::of_fit(&other, &plain).unwrap_err().to_string();
         assert!(error.starts_with("`exemplar` has cells of 0.2 m x 0.2 m"), "{error}");
         // Nor is one of the same cells and other heights; how high it lies has no effect.

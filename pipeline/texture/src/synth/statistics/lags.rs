@@ -1,8 +1,8 @@
 //! Covariance of a residual by lag, as stored in a fit file, and on a torus.
 //!
 //! Measured about zero from every pair of cells with data, up to a largest lag. Stored at lags of 0 to 32 cells one by one, to 64 in steps of
-//! 2, to 128 in steps of 4 and so on, in both directions: a covariance is smooth at long lags, and the table stays small. Between
-//! stored lags it is bilinear.
+//! 2, to 128 in steps of 4 and so on, in both directions: a covariance is smooth at long lags, and the table stays small; for small sites one by
+//! one only to 16 or 8 ([`thinned`]). Between stored lags it is bilinear.
 
 use crate::covariance::masked_covariance;
 use rayon::prelude::*;
@@ -10,14 +10,14 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::statistics::{self, LagCovariances};
 
 /// Lags stored one by one; each later octave has half as many.
-const DENSE: usize = 32;
+pub const DENSE: usize = 32;
 /// Largest lag, cells, that a table may hold.
 pub const LAG_MAX: usize = statistics::LAG_MAX as usize;
 
 /// The covariance of a residual at lags of up to `lag_max` cells, rows and columns.
 pub fn measure(residual: &Grid, lag_max: [usize; 2]) -> LagCovariances {
     let found = masked_covariance(&residual.values, residual.cols(), lag_max.map(|lag| lag.min(LAG_MAX)));
-    let [rows, cols] = found.max_lag.map(|lag| nodes(lag.min(LAG_MAX)));
+    let [rows, cols] = found.max_lag.map(|lag| nodes(lag.min(LAG_MAX), DENSE));
     let across: Vec<isize> = mirrored(&cols);
     // Far lags without any pair carry no covariance.
     let at = |row: u32, col: isize| found.covariance(row as isize, col).unwrap_or(0.0);
@@ -25,13 +25,32 @@ pub fn measure(residual: &Grid, lag_max: [usize; 2]) -> LagCovariances {
     LagCovariances { rows, cols, values }
 }
 
-/// Lags from 0 to `last`, each octave half as dense as the one before.
-fn nodes(last: usize) -> Vec<u32> {
+/// A table at some of its lags: one by one to `dense`, each octave beyond half as dense as the one before, and the last.
+pub fn thinned(table: &LagCovariances, dense: usize) -> LagCovariances {
+    let kept = |lags: &[u32]| -> Vec<usize> {
+        let last = lags.last().map_or(0, |&lag| lag as usize);
+        let nodes = nodes(last, dense);
+        (0..lags.len()).filter(|&k| k + 1 == lags.len() || nodes.contains(&lags[k])).collect()
+    };
+    let (rows, cols) = (kept(&table.rows), kept(&table.cols));
+    let middle = table.cols.len() - 1;
+    let west = cols[1..].iter().rev().map(|&k| middle - k);
+    let across: Vec<usize> = west.chain(cols.iter().map(|&k| middle + k)).collect();
+    let line = |row: usize| &table.values[row * table.inner()..(row + 1) * table.inner()];
+    LagCovariances {
+        values: rows.iter().flat_map(|&row| across.iter().map(move |&k| line(row)[k])).collect(),
+        rows: rows.iter().map(|&k| table.rows[k]).collect(),
+        cols: cols.iter().map(|&k| table.cols[k]).collect(),
+    }
+}
+
+/// Lags from 0 to `last`: one by one to `dense`, each octave beyond half as dense as the one before.
+fn nodes(last: usize, dense: usize) -> Vec<u32> {
     let mut nodes = Vec::new();
     let (mut lag, mut step) = (0, 1);
     while lag <= last {
         nodes.push(lag as u32);
-        if lag == DENSE * step {
+        if lag == dense * step {
             step *= 2;
         }
         lag += step;
@@ -140,11 +159,30 @@ mod tests {
 
     #[test]
     fn val_nodes_thin_out_by_octaves() {
-        assert_eq!(nodes(0), [0]);
-        assert_eq!(nodes(32).len(), 33);
-        assert_eq!(nodes(65)[31..], [31, 32, 34, 36, 38, 40, 42, 44, 46, 48, 50, 52, 54, 56, 58, 60, 62, 64]);
-        assert_eq!(nodes(LAG_MAX).len(), 33 + 3 * 16);
-        assert_eq!(nodes(LAG_MAX).last(), Some(&256));
+        assert_eq!(nodes(0, DENSE), [0]);
+        assert_eq!(nodes(32, DENSE).len(), 33);
+        assert_eq!(nodes(40, 8), [0, 1, 2, 3, 4, 5, 6, 7, 8, 10, 12, 14, 16, 20, 24, 28, 32, 40]);
+        assert_eq!(nodes(65, DENSE)[31..], [31, 32, 34, 36, 38, 40, 42, 44, 46, 48, 50, 52, 54, 56, 58, 60, 62, 64]);
+        assert_eq!(nodes(LAG_MAX, DENSE).len(), 33 + 3 * 16);
+        assert_eq!(nodes(LAG_MAX, DENSE).last(), Some(&256));
+    }
+
+    /// A table with fewer lags has the same values there, and the same reach.
+    #[test]
+    fn prop_thinned_tables_keep_their_values() {
+        let mut stream = Streams::for_seed(5, "lags-test").stream("heights");
+        let residual = Grid::new(Geometry::square(60, 70, 0.5), (0..4200).map(|_| stream.normal()).collect());
+        let table = measure(&residual, [13, 21]);
+        let few = thinned(&table, 8);
+        assert_eq!((few.rows.len(), reach(&few)), (9 + 2 + 1, [13, 21]));
+        assert_eq!(few.cols[8..], [8, 10, 12, 14, 16, 20, 21]);
+        assert!(few.check().is_ok() && few.variance() == table.variance());
+        let [all, some] = [&table, &few].map(|table| on_torus(table, [40, 60], |_| 1.0));
+        for (row, col) in [(0_isize, 21_isize), (13, -20), (12, 14), (7, -16), (10, 3)] {
+            let at = row as usize * 60 + col.rem_euclid(60) as usize;
+            assert_eq!(all[at], some[at], "{row} {col}");
+        }
+        assert_eq!(thinned(&table, DENSE), table);
     }
 
     /// The double sum over pairs, with holes; and back on a torus.

@@ -19,6 +19,10 @@ use sastrugi_schemas::statistics::{Statistics, VERSION};
 pub const CELLS_MIN: usize = 4096;
 /// Smallest largest lag, cells.
 pub const LAG_MIN: usize = 4;
+/// Fewest cells with data for each number that is stated: far from as many equations as unknowns.
+pub const CELLS_PER_NUMBER: usize = 4;
+/// Lags that are stated one by one, where all of them would be too many.
+const SPARSE: [usize; 2] = [16, 8];
 
 /// Why statistics cannot be measured.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -28,6 +32,17 @@ pub enum StatisticsError {
     TooSmall {
         /// Cells with data.
         cells: usize,
+    },
+    /// More numbers than the residual should tell of itself.
+    #[error(
+        "the residual has {cells} cells with data; its statistics, {numbers} numbers, need {CELLS_PER_NUMBER} for each, {}: use a larger DEM",
+        CELLS_PER_NUMBER * .numbers
+    )]
+    TooFewCells {
+        /// Cells with data.
+        cells: usize,
+        /// Numbers that would be stated.
+        numbers: usize,
     },
     /// No relief.
     #[error("the residual has the same height, {height_m} m, everywhere; there is no texture to measure")]
@@ -49,7 +64,8 @@ pub enum StatisticsError {
 /// should be 1.5 windows of the background.
 ///
 /// # Errors
-/// A residual with fewer than [`CELLS_MIN`] cells of data or without relief; a largest lag below [`LAG_MIN`] cells.
+/// A residual with fewer than [`CELLS_MIN`] cells of data, or than [`CELLS_PER_NUMBER`] for each number stated, or without relief; a largest lag below
+/// [`LAG_MIN`] cells.
 pub fn measure(residual: &Grid, lag_max: [usize; 2]) -> Result<Statistics, StatisticsError> {
     let mut heights = sums::finite(&residual.values);
     if heights.len() < CELLS_MIN {
@@ -78,8 +94,25 @@ pub fn measure(residual: &Grid, lag_max: [usize; 2]) -> Result<Statistics, Stati
         probabilities,
         ..Statistics::default()
     };
+    sparse(&mut statistics)?;
     statistics.modulation = modulated::measure(residual, &statistics);
     Ok(statistics)
+}
+
+/// Leaves lags out until there are enough cells for each number.
+fn sparse(statistics: &mut Statistics) -> Result<(), StatisticsError> {
+    let cells = statistics.cells as usize;
+    for dense in SPARSE {
+        if CELLS_PER_NUMBER * statistics.numbers() <= cells {
+            return Ok(());
+        }
+        statistics.covariance = lags::thinned(&statistics.covariance, dense);
+        statistics.wavelets.patches = statistics.wavelets.patches.take().map(|patches| lags::thinned(&patches, dense));
+    }
+    match statistics.numbers() {
+        numbers if CELLS_PER_NUMBER * numbers > cells => Err(StatisticsError::TooFewCells { cells, numbers }),
+        _ => Ok(()),
+    }
 }
 
 #[cfg(test)]

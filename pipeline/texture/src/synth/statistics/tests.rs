@@ -25,7 +25,7 @@ fn val_a_section_stays_below_a_megabyte() {
 /// The section does not depend on where the residual lies, and scales with it.
 #[test]
 fn prop_statistics_scale_with_the_heights() {
-    let z = gaussian_low_pass(&noise(90, 100), 1.0);
+    let z = gaussian_low_pass(&noise(130, 140), 1.0);
     let (one, twice) = (measure(&z, [16, 16]).unwrap(), measure(&z.map(|v| 2.0 * v), [16, 16]).unwrap());
     // Powers of two are exact.
     assert!(one.heights_m.iter().zip(&twice.heights_m).all(|(a, b)| 2.0 * a == *b));
@@ -40,12 +40,29 @@ fn prop_statistics_scale_with_the_heights() {
 /// The same section on one and three threads.
 #[test]
 fn prop_threads_change_no_bit() {
-    let z = gaussian_low_pass(&noise(120, 80), 1.0);
+    let z = gaussian_low_pass(&noise(150, 110), 1.0);
     let on = |threads: usize| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
         pool.install(|| serde_json::to_string(&measure(&z, [12, 12]).unwrap()).unwrap())
     };
     assert_eq!(on(1), on(3));
+}
+
+/// 130 x 140 cells have lags one by one only to 8, so that there are four cells for each number; the Laplacian keeps all of its lags.
+#[test]
+fn val_small_sites_state_fewer_lags() {
+    let small = measure(&noise(130, 140), [24, 24]).unwrap();
+    assert_eq!(
+        (small.covariance.rows[8..].to_vec(), small.laplacian.rows.len()),
+        (vec![8, 10, 12, 14, 16, 20, 24], 17)
+    );
+    assert!(CELLS_PER_NUMBER * small.numbers() <= 130 * 140 && small.check().is_ok());
+    let found = measure(&noise(100, 100), [24, 24]);
+    assert!(matches!(found, Err(StatisticsError::TooFewCells { cells: 10_000, .. })), "{found:?}");
+    assert_eq!(
+        StatisticsError::TooFewCells { cells: 10_000, numbers: 3000 }.to_string(),
+        "the residual has 10000 cells with data; its statistics, 3000 numbers, need 4 for each, 12000: use a larger DEM"
+    );
 }
 
 #[test]

@@ -158,7 +158,7 @@ fn prop_a_step_moves_the_covariance() {
 /// The same bytes on one and three threads, cut from a larger torus or periodic; streams by name; also without any octave.
 #[test]
 fn prop_threads_change_no_bit() {
-    let mut statistics = measure_statistics(&ridged(100, 110, 6), [12, 12]).unwrap();
+    let mut statistics = measure_statistics(&ridged(130, 140, 6), [12, 12]).unwrap();
     let streams = Streams::for_seed(6, "texture");
     for (periodic, octaves) in [(true, true), (false, true), (true, false)] {
         if !octaves {
@@ -183,7 +183,7 @@ fn prop_threads_change_no_bit() {
 
 #[test]
 fn val_refusals() {
-    let statistics = measure_statistics(&ridged(80, 80, 8), [12, 12]).unwrap();
+    let statistics = measure_statistics(&ridged(130, 130, 8), [12, 12]).unwrap();
     let streams = Streams::for_seed(1, "texture");
     let key = |statistics: &Statistics, rounds: u32, shape: [usize; 2]| {
         let parameters = WaveletStatisticsParameters { periodic: true, rounds };
