@@ -4,15 +4,16 @@
 
 Rasters are detrended by scipy's moving average of WINDOW_CELLS cells, the texture with the site's holes, and cut into patches of half a
 window. A random forest (scikit-learn) sees of each patch the features of `features`, none of which needs the place. It is cross-validated by
-place: both rasters are cut across their longer side into strips, and each strip is judged by a forest that saw the other strips, so that
-neighbours of a patch are never in both.
+place: both rasters are cut across their longer side into strips of complete lines of patches, and each strip is judged by a forest that saw only
+patches of the same raster at least a window away from it, so that neighbours of a patch are never in both.
 
 AUC: probability that the forest ranks a patch of the texture above one of the site, the mean over strips; 0.5 is blind, 1 is certain. Printed as
 JSON for each texture, with
 * `band`: 5 and 95 % of the AUC when the blocks of the site itself (two windows wide) are dealt out at random as `real` and `synthetic`: what the
-  method gives where there is nothing to tell;
+  method gives where there is nothing to tell; here and for `interleaved`, strips are of complete lines of blocks;
 * `halves`: the AUC of one half of the site against the other, and `interleaved`: of the black against the white blocks of a chessboard.
-A texture passes if its AUC lies below the larger of the band's end and that of the halves. AUCs below 0.5 are blind too.
+A texture `passes` if its AUC lies below the larger of the band's end and that of the halves: it is no farther from the site than the site's own
+halves are from each other. It `passes_band` if it lies within the band alone. AUCs below 0.5 are blind too.
 
 Importable: `judge(site, texture, window)` with arrays, NaN where there is no data.
 """
@@ -84,30 +85,37 @@ def patches(heights, side):
     return values, np.array(places)
 
 
-def strips(places):
-    """Number of the strip of each place, with as many places in each strip, across the longer side."""
+def folds(places, window, step=1):
+    """Strip of each place across the longer side, and for each strip which places a forest may see: those a window or more away.
+
+    Places in one line of `step` cells are in one strip.
+    """
     along = places[:, np.argmax(np.ptp(places, axis=0))]
-    return np.argsort(np.argsort(along, kind="stable"), kind="stable") * STRIPS // len(along)
+    lines, line = np.unique(along // step, return_inverse=True)
+    strip = line * STRIPS // len(lines)
+    away = [np.abs(along[:, None] - along[strip == k]).min(axis=1, initial=np.inf) - window // 2 for k in range(STRIPS)]
+    return strip, np.array([(strip != k) & (away[k] >= window) for k in range(STRIPS)])
 
 
-def auc(values, labels, groups):
+def auc(values, labels, strips, seen):
     """Mean AUC over strips of forests that saw the others; NaN if no strip has both labels."""
     found = []
-    for group in range(STRIPS):
-        test = groups == group
-        if len(set(labels[test])) < 2 or len(set(labels[~test])) < 2:
+    for strip in range(STRIPS):
+        test, train = strips == strip, seen[strip]
+        if len(set(labels[test])) < 2 or len(set(labels[train])) < 2:
             continue
         forest = RandomForestClassifier(TREES, min_samples_leaf=2, class_weight="balanced", random_state=0, n_jobs=1)
-        forest.fit(values[~test], labels[~test])
+        forest.fit(values[train], labels[train])
         found.append(roc_auc_score(labels[test], forest.predict_proba(values[test])[:, 1]))
     return float(np.mean(found)) if found else float("nan")
 
 
-def against(one, other):
+def against(one, other, window):
     """AUC of one set of patches against another; each has strips of its own."""
     values = np.concatenate([one[0], other[0]])
     labels = np.repeat([0, 1], [len(one[0]), len(other[0])])
-    return auc(values, labels, np.concatenate([strips(one[1]), strips(other[1])]))
+    (first, seen), (second, also_seen) = folds(one[1], window), folds(other[1], window)
+    return auc(values, labels, np.concatenate([first, second]), np.concatenate([seen, also_seen], axis=1))
 
 
 def within(site, window):
@@ -115,13 +123,14 @@ def within(site, window):
     values, places = site
     along = places[:, np.argmax(np.ptp(places, axis=0))]
     half = (along > np.median(along)).astype(int)
-    halves = against((values[half == 0], places[half == 0]), (values[half == 1], places[half == 1]))
+    halves = against((values[half == 0], places[half == 0]), (values[half == 1], places[half == 1]), window)
     cells = (places // (2 * window)).astype(int)
     colour = cells.sum(axis=1) % 2
-    interleaved = auc(values, colour, strips(places))
+    by_block = folds(places, window, 2 * window)
+    interleaved = auc(values, colour, *by_block)
     blocks, block = np.unique(cells, axis=0, return_inverse=True)
     random = np.random.default_rng(0)
-    deals = [auc(values, random.permutation(np.arange(len(blocks)) % 2)[block.ravel()], strips(places)) for _ in range(DEALS)]
+    deals = [auc(values, random.permutation(np.arange(len(blocks)) % 2)[block.ravel()], *by_block) for _ in range(DEALS)]
     return {"halves": halves, "interleaved": interleaved, "band": [float(q) for q in np.nanquantile(deals, [0.05, 0.95])]}
 
 
@@ -130,12 +139,19 @@ def judge(site, textures, window):
     side = window // 2
     real = patches(residual(site, window), side)
     own = within(real, window)
-    limit = max(own["band"][1], own["halves"])
+    band = own["band"][1]
     found = []
     for texture in textures:
         synthetic = patches(residual(with_holes(texture, site), window), side)
-        value = against(real, synthetic)
-        found.append({"auc": value, "patches": [len(real[0]), len(synthetic[0])], "passes": value <= limit})
+        value = against(real, synthetic, window)
+        found.append(
+            {
+                "auc": value,
+                "patches": [len(real[0]), len(synthetic[0])],
+                "passes": value <= max(band, own["halves"]),
+                "passes_band": value <= band,
+            }
+        )
     return {"textures": found, "site": own}
 
 
