@@ -12,7 +12,8 @@
 //! * `directional_psd`: `ln` of the mean power in sectors of 30 degrees over the mean of all, between the longest increment (at least
 //!   8 cells) and half the Nyquist frequency.
 //!
-//! [`surface_statistics`] adds what a fit may set, and the shape of the sets above a level:
+//! [`surface_statistics`], of parts of a surface, adds half an extremum of each kind, and one cell: a smooth part may have none, whose logarithm
+//! would be infinite. It also adds what a fit may set, and the shape of the sets above a level:
 //! * `covariance`: mean product of the residuals, m²: at lag 0, then at 1, 2, 3 ... cells east-west, then north-south;
 //! * `height_distribution`: 99 quantiles over their root mean square, so that unit and sigma do not count; it is also the area above a level,
 //!   the first Minkowski functional;
@@ -95,6 +96,13 @@ fn root_mean_square(values: &[f64]) -> f64 {
 
 /// The statistics of a residual that a covariance does not prescribe, with increments over lags of up to `lag_max` cells.
 pub fn unfitted_statistics(residual: &Grid, lag_max: usize) -> Vec<Statistic> {
+    unfitted(residual, lag_max, [0.0, 0.0])
+}
+
+/// The same with numbers added to the extrema of each kind and to the cells among which they are counted.
+fn unfitted(residual: &Grid, lag_max: usize, [extrema_more, cells_more]: [f64; 2]) -> Vec<Statistic> {
+    let [maxima, minima, cells] = extrema(residual).map(|count| count as f64);
+    let density = |count: f64| libm::log((count + extrema_more) / (cells + cells_more));
     let lags: Vec<usize> =
         std::iter::successors(Some(1), |l| Some(2 * l)).take_while(|l| *l <= lag_max.max(1)).collect();
     let (slope, curvature) = derivatives(residual);
@@ -105,7 +113,7 @@ pub fn unfitted_statistics(residual: &Grid, lag_max: usize) -> Vec<Statistic> {
         with("curvature_distribution", Scale::Relative, quantiles(curvature)),
         with("increment_flatness", Scale::Absolute, increments.iter().map(Moments::log_flatness).collect()),
         with("third_order_structure", Scale::Absolute, increments.iter().flat_map(Moments::skewness).collect()),
-        with("extrema_density", Scale::Absolute, extrema(residual).map(libm::log).to_vec()),
+        with("extrema_density", Scale::Absolute, vec![density(maxima), density(minima)]),
         with("directional_psd", Scale::Absolute, directional_power(residual, lag_max)),
     ]
 }
@@ -118,7 +126,7 @@ pub fn surface_statistics(residual: &Grid, lag_max: usize) -> Vec<Statistic> {
         (1..=LEVELS).map(|k| sums::quantile_sorted(&heights, k as f64 / (LEVELS + 1) as f64)).collect();
     let Minkowski { boundary_per_m, euler_per_m2 } = minkowski(residual, &levels);
     let with = |name, scale, values| Statistic { name, values, scale };
-    let mut all = unfitted_statistics(residual, lag_max);
+    let mut all = unfitted(residual, lag_max, [0.5, 1.0]);
     all.extend([
         with("covariance", Scale::First, covariance(residual, lag_max)),
         with("height_distribution", Scale::Absolute, standardised(&heights)),
@@ -203,8 +211,8 @@ fn increments(z: &Grid, lags: &[usize]) -> Vec<Moments> {
     lags.iter().map(|&lag| Moments { axes: [of(lag, [0, 1]), of(lag, [1, 0])] }).collect()
 }
 
-/// Shares of maxima and of minima among the cells whose eight neighbours have data.
-fn extrema(z: &Grid) -> [f64; 2] {
+/// Numbers of maxima and of minima, and of the cells whose eight neighbours have data.
+fn extrema(z: &Grid) -> [u64; 3] {
     let mut counts = [0u64; 3];
     for r in 1..z.rows().saturating_sub(1) {
         for c in 1..z.cols().saturating_sub(1) {
@@ -220,7 +228,7 @@ fn extrema(z: &Grid) -> [f64; 2] {
             counts[2] += u64::from(complete);
         }
     }
-    [0, 1].map(|k| counts[k] as f64 / counts[2] as f64)
+    counts
 }
 
 /// `ln` of the mean power in each sector over the mean of all; sectors are centred at 0, 30 ... degrees clockwise from north.
@@ -282,6 +290,10 @@ mod tests {
         assert!(values(&all, "curvature_distribution").iter().all(|v| (v + 1.0).abs() < 1e-9));
         let density = values(&all, "extrema_density");
         assert!((density[0] - libm::log(1.0 / (39.0 * 59.0))).abs() < 1e-12 && density[1] == f64::NEG_INFINITY);
+        // With half an extremum more: 1.5 maxima and half a minimum of 39 x 59 + 1 cells.
+        let density = values(&surface_statistics(&z, 4), "extrema_density");
+        let expected = [1.5, 0.5].map(|count| libm::log(count / (39.0 * 59.0 + 1.0)));
+        assert!(density.iter().zip(expected).all(|(d, e)| (d - e).abs() < 1e-12), "{density:?}");
     }
 
     /// A sawtooth that rises eastwards over 7 cells and falls over 1: d over one cell is 1 (7 of 8) or -7 (1 of 8), so that

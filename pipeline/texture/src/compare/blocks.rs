@@ -360,6 +360,7 @@ fn notes(evidence: &BlockEvidence, [site, texture]: &[Blocks; 2], widened: f64) 
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sastrugi_numeric::Geometry;
 
     /// A block with one statistic that is a mean, and one that is a spread.
     fn block(place: [usize; 2], value: f64) -> Block {
@@ -380,6 +381,21 @@ mod tests {
         let (finding, distances) = judge.finding(k, &CompareParameters::default());
         let (apart, null) = finding.known.unwrap();
         (apart, null, distances)
+    }
+
+    /// A block without a maximum or minimum, smooth as it is, counts like any other; a level one has no statistics.
+    #[test]
+    fn val_smooth_blocks_are_kept() {
+        let of = |f: &dyn Fn(f64, f64) -> f64| {
+            let values = (0..34 * 34).map(|k| f((k % 34) as f64, (k / 34) as f64)).collect();
+            Block::of([0, 0], &Grid::new(Geometry::square(34, 34, 0.1), values), 8)
+        };
+        let saddle = of(&|x, y| 0.01 * (x * x - 0.5 * y * y) + 0.02 * x * y + 0.1 * x);
+        let density =
+            |block: &Block| block.statistics.iter().find(|s| s.name == "extrema_density").unwrap().values.clone();
+        let expected = libm::log(0.5 / (32.0 * 32.0 + 1.0));
+        assert!(saddle.is_some_and(|block| density(&block).iter().all(|d| (d - expected).abs() < 1e-12)));
+        assert!(of(&|_, _| 1.0).is_none());
     }
 
     /// By hand: blocks of 1 and 3 have the mean 2 and the standard deviation sqrt 2; against blocks of 2 and 2.5 the means are 0.25 apart,
