@@ -141,6 +141,7 @@ fn read(side: &Side<'_>, request: &Request<'_>) -> Result<Read, Error> {
 
 /// Fits a DEM with the settings of another fit; for older fit files, with its model, window and trimming.
 fn like(dem: &Grid, fit: &FitFile, settings: &CompareSettings, streams: &Streams) -> Result<FitFile, Error> {
+    settings.check_simulations()?;
     let own = settings.parameters();
     let given: FitParameters = serde_json::from_value(fit.settings.clone()).unwrap_or_default();
     let parameters = FitParameters {

@@ -84,7 +84,7 @@ pub struct FoundCopies {
 /// Compares a texture with a site, both in metres with NaN where there is no data; their cells must be of one size, their extents may differ.
 ///
 /// # Errors
-/// Cells of different size, a side that cannot be detrended, and fewer than six blocks of either.
+/// Cells of different size, a side that cannot be detrended, fewer than six blocks of either, and too few for an answer at the stated alpha.
 pub fn blocks(
     site: &Grid,
     texture: &Grid,
@@ -104,8 +104,9 @@ pub fn blocks(
         let (site, texture) = (site_blocks.len(), texture_blocks.len());
         return Err(CompareError::TooFewBlocks { shape, site, texture, needed: BLOCKS_MIN });
     }
-    let judge = Judge::new(site_blocks, texture_blocks, streams);
     let parameters = settings.parameters();
+    check_alpha([site_blocks.len(), texture_blocks.len()], site_blocks[0].statistics.len(), parameters.alpha)?;
+    let judge = Judge::new(site_blocks, texture_blocks, streams);
     let (findings, distances): (Vec<Finding>, Vec<SiteDistances>) =
         (0..judge.site[0].statistics.len()).map(|k| judge.finding(k, parameters)).unzip();
     let mut quantities = decide(findings, parameters.alpha);
@@ -140,6 +141,23 @@ fn check_cells(site: &Grid, texture: &Grid) -> Result<(), CompareError> {
         true => Ok(()),
         false => Err(CompareError::Cells { site_m, texture_m }),
     }
+}
+
+/// Refuses blocks of site and texture whose rarest arrangement could not pass the first step of Holm's adjustment.
+fn check_alpha([site, texture]: [usize; 2], quantities: usize, alpha: f64) -> Result<(), CompareError> {
+    let least = least_p(site, texture);
+    match quantities as f64 * least > alpha {
+        true => Err(CompareError::TooFewArrangements { site, texture, least, quantities, alpha }),
+        false => Ok(()),
+    }
+}
+
+/// The smallest p-value that blocks of site and texture can have: one of all arrangements, of which two are alike where the numbers are equal
+/// (the sides are exchanged), and one of those drawn.
+fn least_p(site: usize, texture: usize) -> f64 {
+    let arrangements = (1..=texture).fold(1.0, |all, k| all * (site + k) as f64 / k as f64);
+    let alike = if site == texture { 2.0 } else { 1.0 };
+    f64::max(alike / arrangements, 1.0 / (ARRANGEMENTS + 1) as f64)
 }
 
 /// The texture without the cells that the site lacks or leaves out as objects; where it is larger, the site's holes are repeated.
@@ -381,6 +399,19 @@ mod tests {
         let (finding, distances) = judge.finding(k, &CompareParameters::default());
         let (apart, null) = finding.known.unwrap();
         (apart, null, distances)
+    }
+
+    /// By hand: 12 blocks have 924 arrangements into two sixes, each with its mirror image; 13 have 1716 into six and seven; more than 2000 are not drawn.
+    #[test]
+    fn val_least_p_values() {
+        assert!((least_p(6, 6) - 2.0 / 924.0).abs() < 1e-15 && (least_p(6, 7) - 1.0 / 1716.0).abs() < 1e-15);
+        assert!((least_p(7, 6) - least_p(6, 7)).abs() < 1e-15 && least_p(30, 200) == 1.0 / 2000.0);
+        assert!(check_alpha([6, 6], 11, 0.05).is_ok());
+        assert_eq!(
+            check_alpha([6, 6], 11, 0.02).unwrap_err().to_string(),
+            "6 blocks of the site and 6 of the texture have no arrangement rarer than p = 0.0022: a difference in one of 11 quantities cannot be \
+             significant at alpha = 0.02; use a smaller outer scale, larger rasters or a larger alpha"
+        );
     }
 
     /// A block without a maximum or minimum, smooth as it is, counts like any other; a level one has no statistics.

@@ -19,13 +19,14 @@ const KIND: &str = "intervals of the fits";
 /// Compares two fit files.
 ///
 /// # Errors
-/// A fit whose model or parameters are invalid.
+/// A fit whose model or parameters are invalid; too few simulations.
 pub fn fits(
     a: &FitFile,
     b: &FitFile,
     settings: &CompareSettings,
     streams: &Streams,
 ) -> Result<Comparison, ParameterError> {
+    settings.check_simulations()?;
     let files = [a, b];
     let sides = [Side::new("A", a)?, Side::new("B", b)?];
     let parameters = settings.parameters();

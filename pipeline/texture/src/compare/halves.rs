@@ -36,8 +36,9 @@ const INTERLEAVED_ALONG: usize = 8;
 /// Compares the textures fitted to one half of a site with its other half.
 ///
 /// # Errors
-/// A half that cannot be fitted.
+/// A half that cannot be fitted; too few simulations.
 pub fn halves(site: &Grid, settings: &CompareSettings, streams: &Streams) -> Result<Comparison, CompareError> {
+    settings.check_simulations()?;
     let examined = middle(site);
     let (one, other) = cut(&examined);
     let Judged { mut quantities, apart, model } =

@@ -207,6 +207,23 @@ pub enum CompareError {
         /// Fewest of each.
         needed: usize,
     },
+    /// Too few arrangements of the blocks for an answer.
+    #[error(
+        "{site} blocks of the site and {texture} of the texture have no arrangement rarer than p = {least:.4}: a difference in one of {quantities} quantities \
+         cannot be significant at alpha = {alpha}; use a smaller outer scale, larger rasters or a larger alpha"
+    )]
+    TooFewArrangements {
+        /// Blocks of the site.
+        site: usize,
+        /// Blocks of the texture.
+        texture: usize,
+        /// Smallest p-value.
+        least: f64,
+        /// Number of quantities.
+        quantities: usize,
+        /// Largest probability of any wrong `different`.
+        alpha: f64,
+    },
     /// The cells differ in size.
     #[error(
         "the site has cells of {} x {} m, the texture of {} x {} m: slopes, increments and spectra depend on the cell; make the texture with \

@@ -6,7 +6,7 @@ use sastrugi_schemas::ParameterError;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// Most quantities of a comparison.
+/// Most quantities of a comparison by simulation.
 const QUANTITIES_MAX: f64 = 6.0;
 /// Most simulations.
 const SIMULATIONS_MAX: u32 = 100_000;
@@ -38,7 +38,7 @@ pub struct CompareParameters {
     /// Largest difference of the covariances at any lag up to half a window (`--statistics`) that still counts as the same, as a share of the
     /// site's variance. Default 0.05.
     pub equivalence_covariance: f64,
-    /// Simulated surfaces of each side, at least 6 / alpha - 1. Default 199.
+    /// Simulated surfaces of each side, at least 6 / alpha - 1; `--statistics` simulates none. Default 199.
     pub simulations: u32,
     /// Largest probability of any wrong `different`, and of each wrong `same`. Default 0.05.
     pub alpha: f64,
@@ -89,15 +89,6 @@ impl TryFrom<CompareParameters> for CompareSettings {
             ParameterError::positive(name, bound)?;
         }
         ParameterError::between("alpha", p.alpha, 0.0, 0.5)?;
-        // The smallest p-value is 1 / (simulations + 1); it must be able to pass the first step of Holm's adjustment.
-        let least = (QUANTITIES_MAX / p.alpha).ceil() - 1.0;
-        if f64::from(p.simulations) < least || p.simulations > SIMULATIONS_MAX {
-            let message = format!(
-                "is {}; it must lie in [{least}, {SIMULATIONS_MAX}] at alpha = {}: with fewer, no difference could be significant",
-                p.simulations, p.alpha
-            );
-            return Err(ParameterError::new("simulations", message));
-        }
         let form = one_term(&p.model)?;
         let fit = FitParameters {
             mode: Mode::Corrected,
@@ -131,5 +122,23 @@ impl CompareSettings {
     /// The parameters with every default written out.
     pub fn parameters(&self) -> &CompareParameters {
         &self.parameters
+    }
+
+    /// Refuses too few simulations for a comparison that needs them: the smallest p-value is 1 / (simulations + 1), and it must be able to pass the
+    /// first step of Holm's adjustment.
+    ///
+    /// # Errors
+    /// Fewer simulations than that, or more than 100 000.
+    pub fn check_simulations(&self) -> Result<(), ParameterError> {
+        let p = &self.parameters;
+        let least = (QUANTITIES_MAX / p.alpha).ceil() - 1.0;
+        if f64::from(p.simulations) >= least && p.simulations <= SIMULATIONS_MAX {
+            return Ok(());
+        }
+        let message = format!(
+            "is {}; it must lie in [{least}, {SIMULATIONS_MAX}] at alpha = {}: with fewer, no difference could be significant",
+            p.simulations, p.alpha
+        );
+        Err(ParameterError::new("simulations", message))
     }
 }

@@ -46,6 +46,7 @@ pub(super) struct Side<'a> {
 /// # Errors
 /// A side that cannot be fitted (see [`FitError`]).
 pub fn surfaces(a: &Grid, b: &Grid, settings: &CompareSettings, streams: &Streams) -> Result<Comparison, CompareError> {
+    settings.check_simulations()?;
     let cases = [case("A", a, settings)?, case("B", b, settings)?];
     let directional = cases.each_ref().map(|c| c.bins_of(Layout::DIRECTIONAL));
     let form = &settings.form;

@@ -153,8 +153,12 @@ fn val_settings_are_checked() {
     let base = CompareParameters::default;
     assert!(refused(CompareParameters { model: "auto".to_owned(), ..base() }).contains("one model"));
     assert!(refused(CompareParameters { model: "exponential+gaussian".to_owned(), ..base() }).contains("one term"));
-    assert!(refused(CompareParameters { simulations: 10, ..base() }).contains("[119,"));
     assert!(refused(CompareParameters { equivalence_sigma: 0.0, ..base() }).contains("equivalence_sigma"));
+    // Only comparisons that simulate need simulations.
+    let site = oblong(&exponential(0.1, 0.2), "settings");
+    let error = surfaces(&site, &site, &settings(10), &Streams::for_seed(4, "compare-test")).unwrap_err().to_string();
+    assert!(error.contains("[119,"), "{error}");
+    assert!(blocks(&site, &site, &settings(10), &Streams::for_seed(4, "compare-test")).is_ok());
 }
 
 fn oblong(covariance: &Covariance, name: &str) -> Grid {
