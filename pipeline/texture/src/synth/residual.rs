@@ -8,6 +8,7 @@
 //! * the cells are those of the site;
 //! * directions, heights and long waves are the site's: a tile has no `ratio`, `azimuth_deg`, `outer_m`, `marginal` and `marginal_m`;
 //! * waves longer than the window of the fit are missing, and belong to the base that the texture is added to;
+//! * noise and blur of the DEM, which a fit takes out of its covariance where they are stated, are in the residual and in the texture;
 //! * the mean covariance of an ensemble is not known beforehand: [`Synthesis::covariance`] states the residual's along rows, with NaN as
 //!   `achieved_m2`, and [`Synthesis::ratio`] is NaN. A scoreboard measures both on realisations.
 //!
@@ -17,7 +18,9 @@ use super::measured::Measured;
 use super::statistics::lags;
 use super::tile::{self, OF_COVARIANCE, Tile};
 use super::{Cost, LagCovariance, Method, Prospect, Synthesis, SynthesisError, TextureOutcome};
+use crate::covariance::filtered::Measurement;
 use crate::covariance::masked_covariance;
+use crate::fit::FitSettings;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::FitFile;
@@ -284,9 +287,28 @@ impl<P: ResidualParameters> Method for Checked<P> {
                 super::to_micrometres(0.5 * (x + y))
             )
         });
-        let notes = self.tile.note().into_iter().chain(source.notes()).chain(window).chain(kernel.notes()).collect();
+        let of_fit = window.into_iter().chain(measurement_notes(fit));
+        let notes = self.tile.note().into_iter().chain(source.notes()).chain(of_fit).chain(kernel.notes()).collect();
         Ok(Box::new(Repeated { tile: self.tile.clone(), parameters: self.parameters(), source, kernel, notes }))
     }
+}
+
+/// What a fit takes out of its covariance and the residual keeps.
+fn measurement_notes(fit: &FitFile) -> Vec<String> {
+    let Ok(settings) = FitSettings::of_fit(fit) else { return Vec::new() };
+    let Measurement { inner_scale_m, noise } = settings.measurement();
+    let noise_m =
+        (noise.white_sigma_m * noise.white_sigma_m + noise.correlated_sigma_m * noise.correlated_sigma_m).sqrt();
+    let repeated = (noise_m > 0.0).then(|| {
+        let noise_m = super::to_micrometres(noise_m);
+        format!("the measured residual holds the noise of the DEM ({noise_m} m), which the texture repeats; the fit's covariance does not")
+    });
+    let blurred = (inner_scale_m > 0.0).then(|| {
+        format!(
+            "the measured residual is blurred by the inner scale of the DEM ({inner_scale_m} m), and so is the texture; the fit's covariance is not"
+        )
+    });
+    repeated.into_iter().chain(blurred).collect()
 }
 
 /// A method bound to a site.
@@ -397,6 +419,30 @@ mod tests {
             assert!(texture.parameters().get("marginal").is_none() && texture.cost().memory_bytes > 0);
             assert!(texture.notes().iter().any(|note| note.contains("window of the fit")), "{:?}", texture.notes());
         }
+    }
+
+    /// Noise and blur that a fit takes out of its covariance are in the texture: a note says so.
+    #[test]
+    fn val_noise_and_blur_are_noted() {
+        let z = site();
+        let notes = |noise_sigma_m: f64, inner_scale_m: f64| {
+            let parameters = FitParameters {
+                outer_scale_m: 2.0,
+                bootstrap: 0,
+                noise_sigma_m,
+                correlated_noise_sigma_m: 0.75 * noise_sigma_m,
+                correlated_noise_range_m: 500.0 * noise_sigma_m,
+                inner_scale_m,
+                ..FitParameters::default()
+            };
+            let fit = fit(&z, &parameters.try_into().unwrap(), &Streams::for_seed(1, "fit")).unwrap().fit;
+            let measured = Arc::new(Measured::of_fit(&z, &fit).unwrap());
+            prepare_from("exemplar", &json!({ "size_px": [64, 64] }), &fit, Some(&measured)).unwrap().notes().join("\n")
+        };
+        let (plain, both) = (notes(0.0, 0.0), notes(0.0004, 0.05));
+        assert!(!plain.contains("holds the noise") && !plain.contains("blurred"), "{plain}");
+        assert!(both.contains("holds the noise of the DEM (0.0005 m)"), "{both}");
+        assert!(both.contains("blurred by the inner scale of the DEM (0.05 m)"), "{both}");
     }
 
     /// The residual is recomputed as the fit computed it, before trimming: its quantiles are those of the fit file.
