@@ -266,7 +266,7 @@ id = "loose"
 fit = "fit"
 method = "wavelet_statistics"
 seed = 5
-size_px = [64, 96]
+size_px = [128, 144]
 tile = [2, 1]
 rounds = 3
 "#

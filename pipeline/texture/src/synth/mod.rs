@@ -206,6 +206,12 @@ pub enum SynthesisError {
         /// Name of the method.
         method: &'static str,
     },
+    /// Heights that overflow.
+    #[error("`{method}` does not lead to finite heights: the statistics of the fit are damaged; fit the DEM again")]
+    NotFinite {
+        /// Name of the method.
+        method: &'static str,
+    },
     /// Too little of the site is free of gaps.
     #[error(
         "the measured residual has {places} places of {side} m x {side} m without gaps, and `{method}` needs at least {least} to choose from; \

@@ -41,7 +41,7 @@
 //! Every realisation has nearly the same covariance and distributions, so realisations differ less than parts of a site do. Edges
 //! longer than the coarsest wavelets, and shapes (a boulder's outline), are not reproduced. A torus of fewer cells than the residual
 //! exaggerates the tails, because its extremes are those of the residual; textures that are not periodic are cut from one of at least
-//! [`SIDE_MIN`] cells a side.
+//! [`SIDE_MIN`] cells a side. A side of fewer than `4 * 2^octaves` cells, two waves of the coarsest octave, is refused.
 //!
 //! Cost: per round six half transforms, a logarithm and an exponential for each band and cell, and for each of some 16 differences a
 //! sort: an estimated 40 s for 1024 x 1024 cells on one core. Memory: 170 bytes per torus cell with four octaves.
@@ -85,6 +85,8 @@ const ROUNDS_MAX: u32 = 200;
 pub const FINISHING: u32 = 2;
 /// Smallest side of a torus that is not the texture itself, cells.
 pub const SIDE_MIN: usize = 256;
+/// Least side of a torus, in units of `2^octaves` cells: two wavelengths of the coarsest octave.
+const WIDTHS: usize = 4;
 /// Largest factor of a magnitude in one round.
 pub const GAIN_MAX: f64 = 30.0;
 /// Bytes per torus cell without the logarithms, and for those of one octave.
@@ -158,7 +160,8 @@ impl ResidualKernel for WaveletTexture {
     }
 
     fn make(&self, streams: &Streams) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
-        Ok((field(&self.statistics, [self.shape, self.torus], self.parameters.rounds, streams), Vec::new()))
+        let heights_m = field(&self.statistics, [self.shape, self.torus], self.parameters.rounds, streams);
+        Ok((heights_m.ok_or(SynthesisError::NotFinite { method: NAME })?, Vec::new()))
     }
 }
 
@@ -182,6 +185,15 @@ impl WaveletStatisticsParameters {
         if cells > CELLS_MAX as f64 {
             let message =
                 format!("needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}: make the texture smaller");
+            return Err(ParameterError::new("size_px", message));
+        }
+        let octaves = statistics.wavelets.octaves;
+        let least = WIDTHS << octaves.min(u32::BITS - 1);
+        if let Some(side) = torus.into_iter().find(|side| *side < least) {
+            let message = format!(
+                "gives a periodic texture of {side} cells on a side, too few for the {octaves} octaves of the fit's wavelets, which need {least}: make it \
+                 larger, or set periodic = false"
+            );
             return Err(ParameterError::new("size_px", message));
         }
         Ok(torus)
@@ -218,7 +230,8 @@ pub fn kind() -> Kind {
 /// One texture of `shape` (rows, columns) in cells of the statistics: heights from the north-west, m. Draws from `start` below `streams`.
 ///
 /// # Errors
-/// Statistics that are damaged or lack the distribution of heights; parameters out of range; more than 2^28 cells of torus.
+/// Statistics that are damaged or lack the distribution of heights; parameters out of range; more than 2^28 cells of torus, or a periodic
+/// texture too small for its octaves; heights that are not finite.
 pub fn synthesise(
     statistics: &Statistics,
     shape: [usize; 2],
@@ -228,17 +241,19 @@ pub fn synthesise(
     statistics.check()?;
     parameters.check()?;
     let torus = parameters.checked_torus(statistics, shape)?;
-    Ok(field(statistics, [shape, torus], parameters.rounds, streams))
+    field(statistics, [shape, torus], parameters.rounds, streams).ok_or_else(|| {
+        ParameterError::new("statistics.wavelets", "do not lead to finite heights; fit the DEM again with --statistics")
+    })
 }
 
-/// The part of a field on a torus that a texture of `shape` shows.
-fn field(statistics: &Statistics, [shape, torus]: [[usize; 2]; 2], rounds: u32, streams: &Streams) -> Vec<f64> {
-    let field = Rounds::new(statistics, torus).run(rounds, &streams.child("start"));
+/// The part of a field on a torus that a texture of `shape` shows; `None` if its heights are not finite.
+fn field(statistics: &Statistics, [shape, torus]: [[usize; 2]; 2], rounds: u32, streams: &Streams) -> Option<Vec<f64>> {
+    let field = Rounds::new(statistics, torus).run(rounds, &streams.child("start"))?;
     if shape == torus {
-        return field;
+        return Some(field);
     }
     let [rows, cols] = shape;
-    field.chunks_exact(torus[1]).take(rows).flat_map(|line| &line[..cols]).copied().collect()
+    Some(field.chunks_exact(torus[1]).take(rows).flat_map(|line| &line[..cols]).copied().collect())
 }
 
 /// The natural logarithm of the magnitude of a wavelet.
@@ -280,7 +295,8 @@ impl<'a> Rounds<'a> {
         self.bands.fft()
     }
 
-    fn run(&self, rounds: u32, streams: &Streams) -> Vec<f64> {
+    /// The field after all rounds; `None` once its heights are not finite.
+    fn run(&self, rounds: u32, streams: &Streams) -> Option<Vec<f64>> {
         let rows = self.torus[0];
         let start = random_spectrum(self.torus, |kx, ky| self.start[kx * rows + ky], Phase::Gaussian, streams);
         let mut field = self.fft().inverse(start);
@@ -289,9 +305,12 @@ impl<'a> Rounds<'a> {
                 field = self.with_magnitudes(&field);
             }
             field = self.with_covariance(&field);
+            if !field.iter().all(|z| z.is_finite()) {
+                return None;
+            }
             self.matcher.step(&mut field, self.fft());
         }
-        field
+        field.iter().all(|z| z.is_finite()).then_some(field)
     }
 
     /// Step 1: the field with the measured means and covariance of the logarithms.
@@ -321,7 +340,8 @@ impl<'a> Rounds<'a> {
                     row.iter().zip(&logarithms).zip(&mean).map(|((a, l), m)| a * (f64::from(l[at]) - m)).sum();
                 let moved = moved + added.as_ref().map_or(0.0, |added| added[at]);
                 let gain = libm::exp(self.wavelets.mean_log[k] + moved - f64::from(logarithms[k][at]));
-                gain.min(GAIN_MAX) - 1.0
+                // `min` would take the limit for what is not a number.
+                gain.clamp(0.0, GAIN_MAX) - 1.0
             };
             let parts = band.real.par_iter_mut().zip(&mut band.imaginary).enumerate().with_min_len(1 << 12);
             parts.for_each(|(at, (re, im))| {

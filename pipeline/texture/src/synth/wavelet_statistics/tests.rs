@@ -193,6 +193,13 @@ fn val_refusals() {
     assert_eq!(key(&statistics, 0, [32, 32]).as_deref(), Some("rounds"));
     assert_eq!(key(&statistics, 201, [32, 32]).as_deref(), Some("rounds"));
     assert_eq!(key(&statistics, 1, [1 << 15, 1 << 15]).as_deref(), Some("size_px"));
+    // Three octaves need 32 cells, on a torus.
+    assert_eq!((statistics.wavelets.octaves, key(&statistics, 1, [31, 40]).as_deref()), (3, Some("size_px")));
+    let cropped = WaveletStatisticsParameters { periodic: false, rounds: 1 };
+    assert!(synthesise(&statistics, [31, 40], &cropped, &streams).is_ok());
+    let mut huge = statistics.clone();
+    huge.wavelets.covariance_log.iter_mut().for_each(|v| *v *= 1e308);
+    assert_eq!(key(&huge, 1, [32, 32]).as_deref(), Some("statistics.wavelets"));
     let old = Statistics { version: 0, ..statistics.clone() };
     assert_eq!(key(&old, 1, [32, 32]).as_deref(), Some("statistics.version"));
     let mut headless = statistics.clone();
