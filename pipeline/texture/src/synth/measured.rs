@@ -9,8 +9,8 @@
 
 use super::SynthesisError;
 use super::to_micrometres;
+use crate::covariance::masked_covariance;
 use crate::fit::{FitError, FitSettings, Heights, residual_with_quantiles};
-use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, sums};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::FitFile;
@@ -22,8 +22,10 @@ const CELL_TOLERANCE: f64 = 1e-6;
 const QUANTILE_TOLERANCE: f64 = 1e-3;
 /// Heights this close are the same, m.
 const COPY_TOLERANCE_M: f64 = 1e-9;
-/// Lags of the correlation reach this share of a side of the site.
+/// Lags of the correlation reach this share of a side of the site,
 const LAG_SHARE: usize = 4;
+/// and at most this many cells, so that the tiles of its transforms stay small.
+const LAG_MAX: usize = 256;
 
 /// The residual of a measured site.
 #[derive(Clone, Debug)]
@@ -102,29 +104,25 @@ impl Measured {
     }
 
     /// Smallest lag at which the correlation has fallen below 1/e, north-south and east-west, cells: at least 1, at most a quarter of
-    /// the side.
+    /// the side and [`LAG_MAX`]. The mean of a residual is 0.
     pub(super) fn correlation_cells(&self) -> [usize; 2] {
-        let variance_m2 = self.covariance_m2([0, 0]);
-        let sides = [self.residual.rows(), self.residual.cols()];
+        let z = &self.residual;
+        let limit = [z.rows(), z.cols()].map(|side| (side / LAG_SHARE).clamp(1, LAG_MAX));
+        let found = masked_covariance(&z.values, z.cols(), limit);
+        // Lags without pairs say nothing.
+        let at = |lag: [isize; 2]| found.covariance(lag[0], lag[1]).unwrap_or(f64::NAN);
+        let variance_m2 = at([0, 0]);
         [0, 1].map(|axis| {
-            let limit = (sides[axis] / LAG_SHARE).max(1);
-            let at = |lag: usize| self.covariance_m2(if axis == 0 { [lag, 0] } else { [0, lag] });
-            (1..limit).find(|&lag| at(lag) * E < variance_m2).unwrap_or(limit)
+            let along = |lag: usize| if axis == 0 { [lag as isize, 0] } else { [0, lag as isize] };
+            (1..limit[axis]).find(|&lag| at(along(lag)) * E < variance_m2).unwrap_or(limit[axis])
         })
     }
+}
 
-    /// Mean product of the pairs of cells at a lag of cells south and east; the mean of a residual is 0. NaN without pairs.
-    fn covariance_m2(&self, [south, east]: [usize; 2]) -> f64 {
-        let z = &self.residual;
-        let of_row = |r: usize| {
-            let pairs = z.row(r).iter().zip(&z.row(r + south)[east.min(z.cols())..]);
-            let products = pairs.map(|(a, b)| a * b).filter(|product| product.is_finite());
-            products.fold((0.0, 0_usize), |(sum, count), product| (sum + product, count + 1))
-        };
-        let rows: Vec<(f64, usize)> = (0..z.rows().saturating_sub(south)).into_par_iter().map(of_row).collect();
-        let count: usize = rows.iter().map(|(_, count)| count).sum();
-        sums::sum(&rows.iter().map(|(sum, _)| *sum).collect::<Vec<_>>()) / count as f64
-    }
+/// Bytes that [`Measured::correlation_cells`] needs for a site of `cells` cells: transforms of tiles of up to 1024 x 1024 cells, padded by a half on
+/// each axis.
+pub(super) fn correlation_bytes(cells: u64) -> u64 {
+    8 * cells + 90 * cells.min(1 << 20)
 }
 
 /// Refuses a residual that is not the fit's, by quantiles of its heights; a fit may state none.

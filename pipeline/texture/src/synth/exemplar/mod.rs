@@ -42,7 +42,7 @@
 
 pub mod sampling;
 
-use super::measured::{Collage, Measured};
+use super::measured::{self, Collage, Measured};
 use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
 use super::{Cost, SynthesisError};
@@ -142,7 +142,8 @@ impl ExemplarParameters {
         let at_random: f64 = (0..GRIDS_MAX).map(|k| at_random(1 << k)).sum();
         let neighbours = f64::from(self.neighbours);
         let compared = neighbours * (neighbours + at_random);
-        Cost { memory_bytes: 20 * places + 48 * cells, operations: OPERATIONS_PER_CELL * compared * cells as f64 }
+        let memory_bytes = (20 * places + 48 * cells).max(measured::correlation_bytes(places));
+        Cost { memory_bytes, operations: OPERATIONS_PER_CELL * compared * cells as f64 }
     }
 
     /// Spacing of the first cells, a power of 2, cells.

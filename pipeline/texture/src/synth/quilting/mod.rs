@@ -38,7 +38,7 @@ pub mod cut;
 mod search;
 
 use super::exemplar::sampling::{self, Field};
-use super::measured::{Collage, Holes, Measured};
+use super::measured::{self, Collage, Holes, Measured};
 use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
 use super::{Cost, SynthesisError};
@@ -156,7 +156,7 @@ impl QuiltingParameters {
         let compared = (search::CANDIDATES * search::FACTOR_MAX * search::FACTOR_MAX) as f64 * (1.0 - new) / new;
         let per_cell = OPERATIONS_PER_BLOCK * blocks + OPERATIONS_PER_COMPARISON * compared;
         Cost {
-            memory_bytes: (8 << 20) + 56 * places + 24 * cells,
+            memory_bytes: ((8 << 20) + 56 * places + 24 * cells).max(24 * places + measured::correlation_bytes(places)),
             operations: per_cell * cells as f64 + OPERATIONS_PER_PLACE * places as f64,
         }
     }
