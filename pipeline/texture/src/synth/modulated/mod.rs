@@ -21,8 +21,8 @@
 //! minimised on a grid of s^2 and L that is then refined. Candidates whose covariance would be off by more than 5 % of the variance, or whose
 //! one-cell increments would have more than 1.1 times their variance, are left out. Stated parameters may cost 10 % of the variance.
 //!
-//! Source: Castaing, Gagne and Hopfinger 1990, Physica D 46, 177 (log-normal amplitudes, flatness by scale); Mehler 1866; for fields with
-//! stochastic amplitude Bardossy and Horning 2016 discuss the alternatives. Departure: the monotone map outside the product.
+//! Source: Castaing, Gagne and Hopfinger 1990, Physica D 46, 177, doi:10.1016/0167-2789(90)90035-N (log-normal amplitudes, flatness by scale);
+//! Mehler 1866. Departure: the monotone map outside the product.
 //!
 //! Not identified: L, if `F` is near 3 (no patches) or near its one-cell value at all lags (patches wider than the largest lag); one
 //! scale of patches is fitted, so F by lag is a compromise where patches have patches. Not reached: a flatness far above that of the heights,

@@ -5,8 +5,9 @@
 //! at 1/2 to 1 at 1 and stays there, `R_j` is centred at `2^-j`; the squares of all bands and of the low-pass that is left add up to 1.
 //! Frequencies are per cell, so that on oblong cells bands are oblong too.
 //!
-//! Source: Simoncelli and Freeman 1995; Portilla and Simoncelli 2000, International Journal of Computer Vision 40, 49. Departure: full size at
-//! every octave, so that any size can be transformed and a shift of the surface shifts its bands.
+//! Source: Simoncelli and Freeman 1995, doi:10.1109/ICIP.1995.537667; Portilla and Simoncelli 2000, International Journal of Computer Vision 40, 49,
+//! doi:10.1023/A:1026553619983. Departure: full size at every octave, so that any size can be transformed and a shift of the surface shifts its
+//! bands.
 
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2};
 use sastrugi_schemas::statistics::Wavelets;
