@@ -35,8 +35,8 @@ pub enum StatisticsError {
     },
     /// More numbers than the residual should tell of itself.
     #[error(
-        "the residual has {cells} cells with data; its statistics, {numbers} numbers, need {CELLS_PER_NUMBER} for each, {}: use a larger DEM",
-        CELLS_PER_NUMBER * .numbers
+        "the residual has {cells} cells with data; its statistics, {numbers} numbers, need {CELLS_PER_NUMBER} for each, {needed}: use a larger DEM",
+        needed = cells_for(*.numbers)
     )]
     TooFewCells {
         /// Cells with data.
@@ -99,18 +99,23 @@ pub fn measure(residual: &Grid, lag_max: [usize; 2]) -> Result<Statistics, Stati
     Ok(statistics)
 }
 
+/// Cells that a site needs to state so many numbers.
+fn cells_for(numbers: usize) -> usize {
+    CELLS_PER_NUMBER * numbers
+}
+
 /// Leaves lags out until there are enough cells for each number.
 fn sparse(statistics: &mut Statistics) -> Result<(), StatisticsError> {
     let cells = statistics.cells as usize;
     for dense in SPARSE {
-        if CELLS_PER_NUMBER * statistics.numbers() <= cells {
+        if cells_for(statistics.numbers()) <= cells {
             return Ok(());
         }
         statistics.covariance = lags::thinned(&statistics.covariance, dense);
         statistics.wavelets.patches = statistics.wavelets.patches.take().map(|patches| lags::thinned(&patches, dense));
     }
     match statistics.numbers() {
-        numbers if CELLS_PER_NUMBER * numbers > cells => Err(StatisticsError::TooFewCells { cells, numbers }),
+        numbers if cells_for(numbers) > cells => Err(StatisticsError::TooFewCells { cells, numbers }),
         _ => Ok(()),
     }
 }
