@@ -19,7 +19,14 @@ fn val_a_study_of_textures_that_repeat_a_site() {
         assert!(sums.contains_key(path), "{path} is missing from {:?}", sums.keys());
     }
     let release = folder.path().join("release");
-    for row in rows(&release, "scoreboard") {
+    let scoreboard = rows(&release, "scoreboard");
+    for method in methods {
+        assert!(
+            scoreboard.iter().any(|row| row["method"] == method.replace('-', "_")),
+            "{method} is not in {scoreboard:?}"
+        );
+    }
+    for row in &scoreboard {
         let method = row["method"].as_str().unwrap_or_default();
         assert_eq!(row["refused"], "", "{method}");
         let number = |key: &str| row[key].as_f64().unwrap_or(f64::NAN);

@@ -131,6 +131,7 @@ fn val_the_wheel_runs_in_an_empty_environment() {
     assert_eq!((call.code, call.stdout.trim()), (0, concat!("sastrugi ", env!("CARGO_PKG_VERSION"))));
     let listed = called(Command::new(bin.join("python")).args(["-m", "pip", "list", "--format", "freeze"]));
     let installed: Vec<&str> = listed.stdout.lines().filter_map(|line| line.split_once("==")).map(|(n, _)| n).collect();
+    assert!(installed.contains(&"numpy") && installed.contains(&"sastrugi"), "{installed:?}");
     assert!(installed.iter().all(|name| ["numpy", "pip", "sastrugi", "setuptools"].contains(name)), "{installed:?}");
 
     pip(vec!["--requirement".into(), root().join("tests/python/requirements.txt").into()]);

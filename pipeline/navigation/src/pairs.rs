@@ -166,6 +166,7 @@ mod tests {
         let map = map(40, 60, |row, col| (row + col) % 3 == 0);
         let rules = PairParameters { distance_min_m: Some(8.0), border_m: 2.0 };
         let pairs = draw_pairs(&map, &rules, 200, &streams()).unwrap();
+        assert_eq!(pairs.len(), 200);
         for pair in &pairs {
             assert!(distance_m(&map, pair.start, pair.goal) >= 8.0);
             for node in [pair.start, pair.goal] {

@@ -34,6 +34,7 @@ def test_terrains(kind, sastrugi_program, tmp_path):
     made = sastrugi.terrain(kind, seed=7, **nested(TERRAINS[kind]))
     made.save(tmp_path / "module.tif")
     assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
+    assert bool(made.maps) == (kind == "planetary")
     for name, values in made.maps.items():
         written = sastrugi.Heightfield.read(tmp_path / f"program.{name}.tif")
         assert written.values.shape == values.shape

@@ -171,7 +171,7 @@ proptest! {
     #![proptest_config(ProptestConfig::with_cases(400))]
 
     /// The fast walk finds the same hit as a march in steps of 1/2000 of a cell, with holes, from inside and outside. Grazing rays are
-    /// excluded: ground missed by the march lies within one step's change of height of the ray.
+    /// excluded: ground missed by the march lies within one step's change of height of the ray, ground missed by the walk within 1 mm of it.
     #[test]
     fn prop_rays_hit_what_a_slow_march_hits(
         x in -2.0..10.0f64, y in -2.0..14.0f64, z in 0.5..6.0f64,
@@ -186,21 +186,24 @@ proptest! {
         let relief = Relief::new(&heights).unwrap();
         let hit = relief.first_hit(origin, towards, 0.0);
         let slow = march(&heights, origin, towards, 30.0, step);
-        let lowest = |to: f64| {
-            let steps = 0..(to / step) as usize;
-            steps.map(|k| above(&heights, origin, towards, k as f64 * step)).filter(|f| f.is_finite()).map(f64::abs).fold(f64::INFINITY, f64::min)
+        let least = |from: f64, to: f64, of: fn(f64) -> f64| {
+            let steps = (from / step) as usize..(to / step) as usize;
+            steps.map(|k| above(&heights, origin, towards, k as f64 * step)).filter(|f| f.is_finite()).map(of).fold(f64::INFINITY, f64::min)
         };
+        let lowest = |to: f64| least(0.0, to, f64::abs);
+        let is_touched = |slow: f64| least(slow, slow + 0.5, std::convert::identity) > -1e-3;
         match (hit, slow) {
             (Some(hit), Some(slow)) if slow.is_finite() => {
                 let near = hit.distance_m > slow - 2.0 * step && hit.distance_m < slow + 1e-9;
-                // Otherwise it hit ground that the march stepped over.
-                prop_assert!(near || lowest(hit.distance_m + step) < 1e-3, "{hit:?} {slow}");
+                // Otherwise it hit ground that the march stepped over, or passed ground that it hardly touches.
+                let other = if hit.distance_m < slow { lowest(hit.distance_m + step) < 1e-3 } else { is_touched(slow) };
+                prop_assert!(near || other, "{hit:?} {slow}");
                 let ground = heights.height(hit.point_m[0], hit.point_m[1]).unwrap_or(hit.point_m[2]);
                 prop_assert!((ground - hit.point_m[2]).abs() < 1e-9);
                 prop_assert!(minus(along(origin, hit.distance_m, towards), hit.point_m).iter().all(|d| d.abs() < 1e-8));
             }
             (None, None) => {}
-            (None, Some(slow)) => prop_assert!(slow.is_infinite() || lowest(30.0) < 1e-3, "march met ground at {slow}"),
+            (None, Some(slow)) => prop_assert!(slow.is_infinite() || is_touched(slow), "march met ground at {slow}"),
             (Some(hit), _) => prop_assert!(lowest(hit.distance_m + step) < 1e-3, "{hit:?} {slow:?}"),
         }
     }

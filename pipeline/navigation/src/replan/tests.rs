@@ -49,6 +49,7 @@ fn val_a_dead_end_is_walked_into_and_left_again() {
 #[test]
 fn prop_every_plan_costs_as_much_as_a_fresh_search_over_the_known_cells() {
     let mut random = Random(71);
+    let mut plans = 0;
     for k in 0..10 {
         let map = rough(18, 18, 0.2, 0.5, &mut random);
         let Some(ends) = ends(&map, &mut random) else { continue };
@@ -64,12 +65,14 @@ fn prop_every_plan_costs_as_much_as_a_fresh_search_over_the_known_cells() {
                 break;
             };
             assert_eq!(found.cost.to_bits(), fresh.to_bits());
+            plans += 1;
             walker.at = found.path[1];
             let changed = walker.known.sense(walker.at);
             walker.search.move_to(&walker.known, walker.at);
             walker.search.changed(&walker.known, changed);
         }
     }
+    assert!(plans > 20, "{plans}");
 }
 
 #[test]

@@ -89,6 +89,7 @@ fn val_astar_costs_equal_those_of_the_pathfinding_crate() {
     let map = hills(60, 3000.0, 6, 11);
     let costs = thesis_costs(&map);
     let mut random = Random(12);
+    let mut found = 0;
     for neighbourhood in NEIGHBOURHOODS {
         let grid = GridNetwork { ground: ground(&map, &costs), neighbourhood };
         for _ in 0..20 {
@@ -104,9 +105,11 @@ fn val_astar_costs_equal_those_of_the_pathfinding_crate() {
             assert_eq!(ours.is_some(), theirs.is_some());
             if let (Some(ours), Some(theirs)) = (ours, theirs) {
                 assert!((ours.cost / (theirs.1 as f64 * 1e-9) - 1.0).abs() < 1e-8);
+                found += 1;
             }
         }
     }
+    assert!(found > 10, "{found}");
 }
 
 /// The grid with the thesis' Manhattan bound.

@@ -483,6 +483,7 @@ fn val_a_full_fit_has_intervals_and_verdicts() {
     let exponential = fit.candidates.iter().find(|c| c.model == "exponential").unwrap();
     assert!(exponential.aicc_above_best.unwrap() < 6.0, "{:?}", fit.candidates);
     let intervals = fit.intervals.unwrap();
+    assert!(intervals.values.len() >= 2, "{:?}", intervals.values);
     for (name, [low, high]) in &intervals.values {
         assert!(low.unwrap() < high.unwrap(), "{name}: {low:?} {high:?}");
     }
@@ -583,6 +584,7 @@ fn prop_a_nanometre_does_not_move_a_fit() {
     scattered(&mut dem, 4);
     let found = |dem: &Grid| fit(dem, &with_bootstrap("exponential", 0), &streams()).unwrap().fit.parameters;
     let before = found(&dem);
+    assert_eq!(before.len(), 2, "{before:?}");
     let mut s = Streams::for_seed(2, "nanometre").stream("cells");
     dem.values.iter_mut().for_each(|z| *z += 1e-9 * s.normal());
     for (name, value) in found(&dem) {
