@@ -11,6 +11,9 @@ use serde_json::Value;
 
 const INTRODUCTION: &str = include_str!("reference.md");
 
+/// Where a reader of the page goes from here.
+const NEXT: &str = "Next: [what a release contains](release.md), or [run the study on a cluster](cluster.md).";
+
 /// The page as Markdown.
 pub fn study() -> String {
     let listed = |name: &str, form: Form, envelope: &Value| {
@@ -30,6 +33,7 @@ pub fn study() -> String {
         parts.push(chapter(section.name, section.form, &(section.envelope)()));
         parts.extend(kinds(section));
     }
+    parts.push(NEXT.to_owned());
     parts.join("\n\n")
 }
 
