@@ -76,3 +76,19 @@ impl Question {
         Ok((!blocks.is_empty()).then_some(Section { id: self.id, name: self.name, title: self.title, blocks }))
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::ALL;
+
+    /// The manual lists the sections by the names and questions that the page has.
+    #[test]
+    fn val_the_manual_lists_every_question() {
+        let manual = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/report.md");
+        let manual = std::fs::read_to_string(manual).unwrap();
+        let sections = manual.split("\n## ").find(|part| part.starts_with("The sections\n")).unwrap();
+        for question in ALL {
+            assert!(sections.contains(question.name) && sections.contains(question.title), "{}", question.title);
+        }
+    }
+}
