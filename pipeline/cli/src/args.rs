@@ -31,20 +31,20 @@ pub struct Arguments {
 #[derive(Debug, Args)]
 pub struct Common {
     /// Number of threads; default: all cores. Results do not depend on it.
-    #[arg(long, global = true, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+    #[arg(long, global = true, display_order = 101, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
     pub threads: Option<u16>,
     /// Print the result as JSON on stdout.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, display_order = 102)]
     pub json: bool,
     /// Suppress progress on stderr; errors are always printed.
-    #[arg(long, global = true)]
+    #[arg(long, global = true, display_order = 103)]
     pub quiet: bool,
 }
 
 /// Verbs.
 #[derive(Debug, Subcommand)]
 pub enum Verb {
-    /// Write a small commented study as a starting point, and the schema with which editors check it.
+    /// Write a small commented study to start from, and its schema for editors.
     #[command(after_help = init_help())]
     Init(Init),
     /// Run a study and write its release; resumes where an earlier run stopped.
@@ -373,7 +373,7 @@ pub struct Cache {
     /// Shared cache.
     #[arg(value_name = "DIR|s3://...")]
     pub place: String,
-    /// Remove the longest unused entries until the rest is no larger, such as 500G.
+    /// Remove the least recently used entries until the rest is no larger, such as 500G.
     #[arg(long, value_name = "BYTES")]
     pub max_bytes: Option<String>,
     /// Remove entries unused for more than this many days.
