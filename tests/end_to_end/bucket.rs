@@ -101,7 +101,7 @@ fn val_a_bucket_is_cache_and_place_of_a_release() {
     write(path, "study.toml", &small_study().replace("name = \"small\"", "name = \"other\""));
     let call = server.call(path, &["run", "study.toml", "-o", "s3://terrains/small", "--quiet"]);
     assert!(
-        call.code == 2 && call.stderr.contains("another release is there already"),
+        call.code == 2 && call.stderr.contains("already contains another release"),
         "{} {}",
         call.code,
         call.stderr

@@ -35,7 +35,7 @@ fn done(arguments: impl IntoIterator<Item = OsString>) -> Verdict {
         Err(error) => return Ok(refuse_arguments(&error)),
     };
     if let Err(error) = signals::listen() {
-        output::warn(&format!("sastrugi: note: no message will be shown on Ctrl-C: {error}"));
+        output::warn(&format!("sastrugi: note: Ctrl-C will end the program without a message: {error}"));
     }
     verbs::start_threads(arguments.common.threads)?;
     verbs::dispatch(&arguments)

@@ -52,7 +52,7 @@ class Fit:
 
     @classmethod
     def load(cls, path: str | os.PathLike[str]) -> Fit:
-        """Reads a fit file. Raises SastrugiError (65) for a file that is missing or is not one."""
+        """Reads a fit file. Raises SastrugiError (65) for a missing file, or one that is not a fit file."""
         return cls(_native.load_fit(os.fspath(path)))
 
     def save(self, path: str | os.PathLike[str]) -> None:
@@ -161,7 +161,7 @@ class Fit:
         return Heightfield.read(exemplar, cell=self._content.get("cell_m"), window=source.get("window"))
 
     def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
-        """Draws the measured covariance and the model, both as detrending and trimming leave them, by lag. Needs matplotlib."""
+        """Plots covariance by lag: measured, and of the model, both after detrending and trimming. Needs matplotlib."""
         lags = np.asarray(self._content.get("lags_m", []), dtype=float)
         if lags.size == 0:
             raise SastrugiError("a stated model has no measured covariance to draw", USAGE)

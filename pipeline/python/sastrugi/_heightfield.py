@@ -87,7 +87,7 @@ class Heightfield:
         return cls(*parts, notes=notes)
 
     def save(self, path: str | os.PathLike[str], *, compress: str = "deflate", cog: bool = False) -> tuple[str, ...]:
-        """Writes the heights; the ending decides on the format (.tif, .asc, .npy, .hgt, .png, .obj, .glb, .usda).
+        """Writes the heights; the extension selects the format (.tif, .asc, .npy, .hgt, .png, .obj, .glb, .usda).
 
         GeoTIFF holds single precision. `compress` is none, deflate or zstd; `cog` writes a cloud-optimised GeoTIFF. Returns notes on what the
         format loses. Maps are not written.
@@ -169,7 +169,7 @@ def heights_of(dem: Any, cell: float | Sequence[float] | None = None) -> Heightf
     """A heightfield as it is, a file read, or an array with its cell. Notes on how a file was read are warnings of the caller's caller."""
     if isinstance(dem, Heightfield):
         if cell is not None:
-            raise SastrugiError("a heightfield has its own `cell`; leave it out", USAGE)
+            raise SastrugiError("a heightfield has its own `cell`; omit it", USAGE)
         return dem
     if isinstance(dem, (str, os.PathLike)):
         read = Heightfield.read(dem, cell=cell)

@@ -87,7 +87,7 @@ class Table:
         return {name: self[name] for name in self}
 
     def to_rows(self) -> list[dict[str, Any]]:
-        """The rows as dicts of Python's values."""
+        """The rows as dicts of Python values."""
         columns = {name: values.tolist() for name, values in self.to_numpy().items()}
         return [dict(zip(columns, row)) for row in zip(*columns.values())]
 
@@ -118,7 +118,7 @@ class Mission:
 
     @property
     def id(self) -> str:
-        """Terrain and mission, as `rough-0001/husky-0003`; wherever a mission is asked for, this may be given."""
+        """Terrain and mission, as `rough-0001/husky-0003`; accepted wherever a mission is expected."""
         return f"{self.terrain_id}/{self.mission_id}"
 
     def __getitem__(self, column: str) -> Any:
@@ -217,7 +217,7 @@ class Release:
         return sorted(folder.name for folder in tables.iterdir() if folder.is_dir())
 
     def table(self, name: str) -> Table:
-        """A table; without rows if the release has none of it.
+        """A table; empty if the release does not have it.
 
         Raises SastrugiError (2) for a name that no release has.
         """

@@ -1,7 +1,7 @@
-//! Long calls: the work is done on a thread of its own, while the caller waits for it, tells how far it is, and watches for Ctrl-C.
+//! Long calls: the work runs on a thread of its own, while the caller waits for it, reports its progress, and watches for Ctrl-C.
 //!
-//! Kernels cannot be stopped in the middle. On Ctrl-C the caller gets its `KeyboardInterrupt` after a moment at most; a run starts no further
-//! item, and what was begun ends in the background without effect (files appear only when they are complete).
+//! Kernels cannot be stopped halfway. On Ctrl-C the caller gets its `KeyboardInterrupt` within about two seconds; a run starts no further items, and
+//! those in progress end in the background without effect (files appear only when they are complete).
 
 use crate::errors::{refused, usage};
 use pyo3::prelude::*;

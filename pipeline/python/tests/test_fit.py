@@ -46,7 +46,7 @@ def test_files(tmp_path):
     with pytest.raises(sastrugi.SastrugiError, match="not a fit file: `model` and `parameters` are required") as refused:
         Fit.load(tmp_path / "other.json")
     assert refused.value.code == 65
-    for place, said in [(tmp_path, "is a folder; name a file"), ("", "the path is empty"), ("s3://a/fit.json", "cannot be written to here")]:
+    for place, said in [(tmp_path, "is a folder; name a file"), ("", "the path is empty"), ("s3://a/fit.json", "must be a path on this machine")]:
         with pytest.raises(sastrugi.SastrugiError, match=said):
             snow().save(place)
 

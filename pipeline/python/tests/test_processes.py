@@ -33,7 +33,7 @@ print(refusal(lambda: snow.texture(1600.0, 0.1)))
 print(sastrugi.terrain("multifractal", size_px=[90, 70]).shape)
 """)
     terrain, texture, shape = found.splitlines()
-    assert terrain.startswith("75 the terrain needs about ") and "GiB are available" in terrain
+    assert terrain.startswith("75 the terrain needs about ") and "GiB is available" in terrain
     assert texture.startswith("75 the texture needs about ")
     assert shape == "(70, 90)"
 

@@ -1,7 +1,7 @@
 //! From a study to a release: one job per stage (glue between kernels and files), the study reader, the runner with its
 //! cache and shards, and the verbs that work on single files.
 //!
-//! A study takes this way:
+//! From a study to a release:
 //!
 //! 1. [`loaded::load`] reads the TOML file, checks it against the schemas of its sections ([`registry::SECTIONS`]), and adds the items of
 //!    each table to a [graph](runner::graph). Errors come all at once, with their places in the text ([`Error::Study`]).

@@ -1,5 +1,5 @@
-//! Memory that the machine has left. Work whose estimate exceeds it is refused: an allocation that fails ends the process, and with it the
-//! notebook that holds the Python module.
+//! Memory that is still available. Work whose estimate exceeds it is refused: an allocation that fails ends the process, and with it the
+//! notebook that uses the Python module.
 
 use crate::error::Error;
 use std::fs;
@@ -13,7 +13,7 @@ pub fn check(what: &str, needed: u64) -> Result<(), Error> {
     let gib = |bytes: u64| bytes as f64 / f64::from(1u32 << 30);
     match available() {
         Some(available) if needed > available => Err(Error::Retry(format!(
-            "{what} needs about {:.2} GiB of memory, and {:.2} GiB are available; make it smaller, or free memory",
+            "{what} needs about {:.2} GiB of memory, but only {:.2} GiB is available; make it smaller, or free memory",
             gib(needed),
             gib(available)
         ))),

@@ -48,7 +48,7 @@ pub fn check_local(output: &Path) -> Result<(), Error> {
         return Err(Error::Usage("the path is empty; name a file or folder".to_owned()));
     }
     if file::is_address(output) {
-        let advice = "an address cannot be written to here; give a path on this machine (the program's `run` and `merge` write releases to s3://bucket/prefix)";
+        let advice = "this output must be a path on this machine (only the program's `run` and `merge` write to an object store, s3://bucket/prefix)";
         return Err(Error::Usage(format!("{}: {advice}", output.display())));
     }
     Ok(())
@@ -157,10 +157,13 @@ fn create(bucket: &Bucket, name: &str, path: &Path, sha256: &str) -> Result<(), 
 }
 
 fn occupied(bucket: &Bucket, name: &str) -> Error {
-    let what =
-        if name == MANIFEST { "another release" } else { "an object with other bytes, as of an unfinished upload" };
+    let what = if name == MANIFEST {
+        "another release"
+    } else {
+        "an object with other bytes, such as one of an unfinished upload"
+    };
     let address = bucket.address();
-    Error::Usage(format!("{address}: {what} is there already ({name}); remove it, or choose another address with -o"))
+    Error::Usage(format!("{address} already contains {what} ({name}); remove it, or choose another address with -o"))
 }
 
 /// Copies all objects into an empty folder.
@@ -221,7 +224,7 @@ mod tests {
         upload(&first, &bucket, &Silent).unwrap();
         assert_eq!(bucket.list("").unwrap(), before);
         let refused = upload(&release(two.path(), "# Other"), &bucket, &Silent).unwrap_err();
-        assert!(matches!(&refused, Error::Usage(why) if why.contains("another release is there already")), "{refused}");
+        assert!(matches!(&refused, Error::Usage(why) if why.contains("already contains another release")), "{refused}");
         assert_eq!(bucket.list("").unwrap(), before);
         let back = tempfile::tempdir().unwrap();
         download(&bucket, back.path(), &Silent).unwrap();
@@ -240,7 +243,7 @@ mod tests {
         bucket.remove("dem/a.asc").unwrap();
         let refused = upload(&release(two.path(), "# Other"), &bucket, &Silent).unwrap_err();
         assert!(
-            matches!(&refused, Error::Usage(why) if why.contains("unfinished upload is there already (README.md)")),
+            matches!(&refused, Error::Usage(why) if why.contains("one of an unfinished upload (README.md)")),
             "{refused}"
         );
         assert!(!bucket.contains(MANIFEST).unwrap());
@@ -271,7 +274,7 @@ mod tests {
         run("# Demo").unwrap();
         let before = bucket.list("").unwrap();
         let refused = run("# Other").unwrap_err();
-        assert!(matches!(&refused, Error::Usage(why) if why.contains("another release is there already")), "{refused}");
+        assert!(matches!(&refused, Error::Usage(why) if why.contains("already contains another release")), "{refused}");
         assert_eq!(bucket.list("").unwrap(), before);
     }
 
@@ -294,11 +297,11 @@ mod tests {
         };
         for other in ["gs://b/c", "S3://b/c", "s3:/b", "file:///tmp/a"] {
             assert!(said(check_place(Path::new(other))).contains("give a folder, or s3://bucket/prefix"), "{other}");
-            assert!(said(check_local(Path::new(other))).contains("give a path on this machine"), "{other}");
+            assert!(said(check_local(Path::new(other))).contains("must be a path on this machine"), "{other}");
         }
         let made =
             releasing(Path::new("s3://b/c"), Some(Path::new("gs://b")), false, &Silent, |_, _, _| panic!("made"));
-        assert!(said(made.map(drop)).contains("gs://b: an address cannot be written to here"));
+        assert!(said(made.map(drop)).contains("gs://b: this output must be a path"));
         assert!(check_place(Path::new("s3://b/c")).is_ok() && check_local(Path::new("s3://b/c")).is_err());
         for check in [check_place, check_local] {
             assert!(check(Path::new("release")).is_ok());

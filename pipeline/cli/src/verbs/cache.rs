@@ -33,7 +33,7 @@ fn described(place: &str, pruned: &Pruned) -> String {
     let Pruned { entries, bytes: size, unused_days, drafts, removed, removed_bytes } = pruned;
     let mut text = format!("{place}: {}, {}", counted(*entries as u64, "entry"), bytes(*size as f64));
     if let Some(days) = unused_days {
-        text.push_str(&format!(", the longest unused for {days:.1} days"));
+        text.push_str(&format!(", the least recently used {days:.1} days ago"));
     }
     if *drafts > 0 {
         text.push_str(&format!("; {}", counted(*drafts as u64, "draft")));
@@ -67,7 +67,7 @@ mod tests {
             removed: 2,
             removed_bytes: 5_000,
         };
-        let expected = "c: 3 entries, 2.0 MB, the longest unused for 1.5 days; 1 draft; removed 2, 5.0 kB";
+        let expected = "c: 3 entries, 2.0 MB, the least recently used 1.5 days ago; 1 draft; removed 2, 5.0 kB";
         assert_eq!(described("c", &full), expected);
         assert_eq!(described("c", &Pruned::default()), "c: 0 entries, 0 bytes");
     }

@@ -33,7 +33,7 @@ pub fn rover(args: &Rover, common: &Common) -> Verdict {
     if !summary.ranking.is_empty() {
         text.push_str(
             "\nmu: mean effect; mu*: mean absolute effect, by which parameters are ranked; sigma: standard deviation between trajectories;\n\
-             noise: the mu* that changed paths alone would give.",
+             noise: the mu* to expect from changed paths alone.",
         );
     }
     let mut json = serde_json::to_value(&run).map_err(Failure::failed)?;

@@ -21,7 +21,8 @@ impl<'a> ShownFiles<'a> {
         let why = "a plot must be .svg or .png";
         plot.into_iter().try_for_each(|path| check_ending(path, &["svg", "png"], why))?;
         let csv = args.csv.as_deref();
-        csv.into_iter().try_for_each(|path| check_ending(path, &["csv"], "the file of `--csv` must end in .csv"))?;
+        csv.into_iter()
+            .try_for_each(|path| check_ending(path, &["csv"], "the file name after `--csv` must end in .csv"))?;
         Ok(Self { plot, csv })
     }
 

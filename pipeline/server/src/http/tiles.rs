@@ -142,8 +142,8 @@ pub async fn tilejson(
         "maxzoom": WINDOW_ZOOM + finest_level(&collection, layer),
         "bounds": window_degrees(&collection),
         "scheme": "xyz",
-        "description": "A plane in place of one tile of the web-Mercator map: distances and areas that a client computes from longitude \
-                        and latitude are not true to the ground; use `metres_per_pixel`.",
+        "description": "A planar map placed in one tile of the web-Mercator map: distances and areas that a client computes from \
+                        longitude and latitude are meaningless; use `metres_per_pixel`.",
         "metres_per_pixel": (0..collection.grid().levels).map(|l| collection.grid().resolution_m(l)).collect::<Vec<_>>(),
     });
     let (_, middle_m) = heights(&collection);

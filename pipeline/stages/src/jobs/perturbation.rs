@@ -203,7 +203,9 @@ fn moved(name: &str, value: &Value, settings: &Perturb) -> Result<Perturbed, Str
     let half = (settings.levels / 2) as usize;
     if factors.iter().zip(&factors[half..]).any(|(before, after)| before == after) {
         let share = 100.0 * settings.share;
-        return Err(format!("`{name}` is {value}, a whole number that {share} % does not change at every step"));
+        return Err(format!(
+            "`{name}` is {value}, a whole number, and {share} % of it is too little to change it at every step"
+        ));
     }
     let values = factors.iter().map(|factor| scaled(value, *factor)).collect();
     Ok(Perturbed { name: name.to_owned(), base, factors, values })

@@ -1,4 +1,4 @@
-//! What is removed from a shared cache: entries that were not used for long, the longest unused if there are too many bytes, and old drafts.
+//! What is removed from a shared cache: entries unused for too long, the least recently used ones while the rest is too large, and old drafts.
 
 use super::{Entry, Shared};
 use crate::error::Error;
@@ -24,7 +24,7 @@ pub struct Pruned {
     pub entries: usize,
     /// Their size, bytes.
     pub bytes: u64,
-    /// Time since the last use of the longest unused one, days.
+    /// Time since the last use of the least recently used one, days.
     pub unused_days: Option<f64>,
     /// Drafts left, of running and killed runs.
     pub drafts: usize,
@@ -62,7 +62,7 @@ fn age(entry: &Entry, now: SystemTime) -> Duration {
     now.duration_since(entry.used).unwrap_or_default()
 }
 
-/// The entries to remove and those to keep, each sorted from the longest unused.
+/// The entries to remove and those to keep, each sorted from the least recently used.
 fn divide(mut entries: Vec<Entry>, keep: Keep, now: SystemTime) -> (Vec<Entry>, Vec<Entry>) {
     if keep == Keep::default() {
         return (Vec::new(), entries);
