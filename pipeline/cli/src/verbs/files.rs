@@ -173,7 +173,8 @@ pub fn info(args: &Info, common: &Common) -> Verdict {
         _ => raster(&args.path, &args.reading)?,
     };
     let notes = result["notes"].as_array().cloned().unwrap_or_default();
-    let rows = result.as_object().into_iter().flatten().filter(|(key, _)| *key != "notes");
+    let is_stated = |value: &Value| !value.is_null() && value.as_str() != Some("");
+    let rows = result.as_object().into_iter().flatten().filter(|(key, value)| *key != "notes" && is_stated(value));
     let rows: Vec<Vec<String>> = rows.map(|(key, value)| vec![key.clone(), plain(value)]).collect();
     let mut text = columns(&rows);
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {}", plain(note))));
