@@ -55,9 +55,12 @@ def test_patches_are_those_of_the_generator(client):
 
 
 def test_points_and_profiles(client):
-    point = client.point("world", 0.0, 3.0)
-    profile = client.profile("world", [(0.0, 3.0), (2.0, 3.0)], 5)
-    assert isinstance(point, dict) and isinstance(profile, dict) and point and profile
+    patch = client.patch("world", origin=(0.0, 3.0), size=(4, 4), resolution=0.02)
+    assert np.float32(client.point("world", 0.0, 3.0)["elevation_m"]) == patch.values[-1, 0]
+    profile = client.profile("world", [(0.0, 3.0), (2.0, 3.0)], 5, resolution_m=0.02, feature_min_m=0)
+    assert profile["x_m"] == [0.0, 0.5, 1.0, 1.5, 2.0] and set(profile["y_m"]) == {3.0}
+    points = [client.point("world", x, 3.0)["elevation_m"] for x in profile["x_m"]]
+    assert np.allclose(profile["elevation_m"], points, rtol=0.0, atol=1e-5) and np.ptp(points) > 0.01
 
 
 def test_errors_carry_the_servers_sentence(client):

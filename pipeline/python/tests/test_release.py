@@ -129,7 +129,10 @@ def test_a_dataset_for_learners(release):
     dataset = HeightPatches(pickle.loads(pickle.dumps(release)), split="train")
     heights, arrived = dataset[1]
     assert len(dataset) == 2 and heights.shape == (1, 40, 40) and heights.dtype == np.float32
-    assert np.isfinite(heights).all() and arrived in (0.0, 1.0)
+    mission = release.missions(split="train")[1]
+    assert arrived == (mission["outcome"] == "success")
+    expected = np.nan_to_num(release.height_patch(mission, 0.0, 4.0, 0.1)).astype(np.float32)
+    assert np.array_equal(heights[0], expected) and np.ptp(expected) > 0.0
 
 
 def test_what_is_no_release(tmp_path):
