@@ -17,7 +17,7 @@ fn streams() -> Streams {
 }
 
 fn largest_difference(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m, (x, y)| f64::max(m, (x - y).abs()))
+    a.iter().zip(b).map(|(x, y)| (x - y).abs()).max_by(f64::total_cmp).unwrap()
 }
 
 /// One term of the printed formula (with plane waves): amplitude, wave vector in turns/m, phase.

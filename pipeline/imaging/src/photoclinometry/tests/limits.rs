@@ -129,8 +129,13 @@ fn val_exposures_are_found() {
     };
     let (held, free) = (run(false), run(true));
     let mean = libm::exp(factors.iter().map(|f| libm::log(*f)).sum::<f64>() / 6.0);
-    let worst =
-        free.calibrations.iter().zip(factors).map(|(c, f)| (c.exposure * mean / f - 1.0).abs()).fold(0.0, f64::max);
+    let worst = free
+        .calibrations
+        .iter()
+        .zip(factors)
+        .map(|(c, f)| (c.exposure * mean / f - 1.0).abs())
+        .max_by(f64::total_cmp)
+        .unwrap();
     let [with, without] = [&free, &held].map(|r| slope_rms(&r.slopes, &truth.slopes));
     println!(
         "exposures within {:.2} % after {} rounds; slopes {without:.4} held, {with:.4} free",
@@ -158,7 +163,7 @@ fn val_haze_is_found_where_heights_are_known_coarsely() {
         recover(&images, &level(&scene), &known, &settings, &streams()).unwrap()
     };
     let (held, free) = (run(false), run(true));
-    let worst = free.calibrations.iter().zip(hazes).map(|(c, h)| (c.haze - h).abs()).fold(0.0, f64::max);
+    let worst = free.calibrations.iter().zip(hazes).map(|(c, h)| (c.haze - h).abs()).max_by(f64::total_cmp).unwrap();
     let [with, without] = [&free, &held].map(|r| slope_rms(&r.slopes, &truth.slopes));
     println!("hazes within {worst:.4} after {} rounds; slopes {without:.4} held, {with:.4} free", free.rounds.len());
     assert!(worst < 0.005 && with < 0.7 * without);

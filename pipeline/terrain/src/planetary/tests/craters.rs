@@ -168,7 +168,7 @@ fn val_later_craters_overprint_earlier_ones() {
             (dx * dx + dy * dy).sqrt() < 0.95 * c.radius
         };
         let second = |z: &[f64], k: usize| z[k - 1] - 2.0 * z[k] + z[k + 1];
-        (1..z.len() - 1).filter(inside).map(|k| (second(z, k) - second(own, k)).abs()).fold(0.0, f64::max)
+        (1..z.len() - 1).filter(inside).map(|k| (second(z, k) - second(own, k)).abs()).max_by(f64::total_cmp).unwrap()
     };
     assert!(bowl_error(&a_first, &alone(1)) < 1e-9 && bowl_error(&a_first, &alone(0)) > 1e-4);
     assert!(bowl_error(&b_first, &alone(0)) < 1e-9 && bowl_error(&b_first, &alone(1)) > 1e-4);
