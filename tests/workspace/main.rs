@@ -1,10 +1,11 @@
-//! The rooms: who may import whom, as `docs/ARCHITECTURE.md` states it. Licences of what others made, and pages whose commands are followed.
+//! The rooms: who may import whom, as `docs/ARCHITECTURE.md` states it. Licences of what others made, pages whose commands are followed, and links.
 
 #![allow(clippy::unwrap_used, reason = "a test may fail where it stands")]
 
 mod licences;
 mod notice;
 mod offline;
+mod pages;
 mod walk;
 
 use std::collections::{BTreeMap, BTreeSet};
