@@ -32,6 +32,9 @@
 //! * Pieces of different places meet between the first cells, and roughen the smallest increments where the site is smooth: by 29 % along ridges
 //!   that are correlated over 3 cells (1 across), so that a ratio of increments of 2.4 became 1.9.
 //! * A site that is not stationary gives a texture that mixes its kinds of ground. A repeated feature (a furrow) need not stay in step.
+//! * The standard deviation has no bias that was found, but a tile with few first cells is a small sample: of tiles of 128 x 128 cells in an independent
+//!   program, a synthetic site rough in patches gave 1.08 +- 0.06 of it and 1.07 +- 0.06 of the increments (spacing 8), two measured ones 1.00 +-
+//!   0.04 and 0.98 +- 0.01, 0.89 +- 0.15 and 0.97 +- 0.11 (spacing 32). The logarithm of the increments' flatness was lower, by 0.1, 0.9 and 0.2.
 //! * A gap in the site costs only the places whose neighbourhood it covers by more than 30 %. The DEM licence extends to the texture.
 //!
 //! # Cost

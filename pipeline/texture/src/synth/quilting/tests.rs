@@ -143,9 +143,8 @@ fn prop_copied_runs_are_no_longer_than_a_patch() {
     let collage = made(&site, &tile(140, 150, false), &QuiltingParameters { tolerance: 0.0, ..parameters(3.0) }, 1);
     let copies = &collage.copies;
     assert!(copies.longest_run.into_iter().all(|run| (15..=30).contains(&run)), "{copies:?}");
-    // 42 patches on a site with room for 26 that do not overlap: at most 5 start within half a patch of each place, and four such places
-    // around a cell reach it.
-    assert!(copies.site_share > 0.3 && copies.uses_max <= 24, "{copies:?}");
+    // 42 patches, 1.6 times the site. In an independent program: 63 %, and 3 or 4 times.
+    assert!(copies.site_share > 0.5 && copies.uses_max <= 8, "{copies:?}");
 }
 
 /// A site with gaps gives a texture without gaps. Narrow gaps are closed, so that patches are as wide as without them.
@@ -198,22 +197,41 @@ fn prop_anisotropy_is_kept() {
     assert!(expected > 1.5 && (found / expected - 1.0).abs() < 0.15, "{found} {expected}");
 }
 
-/// What a Gaussian field lacks, the flatness of increments (ln 3 = 1.1 for a normal surface), is the site's. The standard deviation, and increments
-/// with it, are lower, by 17 to 24 % over ten seeds: quiet patches join with smaller errors.
+/// Standard deviation and increments are the site's to 7 %, in the mean of four textures. The flatness of increments, which a Gaussian field lacks
+/// (ln 3 = 1.1), is the site's to 0.4. In an independent program, textures of four sites had 0.97 +- 0.02 of the standard deviation and 0.98 +-
+/// 0.02 of the increments, 0.79 +- 0.01 and 0.81 +- 0.01 with the rule of Efros and Freeman.
 #[test]
 fn val_statistics_of_an_intermittent_site() {
     let site = intermittent(256, 256);
     let expected = log_flatness(&site.values, 256);
     assert!(expected > 1.4, "{expected}");
-    let heights = made(&site, &tile(256, 256, true), &parameters(4.0), 4).heights_m;
-    let found = log_flatness(&heights, 256);
-    assert!((found - expected).abs() < 0.4, "{found} {expected}");
-    let ratio = (sums::variance(&heights) / sums::variance(&site.values)).sqrt();
-    assert!((0.7..1.05).contains(&ratio), "{ratio}");
-    let [east, south] = increments(&heights, 256, 1);
-    let [site_east, site_south] = increments(&site.values, 256, 1);
-    let ratios = [east / site_east, south / site_south];
-    assert!(ratios.iter().all(|ratio| (0.65..1.05).contains(ratio)), "{ratios:?}");
+    let textures: Vec<Vec<f64>> =
+        (4..8).map(|seed| made(&site, &tile(256, 256, true), &parameters(4.0), seed).heights_m).collect();
+    let mean = |of: &dyn Fn(&[f64]) -> f64| sums::mean(&textures.iter().map(|z| of(z)).collect::<Vec<f64>>());
+    let flatness = mean(&|z| log_flatness(z, 256));
+    assert!((flatness - expected).abs() < 0.4, "{flatness} {expected}");
+    let deviation = |z: &[f64]| sums::variance(z).sqrt();
+    let ratio = |of: &dyn Fn(&[f64]) -> f64| mean(of) / of(&site.values);
+    let mut ratios = vec![ratio(&deviation)];
+    for lag in [1, 4, 16] {
+        ratios.push(ratio(&|z| increments(z, 256, lag)[0]));
+        ratios.push(ratio(&|z| increments(z, 256, lag)[1]));
+    }
+    assert!(ratios.iter().all(|ratio| (0.93..1.07).contains(ratio)), "{ratios:?}");
+}
+
+/// A site whose eastern third is five times as rough: calm patches fit calm ones, rough ones fit rough ones, and both are laid about as often as they
+/// occur. In an independent program the standard deviation was 1.05 to 1.10 of the site's in three textures, 1.64, 1.61 and 0.49 without the cost of
+/// use, and 0.32 to 0.41 with the rule of Efros and Freeman.
+#[test]
+fn val_statistics_of_a_site_with_a_rough_part() {
+    let mut site = gaussian_low_pass(&noise(192, 192, "two kinds"), 1.5);
+    site.values.iter_mut().enumerate().filter(|(k, _)| k % 192 >= 128).for_each(|(_, z)| *z *= 5.0);
+    let deviation = |z: &[f64]| sums::variance(z).sqrt();
+    let textures: Vec<f64> =
+        (0..4).map(|seed| deviation(&made(&site, &tile(192, 192, true), &parameters(2.4), seed).heights_m)).collect();
+    let ratio = sums::mean(&textures) / deviation(&site.values);
+    assert!((0.85..1.2).contains(&ratio), "{ratio}: {textures:?}");
 }
 
 #[test]
@@ -253,8 +271,8 @@ fn val_refusals() {
     assert_eq!(key(QuiltingParameters { patch_m: Some(0.0), ..base() }).as_deref(), Some("patch_m"));
     assert_eq!(key(QuiltingParameters { overlap: 0.6, ..base() }).as_deref(), Some("overlap"));
     assert_eq!(key(QuiltingParameters { tolerance: -0.1, ..base() }).as_deref(), Some("tolerance"));
-    assert_eq!(key(QuiltingParameters { reuse: 0.5, ..base() }).as_deref(), Some("reuse"));
-    assert_eq!(key(QuiltingParameters { reuse: f64::INFINITY, ..base() }).as_deref(), Some("reuse"));
+    assert_eq!(key(QuiltingParameters { evenness: -1.0, ..base() }).as_deref(), Some("evenness"));
+    assert_eq!(key(QuiltingParameters { evenness: f64::NAN, ..base() }).as_deref(), Some("evenness"));
 
     let refused = |site: &Grid, tile: &Tile, parameters: &QuiltingParameters| {
         let measured = Measured { residual: site.clone() };
