@@ -421,6 +421,30 @@ mod tests {
         }
     }
 
+    /// Frozen 64-bit hashes of the heights (FNV-1a over their bits) of each method, from the statistics or the heights of [`site`] about their
+    /// mean. A deliberate change refreshes the constants from the message, and its commit says why released textures change.
+    #[test]
+    fn gold_textures_of_a_site() {
+        let residual = site().map(|z| z - 0.04);
+        let statistics = crate::synth::statistics::measure(&residual, [30, 30]).unwrap();
+        let fit = FitFile { statistics: Some(Box::new(statistics)), ..FitFile::default() };
+        let measured = Arc::new(Measured { residual });
+        let found = METHODS.map(|name| {
+            let mut parameters = json!({ "size_px": [96, 80], "cell_m": 0.1 });
+            if name == "modulated" {
+                // The tile is too small for the widest patches that may be measured.
+                parameters["range_m"] = json!(1.0);
+            }
+            let texture = prepare_from(name, &parameters, &fit, Some(&measured)).unwrap();
+            let heights = texture.generate(&Streams::for_seed(2, "texture")).unwrap().grid.values;
+            let words = heights.iter().map(|z| z.to_bits());
+            words.fold(0xcbf2_9ce4_8422_2325, |hash: u64, word| (hash ^ word).wrapping_mul(0x0100_0000_01b3))
+        });
+        assert_eq!(found, GOLD, "found {found:#x?}");
+    }
+    /// By method, in the order of [`METHODS`].
+    const GOLD: [u64; 4] = [0, 0, 0, 0];
+
     /// Noise and blur that a fit takes out of its covariance are in the texture: a note says so.
     #[test]
     fn val_noise_and_blur_are_noted() {
