@@ -4,6 +4,10 @@
 //! kriging estimate from cells around the hole. The result has the covariance on average, also between filled and measured cells,
 //! and measured cells keep their heights exactly.
 //!
+//! z_u may also be a texture that repeats a site beyond its covariance ([`fill_with`]). Nothing above supposes a normal z_u: rim and covariance
+//! are kept, and away from the rim K is smooth, so that increments and curvatures become those of the texture. Waves that such a texture lacks
+//! come from the surroundings, through K. Its shapes are not made to continue those at the rim.
+//!
 //! K is kriging with a planar drift, because the fitted covariance describes the texture and the background beneath
 //! it is unknown: weights w with `sum of w_j C(h_ij) + drift = C(h_i0)`, `sum of w_j f(x_j) = f(x_0)` for `f = 1, x, y`. For a
 //! hole that is open to one side the drift is only the mean, since a plane would extrapolate too far. Cells with data in fewer than
@@ -71,6 +75,20 @@ pub struct Filled {
     pub twin_range_m: Option<f64>,
 }
 
+impl Filled {
+    /// The surface with heights in its holes, NaN where a cell stays without data.
+    fn new(dem: &Grid, covariance: &Covariance, stationary: &Covariance, unconditional: &Grid) -> Self {
+        let holes: Vec<usize> = (0..dem.values.len()).filter(|k| !dem.values[*k].is_finite()).collect();
+        let fill_one = |k: &usize| estimate(dem, unconditional, stationary, [k / dem.cols(), k % dem.cols()]);
+        let filled: Vec<f64> = holes.par_iter().map(fill_one).collect();
+        let mut grid = dem.clone();
+        let left = filled.iter().filter(|z| z.is_nan()).count();
+        holes.iter().zip(&filled).for_each(|(k, z)| grid.values[*k] = *z);
+        let twin_range_m = (!covariance.is_stationary()).then(|| stationary.range_m());
+        Self { grid, cells: holes.len() - left, left, twin_range_m }
+    }
+}
+
 impl std::fmt::Display for Filled {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "{} no-data cells were filled", self.cells)?;
@@ -90,6 +108,17 @@ pub enum FillError {
     /// No cell has data.
     #[error("the DEM has no data")]
     NoData,
+    /// A texture that does not cover the surface cell by cell.
+    #[error(
+        "the texture has {} rows and {} columns, and the DEM {} and {}; make it as large as the DEM",
+        .texture_cells[0], .texture_cells[1], .dem_cells[0], .dem_cells[1]
+    )]
+    Shape {
+        /// Rows and columns of the surface.
+        dem_cells: [usize; 2],
+        /// Rows and columns of the texture.
+        texture_cells: [usize; 2],
+    },
     /// The unconditional field cannot be synthesised.
     #[error("{0}")]
     Field(String),
@@ -127,17 +156,25 @@ pub fn fill(dem: &Grid, covariance: &Covariance, streams: &Streams) -> Result<Fi
     if dem.finite_count() == 0 {
         return Err(FillError::NoData);
     }
-    let surrogate = stationary(dem, covariance);
-    let twin_range_m = (!covariance.is_stationary()).then(|| surrogate.range_m());
-    let covariance = surrogate;
-    let unconditional = unconditional(dem, &covariance, streams)?;
-    let holes: Vec<usize> = (0..dem.values.len()).filter(|k| !dem.values[*k].is_finite()).collect();
-    let fill_one = |k: &usize| estimate(dem, &unconditional, &covariance, [k / dem.cols(), k % dem.cols()]);
-    let filled: Vec<f64> = holes.par_iter().map(fill_one).collect();
-    let mut grid = dem.clone();
-    let left = filled.iter().filter(|z| z.is_nan()).count();
-    holes.iter().zip(&filled).for_each(|(k, z)| grid.values[*k] = *z);
-    Ok(Filled { grid, cells: holes.len() - left, left, twin_range_m })
+    let stationary = stationary(dem, covariance);
+    let unconditional = unconditional(dem, &stationary, streams)?;
+    Ok(Filled::new(dem, covariance, &stationary, &unconditional))
+}
+
+/// Fills the holes of a surface as [`fill`] does, with a texture of any method in place of the normal field: as many cells as the surface,
+/// without gaps. `covariance`, about that of the texture, weighs the cells around a hole.
+///
+/// # Errors
+/// A surface without data; a texture of another shape.
+pub fn fill_with(dem: &Grid, covariance: &Covariance, texture: &Grid) -> Result<Filled, FillError> {
+    if dem.finite_count() == 0 {
+        return Err(FillError::NoData);
+    }
+    let [dem_cells, texture_cells] = [dem, texture].map(|grid| [grid.rows(), grid.cols()]);
+    if dem_cells != texture_cells {
+        return Err(FillError::Shape { dem_cells, texture_cells });
+    }
+    Ok(Filled::new(dem, covariance, &stationary(dem, covariance), texture))
 }
 
 /// The covariance, or its stationary counterpart with the longest range whose torus is not too large.
@@ -305,6 +342,45 @@ mod tests {
         let tilted = fill(&with_hole(&tilted)).grid;
         let off = (0..1600).map(|k| (tilted.values[k] - plane(k) - filled.grid.values[k]).abs()).fold(0.0, f64::max);
         assert!(off < 1e-6, "{off}");
+    }
+
+    /// A texture that is the surface itself but for a plane fills the hole with the surface: nothing of the texture is lost, and the plane is
+    /// the drift's. One of another shape is refused.
+    #[test]
+    fn val_the_texture_is_what_fills_the_hole() {
+        let truth = surface(3);
+        let plane = |k: usize| 2.0 - 0.1 * (k % 40) as f64 + 0.4 * (k / 40) as f64;
+        let texture = Grid::new(truth.geometry, truth.values.iter().enumerate().map(|(k, z)| z - plane(k)).collect());
+        let filled = fill_with(&with_hole(&truth), &exponential(), &texture).unwrap();
+        let off = filled.grid.values.iter().zip(&truth.values).map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        assert!(filled.cells == 140 && off < 1e-6, "{off}");
+        let error = fill_with(&truth.window(0, 0, 30, 40), &exponential(), &texture).unwrap_err().to_string();
+        assert_eq!(error, "the texture has 40 rows and 40 columns, and the DEM 30 and 40; make it as large as the DEM");
+    }
+
+    /// A texture far from normal, the magnitude of an independent field scaled to its variance, joins the surface without a step at the rim, and
+    /// is what lies in the hole. Limits lie 5 standard deviations from the mean over 30 draws of the same formulas in numpy: mean square steps
+    /// across the rim 1.65 +- 0.48 times those of the surface (steps of the texture are 2.8 times as large, and without conditioning those
+    /// across the rim 5.4 +- 2.1 times), correlation of curvatures inside 0.90 +- 0.05.
+    #[test]
+    fn stat_a_texture_that_is_not_normal_joins_at_the_rim() {
+        let (truth, texture) = (surface(4), surface(5).map(|z| (z.abs() - 0.08) / 0.6));
+        let filled = fill_with(&with_hole(&truth), &exponential(), &texture).unwrap().grid;
+        let square = |a: f64, b: f64| (a - b) * (a - b);
+        let of_rows = (12..26).flat_map(|c| [[13, c, 14, c], [24, c, 23, c]]);
+        let of_cols = (14..24).flat_map(|r| [[r, 11, r, 12], [r, 26, r, 25]]);
+        let across = of_rows.chain(of_cols).map(|[r, c, in_r, in_c]| square(filled.at(r, c), filled.at(in_r, in_c)));
+        let own = truth.values.chunks(40).flat_map(|row| row.windows(2)).map(|pair| square(pair[0], pair[1]));
+        let ratio = sums::mean(&across.collect::<Vec<_>>()) / sums::mean(&own.collect::<Vec<_>>());
+        assert!(ratio < 4.0, "{ratio}");
+        let bends = |z: &Grid| -> Vec<f64> {
+            let bend = |r: usize, c: usize| z.at(r, c - 1) + z.at(r, c + 1) - 2.0 * z.at(r, c);
+            (16..22).flat_map(|r| (14..25).map(move |c| (r, c))).map(|(r, c)| bend(r, c)).collect()
+        };
+        let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
+        let (made, wanted) = (bends(&filled), bends(&texture));
+        let correlation = product(&made, &wanted) / (product(&made, &made) * product(&wanted, &wanted)).sqrt();
+        assert!(correlation > 0.6, "{correlation}");
     }
 
     /// Kriging by hand, without an unconditional field. A hole of one cell in the middle of level ground gets its height, and of a plane the
