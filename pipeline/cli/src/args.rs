@@ -661,9 +661,9 @@ pub struct Texture {
     /// Factor on the heights of the texture: one number above 0, or with `--onto` a raster of factors, 0 or above.
     #[arg(long, value_name = "FACTOR|RASTER")]
     pub amplitude: Option<String>,
-    /// Only fill the holes of this DEM, with texture conditioned on their surroundings. `--cell` gives the cell size of a DEM that
-    /// states none.
-    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "method", "covariance", "amplitude", "exemplar", "set"])]
+    /// Only fill the holes of this DEM, with texture conditioned on their surroundings: of `fft_ma`, or of a method that repeats the
+    /// site. `--cell` gives the cell size of a DEM that states none.
+    #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "covariance", "amplitude", "set"])]
     pub fill: Option<PathBuf>,
     /// Set any other parameter of the method (see `kinds`), `name=value`.
     #[arg(long = "set", value_name = "K=V")]

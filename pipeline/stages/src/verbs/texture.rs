@@ -7,7 +7,7 @@ use crate::memory;
 use crate::operations::fits::of_json;
 use crate::operations::textures::{fill_note, has_its_texture, lay_onto, on_site_cells, scaled};
 use crate::verbs::{Read, Reading, read};
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_store::dem::points::GridSettings;
@@ -15,7 +15,7 @@ use sastrugi_store::dem::{self, Crs, WriteOptions};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
 use sastrugi_texture::synth::{conditional, fft_ma};
-use sastrugi_texture::{Measured, Needs, needs};
+use sastrugi_texture::{Measured, Needs, Synthesis, needs};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -84,6 +84,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         parameters::check(&request.parameters, known)?;
     }
     let fit = read_fit(request.fit)?;
+    check_exemplar(request)?;
     if let Some(dem) = request.fill {
         return fill(request, dem, &fit);
     }
@@ -103,22 +104,8 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         parameters["covariance"] = json!(fft_ma::CovarianceOf::Residual);
     }
     on_site_cells(request.method, &mut parameters, fit.cell_m);
-    let copies = needs(request.method) == Some(Needs::Residual);
-    if let Some(exemplar) = request.exemplar.as_ref().filter(|_| !copies) {
-        let message = format!(
-            "{}: `{}` does not copy from a DEM; omit `--exemplar`, or choose `quilting` or `exemplar`",
-            exemplar.dem.display(),
-            request.method
-        );
-        return Err(Error::Usage(message));
-    }
     super::check_output(request.output)?;
-    let (measured, read_notes) = match &request.exemplar {
-        None => (None, Vec::new()),
-        Some(exemplar) => measured(exemplar, &fit)?,
-    };
-    let synthesis = sastrugi_texture::prepare_from(request.method, &parameters, &fit, measured.as_ref())?;
-    memory::check("the texture", synthesis.cost().memory_bytes)?;
+    let (synthesis, read_notes) = prepared(request, &parameters, &fit)?;
     let streams = Streams::for_seed(request.seed, STAGE);
     let mut notes = sastrugi_texture::fit_notes(&fit);
     notes.extend(read_notes);
@@ -169,6 +156,34 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     }))
 }
 
+/// Refuses an exemplar for a method that does not copy.
+fn check_exemplar(request: &Request<'_>) -> Result<(), Error> {
+    let copies = needs(request.method) == Some(Needs::Residual);
+    match request.exemplar.as_ref().filter(|_| !copies) {
+        None => Ok(()),
+        Some(exemplar) => Err(Error::Usage(format!(
+            "{}: `{}` does not copy from a DEM; omit `--exemplar`, or choose `quilting` or `exemplar`",
+            exemplar.dem.display(),
+            request.method
+        ))),
+    }
+}
+
+/// The method bound to the fit and to the exemplar, and notes on the reading of that.
+fn prepared(
+    request: &Request<'_>,
+    parameters: &Value,
+    fit: &FitFile,
+) -> Result<(Box<dyn Synthesis>, Vec<String>), Error> {
+    let (measured, notes) = match &request.exemplar {
+        None => (None, Vec::new()),
+        Some(exemplar) => measured(exemplar, fit)?,
+    };
+    let synthesis = sastrugi_texture::prepare_from(request.method, parameters, fit, measured.as_ref())?;
+    memory::check("the texture", synthesis.cost().memory_bytes)?;
+    Ok((synthesis, notes))
+}
+
 /// The residual of the DEM of a fit, read as the fit read it, and notes on the reading.
 fn measured(exemplar: &Exemplar<'_>, fit: &FitFile) -> Result<(Option<Arc<Measured>>, Vec<String>), Error> {
     let name = exemplar.dem.display();
@@ -211,6 +226,20 @@ fn check_masks(exemplar: &Exemplar<'_>, source: &Source) -> Result<(), Error> {
     Err(Error::Usage(message))
 }
 
+/// A texture that repeats the site, as large as a DEM whose holes it fills, and notes on it.
+fn texture_for(
+    request: &Request<'_>,
+    dem: &Grid,
+    fit: &FitFile,
+    streams: &Streams,
+) -> Result<(Grid, Vec<String>), Error> {
+    let parameters = json!({ "size_px": [dem.cols(), dem.rows()], "cell_m": dem.geometry.cell, "periodic": false });
+    let (synthesis, mut notes) = prepared(request, &parameters, fit)?;
+    let outcome = synthesis.generate(streams).map_err(|e| Error::Usage(e.to_string()))?;
+    notes.extend(synthesis.notes().into_iter().chain(outcome.notes));
+    Ok((outcome.grid, notes))
+}
+
 /// Fills the holes of a DEM and writes it.
 fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Error> {
     super::check_output(request.output)?;
@@ -219,14 +248,26 @@ fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Erro
     let Read { dem, mut notes, .. } = read(path, &Reading { cell_m, ..Reading::default() })?;
     let streams = Streams::for_seed(request.seed, STAGE);
     let covariance = Covariance::of_fit(fit).map_err(|e| Error::Input(format!("{}: {e}", request.fit.display())))?;
-    let filled = conditional::fill(&dem.grid, &covariance, &streams)
-        .map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
+    let filled = match needs(request.method) {
+        Some(Needs::Covariance) if request.method != fft_ma::kind().kind => {
+            let message = "`--fill` takes `fft_ma`, or a method that repeats the site";
+            return Err(Error::Usage(format!("{message}; `{}` does not", request.method)));
+        }
+        Some(Needs::Covariance) => conditional::fill(&dem.grid, &covariance, &streams),
+        _ => {
+            let (texture, of_texture) = texture_for(request, &dem.grid, fit, &streams)?;
+            notes.extend(of_texture);
+            conditional::fill_with(&dem.grid, &covariance, &texture)
+        }
+    };
+    let filled = filled.map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
     notes.push(filled.to_string());
     notes.extend(fill_note(fit));
     let lost = dem::write(request.output, &filled.grid, &dem.info.crs, &request.options);
     notes.extend(lost.map_err(super::write_error)?);
     Ok(json!({
         "file": request.output.display().to_string(),
+        "method": request.method,
         "seed": request.seed,
         "stream": streams.label(),
         "filled_cells": filled.cells,
