@@ -196,6 +196,37 @@ fn val_pairing_decides_what_is_shared() {
     assert!(terrains.iter().all(|row| text(row, "stream").starts_with("seed/1")), "an explicit seed wins");
 }
 
+/// Textures on one base have its cells: their replicates share draws.
+#[test]
+fn val_textures_on_a_base_are_paired() {
+    let texture = |id: &str| {
+        format!(
+            "[[texture]]\nid = \"{id}\"\nfit = {{ model = \"exponential\", sigma_m = 0.001, range_m = 0.3 }}\nonto = \"flat\"\n\
+             group = \"{id}\"\ncount = 2\ncell_m = 0.1\n\n"
+        )
+    };
+    let study = format!(
+        "[study]\nname = \"paired\"\nseed = 3\ndate = \"2026-01-01\"\npairing = \"common\"\n\n[[terrain]]\nid = \"flat\"\n\
+         kind = \"multifractal\"\nsize_px = [200, 180]\ncell_m = 0.1\nz_scale_percent = 0.1\n\n{}{}[[missions]]\nid = \"m\"\n\
+         terrains = [\"one\", \"other\"]\ncount = 2\nlength_m = 3.0\nborder_m = 1.5\n\n[[traverse]]\nid = \"husky\"\nmissions = \"m\"\n\
+         timeout_s = 12.0\n",
+        texture("one"),
+        texture("other")
+    );
+    let folder = area();
+    run(folder.path(), &study, "2");
+    let missions = rows(&folder.path().join("release"), "missions");
+    let mut pairs: BTreeMap<&str, Vec<&Row>> = BTreeMap::new();
+    missions.iter().for_each(|row| pairs.entry(text(row, "pair_id")).or_default().push(row));
+    assert!(pairs.keys().all(|pair| pair.starts_with("m-0001-") || pair.starts_with("m-0002-")), "{pairs:?}");
+    let lines = |rows: &[&Row]| rows.iter().map(|row| of(row, &LINE)).collect::<BTreeSet<String>>();
+    assert!(pairs.values().all(|rows| lines(rows).len() == 1), "{pairs:?}");
+    assert!(
+        pairs.values().any(|rows| rows.len() == 2 && text(rows[0], "group") != text(rows[1], "group")),
+        "{pairs:?}"
+    );
+}
+
 /// Heightfields with different cells cannot share missions.
 #[test]
 fn val_terrains_with_different_cells_are_not_paired() {

@@ -317,6 +317,12 @@ impl<'a> Builder<'a> {
         self.study.head.pairing == Pairing::Common
     }
 
+    /// Number of the replicate whose draws a heightfield shares with the same replicate of others, from 0; none unless the study is paired. Only
+    /// heightfields share draws whose cells are known before the run, since those of one number must have the same.
+    pub fn shared(&self, field: &Heightfield) -> Option<u64> {
+        field.replicate.filter(|_| self.is_paired() && field.expected.is_some())
+    }
+
     /// Registers a family of ids, to which references resolve.
     ///
     /// # Errors

@@ -193,7 +193,7 @@ fn add_search(
     let mut all = Vec::new();
     for terrain in terrains {
         let Some(field) = builder.heightfields.get(terrain).cloned() else { continue };
-        let shared = field.replicate.filter(|_| builder.is_paired() && field.geometry.is_some());
+        let shared = builder.shared(&field);
         let word = shared.map_or_else(|| terrain.clone(), common);
         let streams = builder.streams(STAGE, &format!("pairs@{word}"), envelope.seed, shared.unwrap_or(0));
         let stream = matches!(search.pairs, Pairs::Drawn { .. }).then(|| streams.label());

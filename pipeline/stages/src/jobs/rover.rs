@@ -259,7 +259,7 @@ fn add_one(
 /// Streams of starts and noise on a terrain. They are named after the table without its swept part, so that every value of a sweep and
 /// every perturbed design shares them.
 pub fn streams(builder: &Builder<'_>, envelope: &RoverItem, terrain: &str, field: &Heightfield) -> Streams {
-    let shared = field.replicate.filter(|_| builder.is_paired() && field.geometry.is_some());
+    let shared = builder.shared(field);
     let word = shared.map_or_else(|| terrain.to_owned(), common);
     builder.streams(STAGE, &format!("{}@{word}", envelope.id), envelope.seed, shared.unwrap_or(0))
 }

@@ -116,9 +116,7 @@ pub fn add(
 
 /// The missions of a heightfield, with its own draws or with those shared by all replicates of the same number.
 fn lines(builder: &Builder<'_>, missions: &str, rules: &Arc<Value>, heightfield: String) -> Lines {
-    // Draws can be shared only if the cells are known to be the same.
-    let known = builder.heightfields.get(&heightfield).filter(|field| builder.is_paired() && field.geometry.is_some());
-    let shared = known.and_then(|field| field.replicate);
+    let shared = builder.heightfields.get(&heightfield).and_then(|field| builder.shared(field));
     let item = ItemRef::new(STAGE, &format!("{missions}@{heightfield}"));
     Lines {
         pairs: item.id.clone(),
@@ -153,7 +151,7 @@ fn doubt_of_size(
 fn check_geometry(builder: &Builder<'_>, entry: &Entry<'_>, lines: &[Arc<Lines>]) -> Result<(), BuildError> {
     let mut first: BTreeMap<u64, (&str, Geometry)> = BTreeMap::new();
     for one in lines {
-        let geometry = builder.heightfields.get(&one.heightfield).and_then(|field| field.geometry);
+        let geometry = builder.heightfields.get(&one.heightfield).and_then(|field| field.expected);
         let (Some(number), Some(geometry)) = (one.shared, geometry) else { continue };
         let (id, of_first) = *first.entry(number).or_insert((&one.heightfield, geometry));
         if of_first != geometry {

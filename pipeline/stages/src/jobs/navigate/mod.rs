@@ -126,7 +126,7 @@ fn add_one(
 ) -> Result<(), StudyError> {
     let terrain = &routes.terrain;
     let Some(field) = builder.heightfields.get(terrain).cloned() else { return Ok(()) };
-    let shared = field.replicate.filter(|_| builder.is_paired() && field.geometry.is_some());
+    let shared = builder.shared(&field);
     let word = shared.map_or_else(|| terrain.clone(), common);
     // Named after the table without its swept part, so that every value of a sweep has the same draws.
     let streams = builder.streams(STAGE, &format!("{}@{word}", envelope.id), envelope.seed, shared.unwrap_or(0));
