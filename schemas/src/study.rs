@@ -400,7 +400,7 @@ pub struct TextureItem {
     /// Local factor on the texture: the id of a raster of factors, or a table of factors by the slope of the base.
     #[serde(default)]
     pub modulate: Option<Modulate>,
-    /// Id of a DEM whose holes are filled with texture conditioned on their surroundings; by `fft_ma` only.
+    /// Id of a DEM whose holes are filled with texture conditioned on their surroundings, of `fft_ma` or a method that repeats the site.
     #[serde(default)]
     pub fill: Option<String>,
     /// Label for statistics.

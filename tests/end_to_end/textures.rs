@@ -76,6 +76,50 @@ fn site(path: &Path) {
     assert_eq!(call.code, 0, "{}", call.stderr);
 }
 
+/// Holes are filled with textures that repeat a site: a study and the verb give the same heights, no cell stays empty, and what is not possible
+/// is refused before anything runs.
+#[test]
+fn val_holes_are_filled_in_a_study() {
+    let folder = area();
+    let path = folder.path();
+    site(path);
+    write(path, "hole.geojson", "{\"type\": \"Polygon\", \"coordinates\": [[[6,6],[9,6],[9,8],[6,8],[6,6]]]}");
+    let study = |method: &str| {
+        format!(
+            "[study]\nname = \"filled\"\nseed = 7\ndate = \"2026-01-01\"\n\n[[dem]]\nid = \"site\"\nfile = \"holed.tif\"\n\
+             license = \"CC-BY-4.0\"\nattribution = \"The agency\"\n\n[[fit]]\nid = \"fit\"\ndem = \"site\"\nouter_scale_m = 2.0\n\
+             bootstrap = 0\nstatistics = true\n\n[[texture]]\nid = \"whole\"\nfit = \"fit\"\nfill = \"site\"\nmethod = \"{method}\"\nseed = 4\n"
+        )
+    };
+    let run = |arguments: &[&str]| {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{arguments:?}: {}", call.stderr);
+        call.stdout
+    };
+    run(&["convert", "site.tif", "holed.tif", "--exclude", "hole.geojson"]);
+    run(&["fit", "holed.tif", "--outer-scale", "2", "--bootstrap", "0", "--statistics", "-o", "fit.json"]);
+    for (method, exemplar) in [("modulated", &[][..]), ("quilting", &["--exemplar", "holed.tif"][..])] {
+        fs::remove_dir_all(path.join("release")).ok();
+        run_study(path, &study(method), &[]);
+        let verb = ["texture", "fit.json", "--fill", "holed.tif", "--method", method, "--seed", "4", "-o", "verb.tif"];
+        run(&[&verb[..], exemplar].concat());
+        let whole = heights(path, "release/texture/whole.tif");
+        assert!(whole == heights(path, "verb.tif") && whole != heights(path, "holed.tif"), "{method}");
+        let info: Value = serde_json::from_str(&run(&["info", "verb.tif", "--json"])).unwrap();
+        assert_eq!(info["valid"], 160 * 160, "{method}");
+    }
+    for (text, words) in [
+        (study("cholesky"), "takes `fft_ma` or a method that repeats the site"),
+        (study("modulated").replace("statistics = true\n", ""), "statistics = true"),
+        (study("modulated").replace("seed = 4", "size_px = [9, 9]"), "takes its cells from the DEM"),
+    ] {
+        write(path, "other.toml", &text);
+        let call = sastrugi_in(path, &["plan", "other.toml"]);
+        let said: String = call.stderr.replace('│', " ").split_whitespace().collect::<Vec<_>>().join(" ");
+        assert!(call.code == 2 && said.contains(words), "{words}: {}", call.stderr);
+    }
+}
+
 fn heights(path: &Path, name: &str) -> String {
     let call = sastrugi_in(path, &["convert", name, "heights.asc"]);
     assert_eq!(call.code, 0, "{name}: {}", call.stderr);

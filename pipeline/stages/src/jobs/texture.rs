@@ -21,7 +21,7 @@ use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
 use sastrugi_texture::synth::{conditional, fft_ma};
-use sastrugi_texture::{Cost, Method, Needs, Prospect, SlopeFactors, TextureOutcome, needs};
+use sastrugi_texture::{Cost, Method, Needs, Prospect, SlopeFactors, Synthesis, TextureOutcome, needs};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -158,6 +158,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             let mut own =
                 if side_by_side { own_parameters(&one.params, &kinds, method) } else { Value::clone(&one.params) };
             on_site_cells(method, &mut own, prospect.and_then(|fit| fit.cell_m));
+            if let Some(field) = fill.as_ref().filter(|_| needs(method) != Some(Needs::Covariance)) {
+                on_cells_of(field, &mut own).map_err(|message| entry.error("fill", message))?;
+            }
             let checked = sastrugi_texture::method(method, &own).and_then(|synthesis| {
                 // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
                 if !side_by_side && fill.is_none() {
@@ -259,6 +262,20 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     Ok(())
 }
 
+/// Sets the cells of a texture to those of the DEM whose holes it fills.
+fn on_cells_of(dem: &Heightfield, parameters: &mut Value) -> Result<(), String> {
+    let Some(Geometry { rows, cols, cell, .. }) = dem.expected else {
+        return Err(format!(
+            "\"{}\" does not state its cells before the run, which a texture that repeats a site needs; convert it to GeoTIFF, or fill with \
+             `fft_ma`",
+            dem.item.id
+        ));
+    };
+    let own = json!({ "size_px": [cols, rows], "cell_m": cell, "periodic": false });
+    own.as_object().into_iter().flatten().for_each(|(key, value)| parameters[key] = value.clone());
+    Ok(())
+}
+
 /// Refuses, before the fit is computed, a texture that is known not to match the fit, and cells that do not match those of the base.
 fn check_before_run(
     prospect: Option<&Prospect>,
@@ -293,11 +310,11 @@ fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Resul
     if item.modulate.is_some() && item.onto.is_none() {
         return Err(entry.error("modulate", "`modulate` needs `onto`, the base on which it scales the texture"));
     }
-    let alone = item.onto.is_none() && item.methods.is_none() && item.method == fft_ma::kind().kind;
-    if item.fill.is_some() && !alone {
-        return Err(
-            entry.error("fill", "`fill` cannot be combined with `onto`, `methods` or a method other than `fft_ma`")
-        );
+    let fills = item.method == fft_ma::kind().kind || needs(&item.method) != Some(Needs::Covariance);
+    if item.fill.is_some() && (item.onto.is_some() || item.methods.is_some() || !fills) {
+        let message =
+            "`fill` cannot be combined with `onto` or `methods`, and takes `fft_ma` or a method that repeats the site";
+        return Err(entry.error("fill", message));
     }
     let keys = params.as_object().into_iter().flat_map(|p| p.keys()).chain(item.sweep.keys());
     if let Some(name) = keys.into_iter().find(|_| item.fill.is_some()) {
@@ -464,10 +481,8 @@ impl Job for TextureJob {
         if let Some(dem) = &self.fill {
             return self.filled(work, dem, &fit);
         }
-        let measured = self.exemplar.as_ref().map(|site| site.residual(work)).transpose()?.map(Arc::new);
-        let synthesis = self.synthesis.bind(&fit, measured.as_ref()).map_err(JobError::new)?;
-        let TextureOutcome { grid, covariance_error_max_m2, clip_share, notes: on_this } =
-            synthesis.generate(&self.streams).map_err(JobError::new)?;
+        let (synthesis, made) = self.made(work, &fit)?;
+        let TextureOutcome { grid, covariance_error_max_m2, clip_share, notes: on_this } = made;
         let mut notes = sastrugi_texture::fit_notes(&fit);
         notes.extend(synthesis.notes().into_iter().chain(on_this));
         if self.one_of_many && synthesis.parameters()["phase"] == "unit" {
@@ -507,6 +522,14 @@ impl Job for TextureJob {
 }
 
 impl TextureJob {
+    /// The method bound to the fit, and its texture.
+    fn made(&self, work: &Work<'_>, fit: &FitFile) -> Result<(Box<dyn Synthesis>, TextureOutcome), JobError> {
+        let measured = self.exemplar.as_ref().map(|site| site.residual(work)).transpose()?.map(Arc::new);
+        let synthesis = self.synthesis.bind(fit, measured.as_ref()).map_err(JobError::new)?;
+        let made = synthesis.generate(&self.streams).map_err(JobError::new)?;
+        Ok((synthesis, made))
+    }
+
     /// The texture without its base, detrended and trimmed like the residual of the fit, for comparison with that residual.
     fn residual(&self, texture: &Grid, fit: &FitFile) -> Option<SurfaceRows> {
         let Matched::Item(item) = &self.matched else { return None };
@@ -520,8 +543,16 @@ impl TextureJob {
     fn filled(&self, work: &Work<'_>, dem: &ItemRef, fit: &FitFile) -> Result<Outcome, JobError> {
         let dem = dem::read(&work.parent(dem, HEIGHTS)?).map_err(input_error)?;
         let covariance = Covariance::of_fit(fit).map_err(JobError::new)?;
-        let filled = conditional::fill(&dem.grid, &covariance, &self.streams).map_err(JobError::new)?;
-        let notes = [filled.to_string()].into_iter().chain(fill_note(fit)).collect();
+        let (filled, mut notes) = match needs(&self.method) {
+            Some(Needs::Covariance) => (conditional::fill(&dem.grid, &covariance, &self.streams), Vec::new()),
+            _ => {
+                let (synthesis, made) = self.made(work, fit)?;
+                let notes = synthesis.notes().into_iter().chain(made.notes).collect();
+                (conditional::fill_with(&dem.grid, &covariance, &made.grid), notes)
+            }
+        };
+        let filled = filled.map_err(JobError::new)?;
+        notes.extend([filled.to_string()].into_iter().chain(fill_note(fit)));
         self.released(work, &filled.grid, &dem.info.crs, notes)
     }
 
