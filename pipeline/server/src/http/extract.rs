@@ -1,11 +1,12 @@
 //! Extractors of the handlers; whatever they cannot extract becomes a problem response.
 
+use super::host::Host;
 use super::query::Query;
 use super::{Problem, Service};
 use crate::collections::Collection;
 use axum::extract::{FromRequest, FromRequestParts, Path, Request};
+use axum::http::HeaderMap;
 use axum::http::request::Parts;
-use axum::http::{HeaderMap, header};
 use hyper::body::Bytes;
 use serde::de::DeserializeOwned;
 use std::sync::Arc;
@@ -82,7 +83,8 @@ impl FromRequestParts<Arc<Service>> for Base {
     type Rejection = Problem;
 
     async fn from_request_parts(parts: &mut Parts, service: &Arc<Service>) -> Result<Self, Problem> {
-        let host = host(&parts.headers).map_or_else(|| service.address.to_string(), str::to_owned);
+        let host = Host::of(parts.version, &parts.uri, &parts.headers)?;
+        let host = host.map_or_else(|| service.address.to_string(), |host| host.text.to_owned());
         // Set by a proxy that terminates TLS.
         let scheme = match text(&parts.headers, "x-forwarded-proto") {
             Some("https") => "https",
@@ -94,13 +96,6 @@ impl FromRequestParts<Arc<Service>> for Base {
 
 fn text<'a>(headers: &'a HeaderMap, name: &str) -> Option<&'a str> {
     headers.get(name).and_then(|value| value.to_str().ok())
-}
-
-/// The `Host` of a request, if it is well-formed.
-pub fn host(headers: &HeaderMap) -> Option<&str> {
-    let host = headers.get(header::HOST)?.to_str().ok()?;
-    let plain = |b: u8| b.is_ascii_alphanumeric() || b".:-_[]".contains(&b);
-    (!host.is_empty() && host.bytes().all(plain)).then_some(host)
 }
 
 /// The body of a request: a JSON object.
@@ -130,25 +125,5 @@ impl<T: DeserializeOwned, S: Send + Sync> FromRequest<S> for Body<T> {
         serde_json::from_value(value)
             .map(Self)
             .map_err(|e| Problem::bad_request(format!("the body does not match the schema: {e}")))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn val_only_well_formed_hosts_count() {
-        let of = |value: &'static str| {
-            let headers = HeaderMap::from_iter([(header::HOST, axum::http::HeaderValue::from_static(value))]);
-            host(&headers).map(str::to_owned)
-        };
-        for plain in ["localhost", "127.0.0.1:8080", "[::1]:80", "a_b.example-1.org"] {
-            assert_eq!(of(plain).as_deref(), Some(plain));
-        }
-        for odd in ["", "a b", "a/b", "a\"b", "user@host"] {
-            assert_eq!(of(odd), None, "{odd}");
-        }
-        assert_eq!(host(&HeaderMap::new()), None);
     }
 }

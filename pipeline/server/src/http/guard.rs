@@ -2,7 +2,7 @@
 
 use super::Problem;
 use super::answer::Retained;
-use super::extract::host;
+use super::host::Host;
 use super::query::TOKEN;
 use super::room::Load;
 use super::service::{BODY_BYTES, Service};
@@ -193,25 +193,15 @@ fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Prob
     Ok(Some(Seat { service: Arc::clone(service), client }))
 }
 
-/// A server without a token that listens on loopback only answers requests whose `Host` names this machine; otherwise a page of another site could
-/// reach it through a name of its own (DNS rebinding).
+/// A server without a token that listens on loopback only answers requests whose host names this machine; otherwise a page of another site could
+/// reach it through a name of its own (DNS rebinding). Browsers always send a host.
 fn check_host(service: &Service, request: &Request) -> Result<(), Problem> {
-    if request.headers().get_all(header::HOST).iter().count() > 1 {
-        return Err(Problem::bad_request("the `Host` header is given more than once"));
-    }
-    let Some(host) = host(request.headers()) else { return Ok(()) };
-    if !service.address.ip().is_loopback() || service.token.is_some() {
+    let host = Host::of(request.version(), request.uri(), request.headers())?;
+    let Some(host) = host.filter(|_| service.address.ip().is_loopback() && service.token.is_none()) else {
         return Ok(());
-    }
-    let name = match host.rsplit_once(':') {
-        Some((name, port)) if port.bytes().all(|b| b.is_ascii_digit()) => name,
-        _ => host,
     };
-    let address = name.trim_matches(['[', ']']).parse::<IpAddr>();
-    if name.eq_ignore_ascii_case("localhost")
-        || address.is_ok_and(|address| address.is_loopback())
-        || service.hosts.iter().any(|own| own.eq_ignore_ascii_case(name))
-    {
+    let name = host.name;
+    if host.is_loopback() || service.hosts.iter().any(|own| own.eq_ignore_ascii_case(name)) {
         return Ok(());
     }
     Err(Problem::misdirected(format!(

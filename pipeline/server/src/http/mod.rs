@@ -3,6 +3,7 @@
 pub mod answer;
 pub mod extract;
 pub mod guard;
+pub mod host;
 pub mod jobs;
 pub mod metrics;
 pub mod ogc;

@@ -36,10 +36,13 @@ fn service(change: impl FnOnce(&mut Service)) -> Arc<Service> {
     Arc::new(service)
 }
 
+/// Sends a request to `localhost`, unless the headers name another host.
 fn send(service: &Arc<Service>, method: &str, uri: &str, headers: &[(&str, &str)]) -> Response {
+    let named = headers.iter().any(|(name, _)| *name == "host");
+    let own = [("host", "localhost")].into_iter().filter(|_| !named);
     let mut request = axum::http::Request::builder().method(method).uri(uri);
-    for (name, value) in headers {
-        request = request.header(*name, *value);
+    for (name, value) in headers.iter().copied().chain(own) {
+        request = request.header(name, value);
     }
     let peer = Peer(SocketAddr::from(([127, 0, 0, 1], 9)));
     let request = request.extension(peer).body(Body::empty()).unwrap();
@@ -91,10 +94,19 @@ fn val_other_hosts_are_refused_on_loopback() {
         ("evil.example", 421),
         ("192.168.0.7", 421),
         ("localhost.evil.example", 421),
+        ("localhost.:8080", 200),
+        ("EXAMPLE.org.", 200),
+        // Browsers send these characters; a malformed host is refused too.
+        ("a!b.evil.example", 421),
+        ("a~b$c,d.evil.example:80", 421),
+        ("", 400),
+        ("evil.example@localhost", 400),
     ] {
         assert_eq!(status(&open, "GET", "/v1", &[("host", host)]), expected, "{host}");
     }
     assert_eq!(status(&open, "GET", "/v1", &[("host", "localhost"), ("host", "evil.example")]), 400);
+    assert_eq!(status(&open, "GET", "http://evil.example/v1", &[("host", "localhost")]), 421);
+    assert_eq!(status(&open, "GET", "http://localhost/v1", &[("host", "evil.example")]), 200);
     let secret = service(|service| service.token = Some("secret".to_owned()));
     let headers = [("host", "evil.example"), ("authorization", "Bearer secret")];
     assert_eq!(status(&secret, "GET", "/v1", &headers), 200);
