@@ -2,6 +2,7 @@
 //! Requires node >= 18, the packages in `.cache/page` (`./test` installs them) and, for the browser, Chromium.
 
 use super::{area, called, sastrugi_in, write};
+use sastrugi_store::dem;
 use sastrugi_tests::server::Server;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -53,7 +54,7 @@ radius_m = 5.0
 distance_limit_m = 60.0
 "#;
 
-/// The browser's readout, colours, profile, tracks and playback agree with the server, on a world and on a release.
+/// The browser's readout, colours, profile, tracks, playback and study of a box agree with the server, on a world and on a release.
 #[test]
 fn val_the_page_agrees_with_the_server() {
     let Some(page) = page() else { return };
@@ -71,6 +72,23 @@ fn val_the_page_agrees_with_the_server() {
     let smoke = ["test/smoke.mjs", &url, "pictures"];
     let call = called(Command::new("node").current_dir(page.path()).args(smoke).env("SMOKE_SIZE", "960x640"));
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+    let section = std::fs::read_to_string(page.path().join("pictures/study.toml")).unwrap();
+    assert_study_is_served(folder.path(), &server, &section);
+}
+
+/// A study with the section that the page gives for a drawn box generates the samples that the server has there, bit for bit.
+fn assert_study_is_served(folder: &Path, server: &Server, section: &str) {
+    let head = "[study]\nname = \"box\"\nseed = 1\ndate = \"2026-11-25\"\nlicense = \"CC0-1.0\"\n\n";
+    write(folder, "box.toml", &format!("{head}{section}"));
+    let call = sastrugi_in(folder, &["run", "box.toml", "-o", "box", "--quiet"]);
+    assert_eq!(call.code, 0, "{section}{}", call.stderr);
+    let made = dem::read(&folder.join("box/terrain/planet.tif")).unwrap().grid;
+    let g = made.geometry;
+    let [x, y] = [g.x(0), g.y(g.rows - 1)];
+    let patch = format!("origin={x},{y}&size={},{}&resolution_m={}&format=raw", g.cols, g.rows, g.cell[0]);
+    let served = server.get(&format!("/v1/collections/planet/patch?{patch}")).floats();
+    assert_eq!(served.len(), made.values.len());
+    assert!(made.values.iter().zip(&served).all(|(a, b)| (*a as f32).to_bits() == b.to_bits()), "{patch}");
 }
 
 /// The committed bundle is that of the sources, byte for byte.

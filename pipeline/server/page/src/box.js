@@ -25,12 +25,20 @@ export function boxPanel() {
   const text = h('pre', { tabindex: '0', hidden: true });
   const copy = h('button', { type: 'button', hidden: true, onclick: async () => { try { await navigator.clipboard.writeText(text.textContent); copy.textContent = 'Copied'; } catch { getSelection().selectAllChildren(text); } } }, 'Copy');
   const study = h('button', { type: 'button', onclick: snippet }, 'Study TOML');
+  const complete = h('p', { class: 'hint', hidden: true }, 'The study applies all processes, including those that are switched off here.');
   const refused = h('p', { class: 'refused', role: 'alert', hidden: true });
 
   const extent = () => sides.map((side) => Number(side.value));
   const samples = () => { const [w, s, e, n] = extent(); const step = Number(resolution.value); return [Math.round((e - w) / step), Math.round((n - s) / step)]; };
   const good = () => samples().every((count) => Number.isFinite(count) && count >= 1);
-  const where = () => ({ origin: extent().slice(0, 2).join(','), size: samples().join(','), resolution_m: resolution.value });
+  const corner = () => extent().slice(0, 2);
+  const where = () => ({ origin: corner().join(','), size: samples().join(','), resolution_m: resolution.value });
+  /** The same window by its centre, which the server moves to the nearest samples: those of a study lie at multiples of the cell. */
+  const nearest = () => {
+    const counts = samples();
+    const center = corner().map((edge, at) => edge + 0.5 * (counts[at] - 1) * Number(resolution.value));
+    return { center: center.join(','), size: counts.join(','), resolution_m: resolution.value };
+  };
 
   function take(box) {
     const places = Math.max(0, Math.min(4, 1 - Math.floor(Math.log10(Math.max(box[2] - box[0], 1e-6) / 1000))));
@@ -65,8 +73,9 @@ export function boxPanel() {
   async function snippet() {
     if (!good()) return tellSize();
     try {
-      text.textContent = await (await get(`${base(state.collection)}/study${query(where())}`)).text();
+      text.textContent = await (await get(`${base(state.collection)}/study${query(nearest())}`)).text();
       text.hidden = copy.hidden = false;
+      complete.hidden = !state.phenomena;
       copy.textContent = 'Copy';
     } catch (error) { told(error); }
   }
@@ -75,7 +84,7 @@ export function boxPanel() {
     field.replaceChildren(...fields.map((name) => h('option', { value: name }, fieldName(name))));
     resolution.value = cell;
     study.hidden = kind !== 'world';
-    text.hidden = copy.hidden = true;
+    text.hidden = copy.hidden = complete.hidden = true;
     sides.forEach((side) => { side.value = ''; });
     changed();
   }
@@ -84,7 +93,7 @@ export function boxPanel() {
     h('div', { class: 'pairs' }, ['West', 'South', 'East', 'North'].map((name, at) => h('label', {}, `${name} (m)`, sides[at]))),
     h('div', { class: 'pairs' }, h('label', {}, 'Field', field), h('label', {}, 'Format', format)),
     h('div', { class: 'pairs' }, h('label', {}, 'Resolution (m)', resolution), h('button', { type: 'button', onclick: () => take(windowOf()) }, 'Use map view')),
-    size, refused, h('div', { class: 'row' }, h('button', { class: 'main' }, 'Download'), study), text, copy);
+    size, refused, h('div', { class: 'row' }, h('button', { class: 'main' }, 'Download'), study), complete, text, copy);
   return {
     title: 'Download', element, take,
     open() {

@@ -4,7 +4,7 @@
 // Each check prints one line; screenshots go into FOLDER; the exit code is 1 if a check failed.
 
 import puppeteer from 'puppeteer-core';
-import { mkdirSync, existsSync } from 'node:fs';
+import { mkdirSync, existsSync, writeFileSync } from 'node:fs';
 import { join } from 'node:path';
 
 const url = (process.argv[2] ?? 'http://127.0.0.1:8080').replace(/\/$/, '');
@@ -265,6 +265,26 @@ await check('the stated size of a download is right', async () => {
     told.push(`${format}: ${said} B stated, ${length} B downloaded`);
   }
   return told.join('; ');
+});
+
+if (collection.kind === 'world') await check('a drawn box gives a study', async () => {
+  // Edges of the box do not lie on samples.
+  await visit(at(finest * 3.7, '&phenomena=1'));
+  await page.click('[data-panel=box]');
+  await page.mouse.click(520, 400);
+  await page.mouse.move(700, 500);
+  await wait(300);
+  await page.mouse.click(760, 560);
+  await until('no box was drawn', () => /samples/.test(document.querySelector('#panel .hint').textContent));
+  await page.evaluate(() => [...document.querySelectorAll('#panel button')].find((button) => button.textContent === 'Study TOML').click());
+  await until('neither a study nor a refusal is shown', () => ['pre', '.refused'].some((name) => !document.querySelector(`#panel ${name}`).hidden));
+  must(await page.$eval('#panel .refused', (one) => one.hidden), await page.$eval('#panel .refused', (one) => one.textContent));
+  must((await page.$eval('#panel', (panel) => panel.innerText)).includes('switched off'), 'the page does not say that switched-off processes apply');
+  // The caller runs the study.
+  const study = await page.$eval('#panel pre', (one) => one.textContent);
+  writeFileSync(join(folder, 'study.toml'), study);
+  await shot('study');
+  return /size_px = .*/.exec(study)[0];
 });
 
 await check('the 3-D view opens', async () => {
