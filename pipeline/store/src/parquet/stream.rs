@@ -12,6 +12,7 @@ use parquet::arrow::arrow_reader::{
 };
 use sastrugi_schemas::{Cell, ColumnType, Table};
 use std::fs::File;
+use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
 /// The files of a table, and which of its rows are wanted.
@@ -21,6 +22,7 @@ use std::path::{Path, PathBuf};
 /// use sastrugi_schemas::tables::PsdRow;
 /// use sastrugi_schemas::{Cell, Record};
 /// use sastrugi_store::parquet::{TableFiles, write_table};
+/// use std::ops::ControlFlow;
 ///
 /// let row = |surface: &str, bin: i64| PsdRow {
 ///     surface_id: surface.to_owned(),
@@ -38,6 +40,12 @@ use std::path::{Path, PathBuf};
 /// assert_eq!(all.rows()?, 4);
 /// let of_a = all.selecting("surface_id", "a")?;
 /// assert_eq!(of_a.column("bin")?, [1, 2, 3].map(Cell::I64));
+/// let mut seen = Vec::new();
+/// of_a.visit(["bin", "surface_id"], |[bin, _]| {
+///     seen.push(bin);
+///     if seen.len() < 2 { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+/// })?;
+/// assert_eq!(seen, [1, 2].map(Cell::I64));
 /// assert_eq!(of_a.batches().map(|batch| batch.map(|b| b.num_rows())).sum::<Result<usize, _>>()?, 3);
 /// # Ok(())
 /// # }
@@ -84,7 +92,7 @@ impl TableFiles {
 
     /// The rows as record batches.
     pub fn batches(&self) -> Batches {
-        Batches { files: self.clone(), column: None, next: 0, current: None }
+        Batches { files: self.clone(), columns: None, next: 0, current: None }
     }
 
     /// The rows as a stream of the Arrow C data interface.
@@ -116,16 +124,42 @@ impl TableFiles {
     /// # Errors
     /// A column that the table does not have; a file that cannot be read.
     pub fn column(&self, name: &str) -> Result<Vec<Cell>, TableError> {
-        let column = Some(self.position(name)?);
         let mut values = Vec::new();
-        let mut batches = Batches { column, ..self.batches() };
+        self.visit([name], |[value]| {
+            values.push(value);
+            ControlFlow::Continue(())
+        })?;
+        Ok(values)
+    }
+
+    /// Calls `f` with the values of these columns, row by row, until it breaks. Other columns are not decoded.
+    ///
+    /// # Errors
+    /// As [`Self::column`].
+    pub fn visit<const N: usize>(
+        &self,
+        columns: [&str; N],
+        mut f: impl FnMut([Cell; N]) -> ControlFlow<()>,
+    ) -> Result<(), TableError> {
+        let mut places = [0; N];
+        for (place, column) in places.iter_mut().zip(columns) {
+            *place = self.position(column)?;
+        }
+        let mut batches = Batches { columns: Some(places.to_vec()), ..self.batches() };
         while let Some(batch) = batches.advance() {
             let batch = batch?;
-            let column = batch.columns().first().and_then(ColumnValues::of);
-            let column = column.ok_or_else(|| self.unusable("has a column of unknown type"))?;
-            values.extend((0..batch.num_rows()).map(|row| column.cell(row)));
+            // A batch has its columns in the order of the table.
+            let rank = |place: &usize| places.iter().filter(|other| *other < place).count();
+            let values = places.iter().map(|place| ColumnValues::of(batch.columns().get(rank(place))?));
+            let values: Option<Vec<ColumnValues>> = values.collect();
+            let values = values.ok_or_else(|| self.unusable("has a column of unknown type"))?;
+            for row in 0..batch.num_rows() {
+                if f(std::array::from_fn(|k| values[k].cell(row))).is_break() {
+                    return Ok(());
+                }
+            }
         }
-        Ok(values)
+        Ok(())
     }
 
     fn position(&self, column: &str) -> Result<usize, TableError> {
@@ -139,16 +173,16 @@ impl TableFiles {
         TableError::unusable(self.paths.first().map_or(Path::new(self.table.name), PathBuf::as_path), reason)
     }
 
-    /// A reader of one file; with `column`, of that column alone.
-    fn reader(&self, path: &Path, column: Option<usize>) -> Result<ParquetRecordBatchReader, TableError> {
+    /// A reader of one file; with `columns`, of those alone.
+    fn reader(&self, path: &Path, columns: Option<&[usize]>) -> Result<ParquetRecordBatchReader, TableError> {
         let mut builder = open(path, self.table)?.with_batch_size(BATCH_ROWS);
         if !self.wanted.is_empty() {
             let predicates = self.wanted.iter().map(|(column, text)| predicate(&builder, *column, text.clone()));
             let filter = RowFilter::new(predicates.collect());
             builder = builder.with_row_filter(filter);
         }
-        if let Some(column) = column {
-            let mask = ProjectionMask::roots(builder.parquet_schema(), [column]);
+        if let Some(columns) = columns {
+            let mask = ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied());
             builder = builder.with_projection(mask);
         }
         decoding(path, || builder.build())
@@ -169,8 +203,8 @@ fn predicate(builder: &ParquetRecordBatchReaderBuilder<File>, column: usize, tex
 /// The rows of [`TableFiles`], a batch at a time.
 pub struct Batches {
     files: TableFiles,
-    /// The only column that is read.
-    column: Option<usize>,
+    /// The only columns that are read, by position.
+    columns: Option<Vec<usize>>,
     /// Place of the next file.
     next: usize,
     current: Option<(PathBuf, ParquetRecordBatchReader)>,
@@ -196,7 +230,7 @@ impl Batches {
             }
             let Some(path) = self.files.paths.get(self.next).cloned() else { return Ok(None) };
             self.next += 1;
-            let reader = self.files.reader(&path, self.column)?;
+            let reader = self.files.reader(&path, self.columns.as_deref())?;
             self.current = Some((path, reader));
         }
     }

@@ -2,6 +2,7 @@ use super::*;
 use proptest::prelude::*;
 use sastrugi_schemas::tables::{self, CovarianceRow, PsdRow, SampleRow};
 use std::fs;
+use std::ops::ControlFlow;
 
 fn metadata() -> TableMetadata {
     TableMetadata {
@@ -209,6 +210,32 @@ fn val_many_rows_stream_through() {
     .unwrap();
     assert_eq!(expected, count);
     assert_eq!(check_table(&path, &PsdRow::TABLE).unwrap(), count as u64);
+}
+
+/// Columns come in the order in which they are named, whatever their order in the table, from one file after the other until `f` breaks.
+#[test]
+fn val_columns_are_visited_in_the_named_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = ["a", "b"].map(|name| folder.path().join(format!("{name}.parquet")));
+    for (fit, path) in (0..).zip(&paths) {
+        write_table(path, (0..3).map(|bin| row(fit, bin, 0.5 * bin as f64)), None).unwrap();
+    }
+    let files = TableFiles::new(&CovarianceRow::TABLE, paths.to_vec()).unwrap();
+    let visited = |files: &TableFiles, most: usize| {
+        let mut seen = Vec::new();
+        let visit = |[pairs, fit, lag]: [Cell; 3]| {
+            seen.push([pairs, fit, lag]);
+            if seen.len() < most { ControlFlow::Continue(()) } else { ControlFlow::Break(()) }
+        };
+        files.visit(["pairs", "fit_id", "lag_m"], visit).unwrap();
+        seen
+    };
+    let expected =
+        |fit: u32, bin: i64| [Cell::I64(3 * bin), Cell::Text(format!("fit-{fit:03}")), Cell::F64(0.5 * bin as f64)];
+    assert_eq!(visited(&files, 4), [expected(0, 0), expected(0, 1), expected(0, 2), expected(1, 0)]);
+    let second = files.clone().selecting("fit_id", "fit-001").unwrap();
+    assert_eq!(visited(&second, 9), [0, 1, 2].map(|bin| expected(1, bin)));
+    assert!(files.visit(["pairs", "wheels"], |_| ControlFlow::Continue(())).is_err());
 }
 
 #[test]
