@@ -634,6 +634,60 @@ fn val_changed_files_are_not_served() {
     assert!(answer.json()["detail"].as_str().unwrap().contains("changed"), "{}", answer.json());
 }
 
+/// Tracks of tables that are no longer what their release sealed are not served, and their number is unknown; clients do not see where the release
+/// lies. An unknown track is refused without reading samples.
+#[test]
+fn val_changed_tables_are_not_served() {
+    let folder = area();
+    write(folder.path(), "study.toml", &sastrugi_tests::small_study());
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let release = folder.path().join("release");
+    let server = Server::start(folder.path(), &[release.to_str().unwrap()], &[]);
+    let all = server.get("/v1/collections").json();
+    let driven = all["collections"].as_array().unwrap().iter().find(|c| c["tracks"].as_u64().unwrap() > 1).unwrap();
+    let c = format!("/v1/collections/{}", driven["id"].as_str().unwrap());
+    let list = server.get(&format!("{c}/tracks")).json();
+    assert_eq!((&list["total"], list["tracks"].as_array().map(Vec::len)), (&driven["tracks"], Some(tracks_of(driven))));
+    let track = |k: usize| format!("{c}/tracks/{}", list["tracks"][k]["id"].as_str().unwrap());
+    let first = server.get(&track(0));
+    assert_eq!((first.status, first.json()["id"].clone()), (200, list["tracks"][0]["id"].clone()));
+    assert!(first.json()["time_s"].as_array().unwrap().windows(2).all(|t| t[0].as_f64() <= t[1].as_f64()));
+    let tag = format!("If-None-Match: {}", first.header("etag").unwrap());
+    assert_eq!(server.get_with(&track(0), &[&tag]).status, 304);
+    let refused = |server: &Server, path: &str, status: u16| {
+        let answer = server.get(path);
+        let detail = answer.json()["detail"].as_str().unwrap().to_owned();
+        assert_eq!(answer.status, status, "{path}: {detail}");
+        assert!(!detail.contains(folder.path().to_str().unwrap()), "{detail}");
+        detail
+    };
+    damage(&release.join("tables/samples"));
+    assert!(refused(&server, &track(1), 500).contains("changed"));
+    // The first track was read while its table was what the release sealed.
+    assert_eq!(server.get(&track(0)).body, first.body);
+    refused(&server, &format!("{c}/tracks/{}", "none".repeat(100)), 404);
+    damage(&release.join("tables/missions"));
+    assert!(refused(&server, &format!("{c}/tracks"), 500).contains("changed"));
+    let again = Server::start(folder.path(), &[release.to_str().unwrap()], &[]);
+    assert!(again.get(&c).json()["tracks"].is_null());
+    assert!(refused(&again, &format!("{c}/tracks"), 500).contains("changed"));
+}
+
+fn tracks_of(collection: &serde_json::Value) -> usize {
+    collection["tracks"].as_u64().unwrap() as usize
+}
+
+/// Changes a byte in each file of a folder.
+fn damage(folder: &Path) {
+    for file in fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().path()) {
+        let mut bytes = fs::read(&file).unwrap();
+        let middle = bytes.len() / 2;
+        bytes[middle] ^= 1;
+        fs::write(&file, bytes).unwrap();
+    }
+}
+
 /// Ground received from a server, in the same tiles as a world generated in this process.
 struct ServedGround {
     client: Client,

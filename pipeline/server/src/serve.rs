@@ -113,6 +113,7 @@ pub fn serve(
         sending: Sending::default(),
         rooms: Rooms::default(),
         processors: Arc::new(Semaphore::new(settings.library.workers.max(1))),
+        tables: Arc::new(Semaphore::new(1)),
     });
     ready(address, &service.collections);
     runtime.block_on(accept(listener, &service, &origins, stop));

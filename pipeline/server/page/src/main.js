@@ -61,8 +61,8 @@ function furnish() {
     $('title').textContent = title;
     $('title').title = release ? `${title}, release ${release}` : title;
     $('credit').textContent = [credit, license].filter(Boolean).join(', ');
-    $('tools').querySelector('[data-panel=tracks]').hidden = !tracks;
-    if (!tracks && opened === 'tracks') toggle('tracks');
+    $('tools').querySelector('[data-panel=tracks]').hidden = tracks === 0;
+    if (tracks === 0 && opened === 'tracks') toggle('tracks');
   });
 }
 
@@ -106,7 +106,6 @@ async function start() {
   await go(read());
   readout($('readout'));
   keep(go)();
-  panels.tracks.renew();
   if (innerWidth >= 700) toggle('ground');
   if (!read().place) home(false);
   if (!(await pixelsAreTrue())) tell('This browser alters image pixels (fingerprinting protection), so colours may be wrong; allow this page to read canvas data.', true);

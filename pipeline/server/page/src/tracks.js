@@ -15,11 +15,11 @@ import { line as ink, marker, BLUE, RUST } from './ink.js';
 const DRAWN_MAX = 24;
 const known = new Map();
 
-export const trackOf = async (id) => {
+async function trackOf(id, signal) {
   const path = `${base(state.collection)}/tracks/${encodeURIComponent(id)}`;
-  if (!known.has(path)) known.set(path, json(path).catch((error) => { known.delete(path); throw error; }));
+  if (!known.has(path)) known.set(path, await json(path, signal));
   return known.get(path);
-};
+}
 export const tracksShown = new Map();
 
 const told = ({ id, label, outcome, length_m: way, duration_s: time }) =>
@@ -29,26 +29,27 @@ export function tracksPanel() {
   const list = h('ul', { class: 'list' });
   const player = h('div', { class: 'player' });
   const mark = marker(RUST);
-  let lines = [], listed = null, filled = null, playback = null;
+  let lines = [], listed = null, filled = null, playback = null, leave = new AbortController();
 
   async function renew() {
     if (listed === state.collection) return;
-    listed = state.collection;
+    const asked = listed = state.collection;
+    leave.abort();
+    const { signal } = leave = new AbortController();
     stop();
     lines = [];
     tracksShown.clear();
     list.replaceChildren();
     player.replaceChildren();
-    if (!state.collection.tracks) { list.append(h('li', { class: 'hint' }, 'There are no tracks here. A release lists the missions and rovers of each terrain.')); return; }
-    const asked = state.collection;
+    if (asked.tracks === 0) { list.append(h('li', { class: 'hint' }, 'There are no tracks here. A release lists the missions and rovers of each terrain.')); return; }
     try {
-      const { tracks } = await json(`${base(asked)}/tracks`);
-      if (asked !== state.collection) return;
+      const { tracks } = await json(`${base(asked)}/tracks`, signal);
       for (const track of tracks) list.append(h('li', {}, h('button', { type: 'button', class: 'item', 'data-track': track.id, onclick: () => set({ track: track.id }) },
         h('b', {}, track.id), h('span', {}, told(track)))));
-      await Promise.all(tracks.slice(0, DRAWN_MAX).map(({ id }) => draw(id, asked)));
       filled = asked;
       if (state.track) play(state.track);
+      // One after the other, so that tiles find a free connection.
+      for (const { id } of tracks.slice(0, DRAWN_MAX)) await draw(id, signal);
     } catch (error) { failed(error); }
   }
   function stop() {
@@ -56,13 +57,15 @@ export function tracksPanel() {
     playback = null;
     mark.hide();
   }
-  async function draw(id, asked = state.collection) {
-    const path = await trackOf(id);
-    if (asked !== state.collection || tracksShown.has(id)) return path;
+  const look = (feature) => feature.setStyle(feature.get('track') === state.track ? ink(RUST, 2.4) : ink(BLUE, state.track ? 1.4 : 1.6));
+  async function draw(id, signal) {
+    const path = await trackOf(id, signal);
+    signal.throwIfAborted();
+    if (tracksShown.has(id)) return path;
     tracksShown.set(id, path);
     const feature = new Feature(new LineString(path.x_m.map((x, at) => [x, path.y_m[at]])));
     feature.set('track', id);
-    feature.setStyle(ink(BLUE, 1.6));
+    look(feature);
     lines.push(feature);
     drawn.addFeature(feature);
     return path;
@@ -70,8 +73,8 @@ export function tracksPanel() {
   async function play(id) {
     stop();
     try {
-      const path = await draw(id);
-      for (const feature of lines) feature.setStyle(ink(feature.get('track') === id ? RUST : BLUE, feature.get('track') === id ? 2.4 : 1.4));
+      const path = await draw(id, leave.signal);
+      lines.forEach(look);
       for (const button of list.querySelectorAll('button')) button.setAttribute('aria-pressed', String(button.dataset.track === id));
       controls(path);
     } catch (error) { failed(error); }

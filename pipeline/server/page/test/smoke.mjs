@@ -369,10 +369,16 @@ const drawnTrack = (id, colour) => page.evaluate((name, wanted) => {
   return { coordinates: line.getCoordinates(), coloured: places.filter(isColoured).length / places.length };
 }, id, colour);
 
+/** Opens a collection and waits for its tracks. */
+async function showTracks(ground) {
+  await visit(`#c=${encodeURIComponent(ground.id)}`);
+  await until(`the ${ground.tracks} tracks are not drawn`, (count) => window.sastrugi.map.getLayers().getArray().at(-1).getSource().getFeatures().filter((feature) => feature.get('track')).length === count, Math.min(24, ground.tracks));
+}
+
 /** A screenshot of the 3-D view of a collection without its controls, once it has stopped changing. */
 async function relief(ground, tracks) {
-  await visit(`#c=${encodeURIComponent(ground.id)}`);
-  if (tracks) await until('no track is drawn', () => window.sastrugi.map.getLayers().getArray().at(-1).getSource().getFeatures().some((feature) => feature.get('track')));
+  if (tracks) await showTracks(ground);
+  else await visit(`#c=${encodeURIComponent(ground.id)}`);
   await page.click('[data-panel=relief]');
   await page.waitForSelector('#space canvas');
   await page.$eval('.space-bar', (bar) => { bar.style.visibility = 'hidden'; });
@@ -469,6 +475,14 @@ for (const [kind, { collection: ground, track }] of rides) await check(`the trac
   must(coordinates.length === x.length && coordinates.every((place, k) => place[0] === x[k] && place[1] === y[k]), `the line of ${track.id} differs from the server's`);
   must(coloured >= 0.9, `only ${(100 * coloured).toFixed()} % of the track has its colour`);
   return `${x.length} points, ${(100 * coloured).toFixed()} % of the line in its colour`;
+});
+for (const [kind, { collection: ground }] of rides) await check(`tracks of a ${kind} leave connections free`, async () => {
+  await showTracks(ground);
+  const times = await page.evaluate(() => performance.getEntriesByType('resource').filter(({ name }) => /\/tracks\/[^/]+$/.test(name)).map(({ startTime, responseEnd }) => [startTime, responseEnd]));
+  times.sort(([a], [b]) => a - b);
+  must(times.length === Math.min(24, ground.tracks), `${times.length} requests for ${ground.tracks} tracks`);
+  must(times.every(([start], k) => k === 0 || start >= times[k - 1][1]), 'several tracks are requested at once');
+  return `${times.length} requests, one after the other`;
 });
 for (const [kind, { collection: ground }] of rides) await check(`the track of a ${kind} is in the 3-D view`, async () => {
   const shown = await relief(ground, true);

@@ -1,6 +1,7 @@
 //! The collections that are served: worlds, whose patches are generated on demand, and the rasters of releases.
 
 pub mod raster;
+mod sealed;
 pub mod tracks;
 pub mod world;
 
@@ -153,7 +154,7 @@ pub fn open(paths: &[PathBuf], raster_bytes: u64) -> Result<Collections, Error> 
                 .map(|w| World::open(w).map(|w| (w.id().to_owned(), Ground::World(Arc::new(w)), None)))
                 .collect::<Result<Vec<_>, _>>()?,
             Served::Release(release, rasters) => {
-                let drives = Arc::new(Drives::new(*release));
+                let drives = Arc::new(Drives::open(*release));
                 let name = drives.release.manifest().name.clone();
                 let open = |files| {
                     let raster = Raster::open(files, &memory).map_err(Error::Input)?;

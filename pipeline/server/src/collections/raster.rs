@@ -4,6 +4,7 @@
 //! Points and patches are interpolated between the cells of the file, at any sample spacing; map tiles of coarse levels are drawn from means of
 //! cells.
 
+use super::sealed;
 use crate::grid::{TILE, TileGrid, TileIndex};
 use crate::http::Problem;
 use crate::library::undivided;
@@ -13,7 +14,6 @@ use quick_cache::sync::Cache;
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_stages::verbs::served::{SealedFile, ServedRaster};
 use sastrugi_store::dem::{self, Crs, ReadOptions};
-use sastrugi_store::digest;
 use std::sync::Arc;
 
 /// Maps of a release that become fields of the collection, by their names in the release.
@@ -106,15 +106,15 @@ impl Raster {
     }
 
     fn pyramid(&self) -> Result<Pyramid, String> {
-        let heights = sealed(&self.files.heights)?;
+        let heights = read(&self.files.heights)?;
         let map = |name: &str| -> Result<Option<Vec<f32>>, String> {
             let Some(file) = self.files.maps.get(name) else { return Ok(None) };
-            let grid = sealed(file)?;
+            let grid = read(file)?;
             let same = (grid.rows(), grid.cols()) == (heights.rows(), heights.cols());
             if same {
                 Ok(Some(single(&grid)))
             } else {
-                Err(format!("{}: its grid differs from that of the heights", file.path.display()))
+                Err(format!("{}: its grid differs from that of the heights", sealed::name(&file.path)))
             }
         };
         let [albedo, rock, rock_potential] = MAPS.map(map);
@@ -149,18 +149,10 @@ impl Raster {
     }
 }
 
-/// Values of a file after checking that it has not changed since its release was sealed. Clients see its name; the log has its path.
-fn sealed(file: &SealedFile) -> Result<Grid, String> {
-    let name = file.path.file_name().unwrap_or_default().to_string_lossy().into_owned();
-    let refused = |error: &dyn std::fmt::Display| {
-        tracing::warn!(path = %file.path.display(), %error, "cannot serve a file of a release");
-        format!("{name}: the file cannot be read")
-    };
-    let (_, sha256) = digest::of_file(&file.path).map_err(|e| refused(&e))?;
-    if sha256 != file.sha256 {
-        return Err(format!("{name}: the file has changed since its release was sealed; run `sastrugi verify`"));
-    }
-    Ok(dem::read(&file.path).map_err(|e| refused(&e))?.grid)
+/// Values of a file after checking that it has not changed since its release was sealed.
+fn read(file: &SealedFile) -> Result<Grid, String> {
+    sealed::check(file)?;
+    Ok(dem::read(&file.path).map_err(|e| sealed::unreadable(&file.path, &e))?.grid)
 }
 
 fn single(grid: &Grid) -> Vec<f32> {

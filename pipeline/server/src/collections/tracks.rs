@@ -1,123 +1,181 @@
 //! Missions and rovers of a release, by the terrain that they were driven on.
 
 use super::Collection;
+use super::sealed::Sealed;
 use crate::collections::Ground;
 use crate::http::Problem;
-use sastrugi_schemas::Record;
-use sastrugi_schemas::tables::{MissionRow, RoverRow, RoverSampleRow, SampleRow};
-use sastrugi_store::release::{Release, ReleaseError};
+use crate::http::problem::shortened;
+use sastrugi_schemas::tables::{CellType, MissionRow, RoverRow, RoverSampleRow, SampleRow};
+use sastrugi_schemas::{Cell, Record, Table};
+use sastrugi_stages::verbs::served::SealedFile;
+use sastrugi_store::parquet::TableFiles;
+use sastrugi_store::release::{Release, TABLES};
 use serde_json::{Value, json};
 use std::collections::BTreeMap;
-use std::sync::OnceLock;
+use std::ops::ControlFlow;
+use std::path::PathBuf;
+use std::sync::atomic::{AtomicBool, Ordering};
 
 /// Largest number of points sent per track.
 const POINTS_MAX: usize = 5000;
 /// Largest number of missions and rovers listed.
 pub const LISTED_MAX: usize = 10_000;
+/// Column of the terrain, in all tables.
+const TERRAIN: &str = "terrain_id";
 
-/// Poses along a track.
-#[derive(Default)]
-struct Track {
-    time_s: Vec<f64>,
-    x_m: Vec<f64>,
-    y_m: Vec<f64>,
-    z_m: Vec<f64>,
-    heading_deg: Vec<f64>,
+/// What drives on terrains, and the columns that its tables have under names of their own.
+struct Kind {
+    name: &'static str,
+    drives: &'static Table,
+    samples: &'static Table,
+    id: &'static str,
+    driver: &'static str,
+    length_m: &'static str,
+    heading_deg: &'static str,
 }
 
-impl Track {
-    fn push(&mut self, time_s: f64, [x, y, z]: [f64; 3], heading_deg: f64) {
-        self.time_s.push(time_s);
-        self.x_m.push(x);
-        self.y_m.push(y);
-        self.z_m.push(z);
-        self.heading_deg.push(heading_deg);
-    }
+static KINDS: [Kind; 2] = [
+    Kind {
+        name: "mission",
+        drives: &MissionRow::TABLE,
+        samples: &SampleRow::TABLE,
+        id: "mission_id",
+        driver: "vehicle",
+        length_m: "path_length_m",
+        heading_deg: "yaw_deg",
+    },
+    Kind {
+        name: "rover",
+        drives: &RoverRow::TABLE,
+        samples: &RoverSampleRow::TABLE,
+        id: "rover_id",
+        driver: "navigator",
+        length_m: "distance_m",
+        heading_deg: "heading_deg",
+    },
+];
 
-    /// Every n-th point, and the last.
-    fn thinned(self) -> Self {
-        let step = self.time_s.len().div_ceil(POINTS_MAX).max(1);
-        let last = self.time_s.len().saturating_sub(1);
-        let mut thin = Self::default();
-        for k in (0..self.time_s.len()).filter(|k| k % step == 0 || *k == last) {
-            thin.push(self.time_s[k], [self.x_m[k], self.y_m[k], self.z_m[k]], self.heading_deg[k]);
-        }
-        thin
-    }
+/// Time, position and heading at a point of a track.
+type Pose = [f64; 5];
+/// Names of the members of a [`Pose`] in an answer.
+const POSE: [&str; 5] = ["time_s", "x_m", "y_m", "z_m", "heading_deg"];
+
+/// Every n-th pose, and the last.
+fn thinned(poses: &[Pose]) -> Vec<Pose> {
+    let step = poses.len().div_ceil(POINTS_MAX).max(1);
+    let last = poses.len().saturating_sub(1);
+    poses.iter().enumerate().filter(|(k, _)| k % step == 0 || *k == last).map(|(_, pose)| *pose).collect()
 }
 
 /// A release whose missions and rovers are drawn on its terrains.
 pub struct Drives {
     /// The release.
     pub release: Release,
-    /// Number of missions and rovers on each terrain.
-    counts: OnceLock<BTreeMap<String, usize>>,
+    /// Hash of the tables.
+    pub digest: String,
+    /// Files of the tables, by table.
+    files: BTreeMap<&'static str, Vec<Sealed>>,
+    /// Number of missions and rovers on each terrain; `None` if a table could not be read.
+    counts: Option<BTreeMap<String, usize>>,
 }
 
 impl Drives {
-    /// Missions and rovers of a release.
-    pub fn new(release: Release) -> Self {
-        Self { release, counts: OnceLock::new() }
+    /// Missions and rovers of a release. Counts them; a table that cannot be read is logged.
+    pub fn open(release: Release) -> Self {
+        let tables = KINDS.iter().flat_map(|kind| [kind.drives.name, kind.samples.name]);
+        let files: BTreeMap<_, Vec<Sealed>> = tables.map(|table| (table, files_of(&release, table))).collect();
+        let sums: Vec<&str> = files.values().flatten().map(Sealed::sha256).collect();
+        let digest = super::digest(&format!("{} {}", crate::revision(), sums.join(",")));
+        let mut drives = Self { release, digest, files, counts: None };
+        drives.counts = drives.count().ok();
+        drives
     }
 
-    /// Calls `f` with every mission and rover.
-    fn each(&self, mut f: impl FnMut(Drive)) -> Result<(), Problem> {
-        rows(&self.release, |row: MissionRow| {
-            f(Drive {
-                terrain: row.terrain_id,
-                kind: "mission",
-                driver: row.vehicle,
-                id: row.mission_id,
-                outcome: row.outcome,
-                duration_s: row.time_s,
-                length_m: row.path_length_m,
-            });
-        })?;
-        rows(&self.release, |row: RoverRow| {
-            f(Drive {
-                terrain: row.terrain_id,
-                kind: "rover",
-                driver: row.navigator,
-                id: row.rover_id,
-                outcome: row.outcome,
-                duration_s: row.time_s,
-                length_m: row.distance_m,
-            });
-        })
-    }
-
-    /// Number of missions and rovers on a terrain; 0 while the tables cannot be read.
-    fn count(&self, terrain: &str) -> usize {
-        let count = |counts: &BTreeMap<String, usize>| counts.get(terrain).copied().unwrap_or(0);
-        if let Some(counts) = self.counts.get() {
-            return count(counts);
-        }
+    fn count(&self) -> Result<BTreeMap<String, usize>, Problem> {
         let mut counts = BTreeMap::new();
-        match self.each(|drive| *counts.entry(drive.terrain).or_insert(0) += 1) {
-            Ok(()) => count(self.counts.get_or_init(|| counts)),
-            Err(_) => 0,
+        for kind in &KINDS {
+            self.visit(kind.drives, &[], [TERRAIN], &AtomicBool::new(false), |[terrain]| {
+                *counts.entry(text(terrain)).or_insert(0) += 1;
+                ControlFlow::Continue(())
+            })?;
         }
+        Ok(counts)
+    }
+
+    /// Calls `f` with some columns of the rows that have the wanted texts in other columns, until it breaks.
+    ///
+    /// # Errors
+    /// A file has changed or cannot be read; `stop` was set, because nobody waits for the answer any more.
+    fn visit<const N: usize>(
+        &self,
+        table: &'static Table,
+        wanted: &[(&str, &str)],
+        columns: [&str; N],
+        stop: &AtomicBool,
+        mut f: impl FnMut([Cell; N]) -> ControlFlow<()>,
+    ) -> Result<(), Problem> {
+        let unless_stopped = |cells: [Cell; N]| {
+            if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { f(cells) }
+        };
+        let paths = self.paths(table, wanted).map_err(Problem::internal)?;
+        let files = TableFiles::new(table, paths);
+        let files = wanted.iter().fold(files, |files, (column, text)| files?.selecting(column, text));
+        files.and_then(|files| files.visit(columns, unless_stopped)).map_err(|error| {
+            tracing::warn!(release = %self.release.folder().display(), %error, "cannot read a table");
+            Problem::internal(format!("table `{}` of the release cannot be read", table.name))
+        })?;
+        if stop.load(Ordering::Relaxed) {
+            return Err(Problem::unavailable("the request was cancelled"));
+        }
+        Ok(())
+    }
+
+    /// The files of a table, checked; of a table with one file per terrain, only that of the wanted terrain.
+    fn paths(&self, table: &Table, wanted: &[(&str, &str)]) -> Result<Vec<PathBuf>, String> {
+        let part = wanted.iter().find(|(column, _)| table.file_per == Some(*column));
+        let part = part.map(|(_, text)| format!("part-{text}.parquet"));
+        let files = self.files.get(table.name).into_iter().flatten();
+        let files = files.filter(|file| part.as_ref().is_none_or(|name| file.is_named(name)));
+        files.map(|file| file.path().map(PathBuf::from)).collect()
+    }
+
+    /// Poses of one mission or rover.
+    fn poses(&self, kind: &Kind, terrain: &str, id: &str, stop: &AtomicBool) -> Result<Vec<Pose>, Problem> {
+        let mut poses = Vec::new();
+        let columns = ["time_s", "x_m", "y_m", "z_m", kind.heading_deg];
+        self.visit(kind.samples, &[(TERRAIN, terrain), (kind.id, id)], columns, stop, |cells| {
+            poses.push(cells.map(number));
+            ControlFlow::Continue(())
+        })?;
+        Ok(thinned(&poses))
+    }
+
+    /// Whether a terrain has this mission or rover.
+    fn has(&self, kind: &Kind, terrain: &str, id: &str, stop: &AtomicBool) -> Result<bool, Problem> {
+        let mut has = false;
+        self.visit(kind.drives, &[(TERRAIN, terrain), (kind.id, id)], [kind.id], stop, |_| {
+            has = true;
+            ControlFlow::Break(())
+        })?;
+        Ok(has)
     }
 }
 
-/// One mission or rover.
-struct Drive {
-    terrain: String,
-    kind: &'static str,
-    driver: String,
-    id: String,
-    outcome: String,
-    duration_s: f64,
-    length_m: f64,
+/// The files of a table that the manifest lists.
+fn files_of(release: &Release, table: &str) -> Vec<Sealed> {
+    let folder = format!("{TABLES}/{table}/");
+    let is_part = |path: &str| path.starts_with(&folder) && path.ends_with(".parquet");
+    let own = release.manifest().artifacts.iter().filter(|artifact| is_part(&artifact.path));
+    let file = |path: &str, sha256: &str| SealedFile { path: release.path(path), sha256: sha256.to_owned() };
+    own.map(|artifact| Sealed::new(file(&artifact.path, &artifact.sha256))).collect()
 }
 
-impl Drive {
-    fn describe(&self) -> Value {
-        let Self { kind, driver, id, outcome, duration_s, length_m, .. } = self;
-        json!({
-            "id": id, "kind": kind, "label": format!("{driver} {id}"), "outcome": outcome, "duration_s": duration_s, "length_m": length_m,
-        })
-    }
+fn text(cell: Cell) -> String {
+    String::from_cell(cell).unwrap_or_default()
+}
+
+fn number(cell: Cell) -> f64 {
+    f64::from_cell(cell).unwrap_or(f64::NAN)
 }
 
 impl Collection {
@@ -128,57 +186,63 @@ impl Collection {
         }
     }
 
-    /// Number of missions and rovers. The first call reads tables: do not call it on the runtime's threads.
-    pub fn tracks(&self) -> usize {
-        self.driven_on().map_or(0, |(drives, terrain)| drives.count(terrain))
+    /// Number of missions and rovers; `None` if a table could not be read.
+    pub fn tracks(&self) -> Option<usize> {
+        let Some((drives, terrain)) = self.driven_on() else { return Some(0) };
+        drives.counts.as_ref().map(|counts| counts.get(terrain).copied().unwrap_or(0))
     }
 
-    /// The first missions and rovers, at most [`LISTED_MAX`]. Reads tables: do not call it on the runtime's threads.
+    /// The first missions and rovers, at most [`LISTED_MAX`]. Reads tables until `stop` is set: do not call it on the runtime's threads.
     ///
     /// # Errors
-    /// A table cannot be read.
-    pub fn track_list(&self) -> Result<Vec<Value>, Problem> {
+    /// A table has changed or cannot be read.
+    pub fn track_list(&self, stop: &AtomicBool) -> Result<Vec<Value>, Problem> {
         let Some((drives, terrain)) = self.driven_on() else { return Ok(Vec::new()) };
         let mut tracks = Vec::new();
-        drives.each(|drive| {
-            if drive.terrain == terrain && tracks.len() < LISTED_MAX {
-                tracks.push(drive.describe());
-            }
-        })?;
+        for kind in &KINDS {
+            let columns = [kind.id, kind.driver, "outcome", "time_s", kind.length_m];
+            drives.visit(kind.drives, &[(TERRAIN, terrain)], columns, stop, |cells| {
+                if tracks.len() == LISTED_MAX {
+                    return ControlFlow::Break(());
+                }
+                tracks.push(describe(kind, cells));
+                ControlFlow::Continue(())
+            })?;
+        }
         Ok(tracks)
     }
 
-    /// One track. Reads tables: do not call it on the runtime's threads.
+    /// One track. Reads tables until `stop` is set: do not call it on the runtime's threads.
     ///
     /// # Errors
-    /// A table cannot be read, or there is no track with this id.
-    pub fn track(&self, id: &str) -> Result<Value, Problem> {
-        let mut track = Track::default();
-        if let Some((Drives { release, .. }, terrain)) = self.driven_on() {
-            let is = |own: &str, on: &str| own == id && on == terrain;
-            rows(release, |s: SampleRow| {
-                if is(&s.mission_id, &s.terrain_id) {
-                    track.push(s.time_s, [s.x_m, s.y_m, s.z_m], s.yaw_deg);
-                }
-            })?;
-            rows(release, |s: RoverSampleRow| {
-                if is(&s.rover_id, &s.terrain_id) {
-                    track.push(s.time_s, [s.x_m, s.y_m, s.z_m], s.heading_deg);
-                }
-            })?;
+    /// There is no track with this id; a table has changed or cannot be read.
+    pub fn track(&self, id: &str, stop: &AtomicBool) -> Result<Value, Problem> {
+        let unknown = || {
+            let shown = shortened(id);
+            Problem::not_found(format!("no such track on this terrain: \"{shown}\"; `tracks` lists them"))
+        };
+        let (drives, terrain) = self.driven_on().ok_or_else(unknown)?;
+        for kind in &KINDS {
+            // Ids are far fewer than samples.
+            if drives.has(kind, terrain, id, stop)? {
+                let poses = drives.poses(kind, terrain, id, stop)?;
+                let column = |k: usize| json!(poses.iter().map(|pose| pose[k]).collect::<Vec<f64>>());
+                let mut track: serde_json::Map<String, Value> =
+                    POSE.iter().enumerate().map(|(k, name)| ((*name).to_owned(), column(k))).collect();
+                track.insert("id".to_owned(), json!(id));
+                return Ok(Value::Object(track));
+            }
         }
-        if track.time_s.is_empty() {
-            return Err(Problem::not_found(format!("no such track on this terrain: \"{id}\"; `tracks` lists them")));
-        }
-        let t = track.thinned();
-        Ok(json!({
-            "id": id, "time_s": t.time_s, "x_m": t.x_m, "y_m": t.y_m, "z_m": t.z_m, "heading_deg": t.heading_deg,
-        }))
+        Err(unknown())
     }
 }
 
-fn rows<R: Record>(release: &Release, f: impl FnMut(R)) -> Result<(), Problem> {
-    release.for_each_row(f).map_err(|e: ReleaseError| Problem::internal(e.to_string()))
+fn describe(kind: &Kind, [id, driver, outcome, duration_s, length_m]: [Cell; 5]) -> Value {
+    let (id, driver) = (text(id), text(driver));
+    json!({
+        "id": id, "kind": kind.name, "label": format!("{driver} {id}"), "outcome": text(outcome),
+        "duration_s": number(duration_s), "length_m": number(length_m),
+    })
 }
 
 #[cfg(test)]
@@ -188,23 +252,27 @@ mod tests {
     /// A track is thinned to at most 5000 points and its last one.
     #[test]
     fn val_thinned_tracks_keep_their_ends() {
-        let thinned = |count: usize| {
-            let mut track = Track::default();
-            for time_s in (0..count).map(|k| k as f64) {
-                track.push(time_s, [1.0, 2.0, 3.0].map(|more| time_s + more), time_s + 4.0);
-            }
-            track.thinned()
-        };
+        let pose = |k: usize| [0.0, 1.0, 2.0, 3.0, 4.0].map(|more| k as f64 + more);
         for (count, expected) in [(0, 0), (1, 1), (5000, 5000), (5001, 2501), (5002, 2502), (12_000, 4001)] {
-            let track = thinned(count);
-            assert_eq!(track.time_s.len(), expected, "{count}");
-            assert_eq!(track.time_s.first().copied(), (count > 0).then_some(0.0));
-            assert_eq!(track.time_s.last().copied(), count.checked_sub(1).map(|last| last as f64));
-            // Each column keeps to its own.
-            for (k, time_s) in track.time_s.iter().enumerate() {
-                let others = [track.x_m[k], track.y_m[k], track.z_m[k], track.heading_deg[k]];
-                assert_eq!(others, [1.0, 2.0, 3.0, 4.0].map(|more| time_s + more));
+            let poses: Vec<Pose> = (0..count).map(pose).collect();
+            let kept = thinned(&poses);
+            assert_eq!(kept.len(), expected, "{count}");
+            assert_eq!((kept.first(), kept.last()), (poses.first(), poses.last()));
+            assert!(kept.iter().all(|one| poses.contains(one)));
+        }
+    }
+
+    /// Every column that is read exists in its table.
+    #[test]
+    fn val_the_tables_have_the_columns() {
+        for kind in &KINDS {
+            for column in [TERRAIN, kind.id, kind.driver, "outcome", "time_s", kind.length_m] {
+                assert!(kind.drives.position(column).is_some(), "{} {column}", kind.name);
             }
+            for column in [TERRAIN, kind.id, "time_s", "x_m", "y_m", "z_m", kind.heading_deg] {
+                assert!(kind.samples.position(column).is_some(), "{} {column}", kind.name);
+            }
+            assert_eq!((kind.drives.file_per, kind.samples.file_per), (None, Some(TERRAIN)));
         }
     }
 }

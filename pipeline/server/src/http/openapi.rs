@@ -216,7 +216,7 @@ fn document(service: &Service) -> Value {
         if is_tile {
             responses["204"] = json!({ "description": "The tile has no data" });
         }
-        if is_tile || o.path.ends_with("/patch") {
+        if is_tile || o.path.ends_with("/patch") || o.path.ends_with("{track}") {
             responses["206"] = json!({ "description": "The requested range" });
             responses["304"] = json!({ "description": "Not modified" });
             responses["416"] = problem("The range starts beyond the end");

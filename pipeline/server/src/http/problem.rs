@@ -14,6 +14,11 @@ pub struct Problem {
     hint: Hint,
 }
 
+/// The beginning of a text that a client sent, for a message about it.
+pub fn shortened(text: &str) -> String {
+    text.chars().take(60).collect()
+}
+
 /// An additional header.
 #[derive(Clone, Copy, Debug, PartialEq)]
 enum Hint {

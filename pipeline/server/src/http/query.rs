@@ -1,6 +1,6 @@
 //! Query parameters: each must be known, and each is checked.
 
-use super::problem::Problem;
+use super::problem::{Problem, shortened};
 use std::collections::BTreeMap;
 use std::str::FromStr;
 
@@ -37,7 +37,8 @@ impl Query {
             }
             if !known.contains(&name.as_str()) {
                 let names = if known.is_empty() { "none".to_owned() } else { known.join(", ") };
-                return Err(Problem::bad_request(format!("unknown parameter `{name}`; this path takes {names}")));
+                let shown = shortened(&name);
+                return Err(Problem::bad_request(format!("unknown parameter `{shown}`; this path takes {names}")));
             }
             if all.contains_key(&name) {
                 return Err(Problem::bad_request(format!("the parameter `{name}` is given more than once")));
@@ -143,7 +144,7 @@ fn missing(name: &str) -> Problem {
 }
 
 fn refused(name: &str, text: &str, right: &str) -> Problem {
-    let shown: String = text.chars().take(60).collect();
+    let shown = shortened(text);
     Problem::bad_request(format!("`{name}`: \"{shown}\" is not valid; it must be {right}"))
 }
 
@@ -212,5 +213,7 @@ mod tests {
         let text = "9".repeat(1000);
         let said = refusal(query(&[("x", text.as_str())]).unwrap().whole("x", [0, 1]));
         assert!(said.starts_with(&format!("`x`: \"{}\" is not valid", "9".repeat(60))), "{said}");
+        let said = refusal(query(&[(text.as_str(), "1")]));
+        assert!(said.starts_with(&format!("unknown parameter `{}`;", "9".repeat(60))), "{said}");
     }
 }

@@ -3,6 +3,7 @@
 use super::answer::Answers;
 use super::jobs::Jobs;
 use super::metrics::Metrics;
+use super::problem::shortened;
 use super::room::{Rooms, Sending};
 use super::{Problem, Query};
 use crate::collections::raster::Pyramid;
@@ -12,6 +13,7 @@ use crate::library::{Library, Priority};
 use crate::samples::Samples;
 use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::sync::{Arc, Mutex};
 use std::time::Duration;
 use tokio::sync::Semaphore;
@@ -83,6 +85,8 @@ pub struct Service {
     pub rooms: Rooms,
     /// Processors for work outside the library.
     pub processors: Arc<Semaphore>,
+    /// The seat of the request that reads tables of releases.
+    pub tables: Arc<Semaphore>,
 }
 
 impl Service {
@@ -92,8 +96,7 @@ impl Service {
     /// There is no such collection.
     pub fn collection(&self, id: &str) -> Result<&Arc<Collection>, Problem> {
         self.collections.get(id).ok_or_else(|| {
-            let shown: String = id.chars().take(80).collect();
-            Problem::not_found(format!("no such collection: \"{shown}\"; /v1/collections lists them"))
+            Problem::not_found(format!("no such collection: \"{}\"; /v1/collections lists them", shortened(id)))
         })
     }
 
@@ -143,15 +146,49 @@ impl Service {
         &self,
         work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
     ) -> Result<T, Problem> {
-        let ended = |e: &dyn std::fmt::Display| Problem::internal(format!("a task of the server ended early: {e}"));
-        let seat = Arc::clone(&self.processors).acquire_owned().await.map_err(|e| ended(&e))?;
-        let done = tokio::task::spawn_blocking(move || {
-            let done = work();
-            drop(seat);
-            done
-        });
-        done.await.map_err(|e| ended(&e))?
+        seated(&self.processors, work).await
     }
+
+    /// Runs work that reads tables on a blocking thread, one at a time, so that long tables do not hold up ground. The flag is set when the request is
+    /// dropped; the work must poll it.
+    ///
+    /// # Errors
+    /// Those of the work.
+    pub async fn reading<T: Send + 'static>(
+        &self,
+        work: impl FnOnce(&AtomicBool) -> Result<T, Problem> + Send + 'static,
+    ) -> Result<T, Problem> {
+        let waiting = Waiting::default();
+        let stop = Arc::clone(&waiting.stop);
+        seated(&self.tables, move || work(&stop)).await
+    }
+}
+
+/// A request that waits for its work, which it stops when it is dropped.
+#[derive(Default)]
+struct Waiting {
+    stop: Arc<AtomicBool>,
+}
+
+impl Drop for Waiting {
+    fn drop(&mut self) {
+        self.stop.store(true, Ordering::Relaxed);
+    }
+}
+
+/// Runs work on a blocking thread once one of the seats is free.
+async fn seated<T: Send + 'static>(
+    seats: &Arc<Semaphore>,
+    work: impl FnOnce() -> Result<T, Problem> + Send + 'static,
+) -> Result<T, Problem> {
+    let ended = |e: &dyn std::fmt::Display| Problem::internal(format!("a task of the server ended early: {e}"));
+    let seat = Arc::clone(seats).acquire_owned().await.map_err(|e| ended(&e))?;
+    let done = tokio::task::spawn_blocking(move || {
+        let done = work();
+        drop(seat);
+        done
+    });
+    done.await.map_err(|e| ended(&e))?
 }
 
 /// The part of a collection that a request selects.

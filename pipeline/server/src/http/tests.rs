@@ -11,6 +11,8 @@ use crate::library::{Library, Settings};
 use axum::body::Body;
 use std::net::SocketAddr;
 use std::sync::Mutex;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
 use tokio::sync::Semaphore;
 use tower::ServiceExt;
 
@@ -31,6 +33,7 @@ fn service(change: impl FnOnce(&mut Service)) -> Arc<Service> {
         sending: Sending::default(),
         rooms: Rooms::default(),
         processors: Arc::new(Semaphore::new(1)),
+        tables: Arc::new(Semaphore::new(1)),
     };
     change(&mut service);
     Arc::new(service)
@@ -144,4 +147,33 @@ fn val_requests_per_client_are_bounded() {
     assert_eq!(second.headers()[header::RETRY_AFTER], "1");
     drop(first);
     assert_eq!(status(&service, "GET", "/healthz", &[]), 200);
+}
+
+/// Reading tables stops when the client leaves, and does not hold up work on ground.
+#[test]
+fn val_reading_stops_with_its_request() {
+    let runtime = tokio::runtime::Builder::new_multi_thread().worker_threads(2).enable_all().build().unwrap();
+    let (begin, begun) = std::sync::mpsc::channel();
+    let (end, ended) = std::sync::mpsc::channel();
+    let service = service(|_| ());
+    let reader = Arc::clone(&service);
+    let request = runtime.spawn(async move {
+        let read = move |stop: &AtomicBool| {
+            begin.send(()).unwrap();
+            while !stop.load(Ordering::Relaxed) {
+                std::thread::sleep(Duration::from_millis(1));
+            }
+            end.send(()).unwrap();
+            Ok(())
+        };
+        reader.reading(read).await
+    });
+    let patience = Duration::from_secs(60);
+    begun.recv_timeout(patience).unwrap();
+    assert_eq!(runtime.block_on(service.blocking(|| Ok(7))).unwrap(), 7);
+    assert!(ended.try_recv().is_err());
+    request.abort();
+    ended.recv_timeout(patience).unwrap();
+    // The seat is free again.
+    runtime.block_on(service.reading(|_| Ok(()))).unwrap();
 }

@@ -1,5 +1,6 @@
 //! Values at points and along lines, and the tracks of a release.
 
+use super::answer::Answer;
 use super::service::{SELECTION, Service, selection};
 use super::{On, Pairs, Plain, Problem, Segments};
 use crate::collections::world::{FEATURE_PIXELS, Piece, Selection};
@@ -7,8 +8,11 @@ use crate::collections::{Collection, Ground};
 use crate::grid::TILE;
 use axum::Json;
 use axum::extract::State;
+use axum::http::HeaderMap;
+use axum::response::Response;
 use serde_json::{Value, json};
 use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
 use tokio::task::JoinSet;
 
 /// Parameters of a point and of a profile, in addition to the selection.
@@ -150,8 +154,10 @@ fn along(line: &[[f64; 2]], count: usize) -> Option<(Vec<f64>, Vec<[f64; 2]>)> {
 
 /// `GET /v1/collections/{id}/tracks`
 pub async fn tracks(State(service): State<Arc<Service>>, On(collection): On, _: Plain) -> Result<Json<Value>, Problem> {
-    let list = move || Ok(Json(json!({ "tracks": collection.track_list()?, "total": collection.tracks() })));
-    service.blocking(list).await
+    let list = move |stop: &AtomicBool| {
+        Ok(Json(json!({ "tracks": collection.track_list(stop)?, "total": collection.tracks() })))
+    };
+    service.reading(list).await
 }
 
 /// `GET /v1/collections/{id}/tracks/{track}`
@@ -160,8 +166,16 @@ pub async fn track(
     On(collection): On,
     Segments((_, track)): Segments<(String, String)>,
     _: Plain,
-) -> Result<Json<Value>, Problem> {
-    service.blocking(move || collection.track(&track).map(Json)).await
+    headers: HeaderMap,
+) -> Result<Response, Problem> {
+    let tables = collection.drives.as_ref().map(|drives| drives.digest.as_str()).unwrap_or_default();
+    let what = format!("track {tables} {} {track}", collection.id);
+    let make = async {
+        let collection = Arc::clone(&collection);
+        let json = service.reading(move |stop| collection.track(&track, stop)).await?;
+        Ok(Some(Answer::new("application/json", json.to_string())))
+    };
+    service.answers.answer(&headers, &what, make).await
 }
 
 #[cfg(test)]
