@@ -303,6 +303,8 @@ fn val_answers_have_tags_ranges_and_encodings() {
     let beyond = server.get_with(PATCH, &["Range: bytes=99999999-"]);
     assert_eq!((beyond.status, beyond.header("content-type")), (416, Some("application/problem+json")));
     assert_eq!(beyond.header("content-range").unwrap(), format!("bytes */{}", whole.body.len()));
+    // It must not be stored as if it were the answer.
+    assert_eq!((beyond.header("cache-control"), beyond.header("etag")), (Some("no-store"), None));
     let json = server.get_with("/v1/collections", &["Accept-Encoding: gzip"]);
     assert_eq!(json.header("content-encoding"), Some("gzip"));
     packed(&server);
@@ -354,9 +356,13 @@ fn packed(server: &Server) {
     let page = server.get_with("/page.js", &["Accept-Encoding: gzip"]);
     let own = format!("If-None-Match: {}", page.header("etag").unwrap());
     assert_eq!(server.get_with("/page.js", &["Accept-Encoding: gzip", &own]).status, 304);
-    let head = server.send("HEAD", &raw, &[], "");
-    assert_eq!((head.status, head.body.len()), (200, 0));
-    assert_eq!(head.header("content-length").unwrap(), plain.body.len().to_string());
+    // A range is for GET alone.
+    for range in ["", "Range: bytes=0-9", "Range: bytes=99999999-"] {
+        let more: Vec<&str> = Some(range).filter(|range| !range.is_empty()).into_iter().collect();
+        let head = server.send("HEAD", &raw, &more, "");
+        assert_eq!((head.status, head.body.len()), (200, 0), "{range}");
+        assert_eq!(head.header("content-length").unwrap(), plain.body.len().to_string());
+    }
 }
 
 /// Only pages of the named origins may read answers and refusals.

@@ -100,7 +100,7 @@ impl Answers {
         if has_any(headers) {
             return Ok(self.scoped(not_modified(tag)));
         }
-        Ok(self.scoped(fresh(full_or_partial(headers, &tag, answer), &tag)))
+        Ok(self.scoped(fresh(full_or_partial(headers, &tag, answer)?, &tag)))
     }
 
     fn scoped(&self, mut response: Response) -> Response {
@@ -154,7 +154,10 @@ fn fresh(mut response: Response, tag: &str) -> Response {
 }
 
 /// The complete body, or the requested range of it.
-fn full_or_partial(headers: &HeaderMap, tag: &str, answer: Answer) -> Response {
+///
+/// # Errors
+/// A range beyond the end, which must not be stored as if it were the answer.
+fn full_or_partial(headers: &HeaderMap, tag: &str, answer: Answer) -> Result<Response, Problem> {
     let length = answer.body.len();
     // Ranges refer to the uncompressed bytes; the tag of a compressed response does not match them.
     let same = headers.get(header::IF_RANGE).is_none_or(|value| value.as_bytes() == tag.as_bytes());
@@ -174,7 +177,7 @@ fn full_or_partial(headers: &HeaderMap, tag: &str, answer: Answer) -> Response {
             };
             (StatusCode::PARTIAL_CONTENT, [(header::CONTENT_RANGE, place)], part).into_response()
         }
-        Some(None) => return Problem::range(length).into_response(),
+        Some(None) => return Err(Problem::range(length)),
     };
     let own = response.headers_mut();
     own.insert(header::CONTENT_TYPE, HeaderValue::from_static(answer.media));
@@ -184,7 +187,7 @@ fn full_or_partial(headers: &HeaderMap, tag: &str, answer: Answer) -> Response {
     if length > COMPRESSED_MAX {
         response.extensions_mut().insert(SkipCompression);
     }
-    response
+    Ok(response)
 }
 
 /// Parses a single byte range: `None` if the header holds none that we support, `Some(None)` if it starts beyond the end.
@@ -259,7 +262,11 @@ mod tests {
         let keeps = |range: &'static str| {
             let headers = HeaderMap::from_iter([(header::RANGE, HeaderValue::from_static(range))]);
             let answer = Answer::new("text/plain", vec![0; 1 << 20]);
-            full_or_partial(&headers, "\"tag\"", answer).extensions().get::<Retained>().map(|retained| retained.0)
+            full_or_partial(&headers, "\"tag\"", answer)
+                .unwrap()
+                .extensions()
+                .get::<Retained>()
+                .map(|retained| retained.0)
         };
         assert_eq!(keeps("bytes=0-99"), Some(100));
         assert_eq!(keeps("bytes=0-262144"), Some(1 << 20));

@@ -8,7 +8,7 @@ use super::room::Load;
 use super::service::{BODY_BYTES, Service};
 use axum::body::Body;
 use axum::extract::{MatchedPath, Query, Request, State};
-use axum::http::{HeaderName, HeaderValue, StatusCode, header};
+use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use hyper::body::{Body as HttpBody, Bytes, Frame, SizeHint};
@@ -37,17 +37,14 @@ const TAIL: usize = 64 << 10;
 /// Time limit for a client to read its response.
 const SENDING: Duration = Duration::from_secs(600);
 
-/// Admits a request or refuses it with a reason.
-pub async fn guard(State(service): State<Arc<Service>>, request: Request, next: Next) -> Response {
+/// Refuses requests for another host; counts and logs every request.
+pub async fn watch(State(service): State<Arc<Service>>, request: Request, next: Next) -> Response {
     let started = Instant::now();
     let route = request.extensions().get::<MatchedPath>().map_or("none".to_owned(), |p| p.as_str().to_owned());
     let (method, path) = (request.method().clone(), request.uri().path().to_owned());
-    let mut response = match admit(&service, &request) {
+    let mut response = match check_host(&service, &request) {
         Err(problem) => problem.into_response(),
-        Ok(seat) => match tokio::time::timeout(service.limits.request, next.run(request)).await {
-            Ok(response) => send(&service, response, seat),
-            Err(_) => late(&service).into_response(),
-        },
+        Ok(()) => next.run(request).await,
     };
     let headers = response.headers_mut();
     headers.insert(header::X_CONTENT_TYPE_OPTIONS, HeaderValue::from_static("nosniff"));
@@ -58,6 +55,22 @@ pub async fn guard(State(service): State<Arc<Service>>, request: Request, next: 
     service.metrics.count(&route, status, seconds);
     tracing::debug!(%method, path, status, milliseconds = 1e3 * seconds, "request");
     response
+}
+
+/// Admits a request or refuses it with a reason.
+pub async fn guard(State(service): State<Arc<Service>>, mut request: Request, next: Next) -> Response {
+    let seat = match admit(&service, &request) {
+        Err(problem) => return problem.into_response(),
+        Ok(seat) => seat,
+    };
+    // A range is a part of what GET returns; other methods ignore it (RFC 9110, section 14.2).
+    if request.method() != Method::GET {
+        request.headers_mut().remove(header::RANGE);
+    }
+    match tokio::time::timeout(service.limits.request, next.run(request)).await {
+        Ok(response) => send(&service, response, seat),
+        Err(_) => late(&service).into_response(),
+    }
 }
 
 fn late(service: &Service) -> Problem {
@@ -163,7 +176,6 @@ fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Prob
     if length > most {
         return Err(Problem::uri_too_long(format!("the URL has {length} bytes; the limit is {most}")));
     }
-    check_host(service, request)?;
     let announced = request.headers().get(header::CONTENT_LENGTH).and_then(|value| value.to_str().ok());
     if announced.and_then(|text| text.parse::<u64>().ok()).is_some_and(|bytes| bytes > BODY_BYTES as u64) {
         return Err(Problem::too_large(

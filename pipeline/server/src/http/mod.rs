@@ -72,10 +72,12 @@ pub fn router(service: &Arc<Service>, origins: &[HeaderValue]) -> Router {
     for (path, handlers) in ROUTES {
         router = router.route(path, handlers());
     }
-    router
+    for path in page::paths() {
+        router = router.route(&path, get(page::file));
+    }
+    let router = router
         .route("/healthz", get(async || "ok\n"))
-        .route("/", get(page::index))
-        .route("/{*file}", get(page::file))
+        .fallback(async || Problem::not_found("no such page; the API is under /v1"))
         .method_not_allowed_fallback(async |method: Method| {
             Problem::method(format!("method {method} is not allowed here; the `Allow` header lists those that are"))
         })
@@ -83,10 +85,10 @@ pub fn router(service: &Arc<Service>, origins: &[HeaderValue]) -> Router {
         .layer(CompressionLayer::new().compress_when(DefaultPredicate::new().and(is_compressed)))
         .layer(from_fn(guard::tag_encodings))
         .layer(CatchPanicLayer::custom(panicked))
-        .layer(from_fn_with_state(Arc::clone(service), guard::guard))
-        // Outermost, so that pages of other origins can read refusals too.
-        .layer(cors(origins))
-        .with_state(Arc::clone(service))
+        .layer(from_fn_with_state(Arc::clone(service), guard::guard));
+    // Outside the limits, so that pages of other origins can read refusals too.
+    let router = if origins.is_empty() { router } else { router.layer(cors(origins)) };
+    router.layer(from_fn_with_state(Arc::clone(service), guard::watch)).with_state(Arc::clone(service))
 }
 
 /// Whether to compress a response for clients that accept it.

@@ -1,9 +1,9 @@
 //! The map page, whose files are embedded in the program.
 
+use super::Problem;
 use super::answer::{held, not_modified, tag};
-use super::{Problem, Segments};
 use axum::body::Bytes;
-use axum::http::{HeaderMap, HeaderValue, header};
+use axum::http::{HeaderMap, HeaderValue, Uri, header};
 use axum::response::{IntoResponse, Response};
 
 /// Name, media type and bytes of every file.
@@ -15,21 +15,18 @@ const FILES: &[(&str, &str, &[u8])] = &[
     ("licences.txt", "text/plain; charset=utf-8", include_bytes!("../../page/dist/licences.txt")),
 ];
 
-/// `GET /`
-pub async fn index(headers: HeaderMap) -> Response {
-    send("index.html", &headers).unwrap_or_else(IntoResponse::into_response)
+/// Paths of the files, and of the page itself.
+pub fn paths() -> impl Iterator<Item = String> {
+    ["/".to_owned()].into_iter().chain(FILES.iter().map(|(name, ..)| format!("/{name}")))
 }
 
-/// `GET /{file}`
-pub async fn file(Segments(name): Segments<String>, headers: HeaderMap) -> Result<Response, Problem> {
-    send(&name, &headers)
-}
-
-fn send(name: &str, headers: &HeaderMap) -> Result<Response, Problem> {
+/// A file of the page, `GET /` or `GET /{file}`.
+pub async fn file(address: Uri, headers: HeaderMap) -> Result<Response, Problem> {
+    let name = Some(address.path().trim_start_matches('/')).filter(|name| !name.is_empty()).unwrap_or("index.html");
     let found = FILES.iter().find(|(own, ..)| *own == name);
     let (_, media, bytes) = found.ok_or_else(|| Problem::not_found("no such page; the API is under /v1"))?;
     let tag = tag(bytes);
-    if let Some(own) = held(headers, &tag) {
+    if let Some(own) = held(&headers, &tag) {
         return Ok(not_modified(own));
     }
     let mut response = Bytes::from_static(bytes).into_response();

@@ -72,13 +72,28 @@ fn val_requests_are_answered_or_refused() {
         ("GET", "/v1/nothing", 404),
         ("GET", "/v1/collections/none", 404),
         ("GET", "/v1/jobs/1", 404),
+        ("GET", "/page.js", 200),
+        ("GET", "/page.js/", 404),
+        ("GET", "/%ff", 404),
         ("POST", "/v1", 405),
+        ("POST", "/page.js", 405),
+        ("POST", "/v1/nothing", 404),
+        ("POST", "/nothing", 404),
+        // Without --cors, no other method is answered.
+        ("OPTIONS", "/v1", 405),
+        ("OPTIONS", "/nothing", 404),
         ("GET", long.as_str(), 414),
         ("POST", "/v1/jobs", 415),
     ] {
         assert_eq!(status(&service, method, uri, &[]), expected, "{method} {uri}");
     }
     assert_eq!(status(&service, "POST", "/v1/jobs", &[("content-length", "65537")]), 413);
+    assert_eq!(status(&service, "OPTIONS", "/v1", &[("host", "evil.example")]), 421);
+    for (encodings, expected) in
+        [("identity;q=0", 406), ("identity;q=0, br", 406), ("identity;q=0, gzip", 200), ("br", 200)]
+    {
+        assert_eq!(status(&service, "GET", "/v1", &[("accept-encoding", encodings)]), expected, "{encodings}");
+    }
     let response = send(&service, "GET", "/v1/collections/none", &[]);
     assert_eq!(response.headers()[header::CONTENT_TYPE], "application/problem+json");
     assert_eq!(response.headers()[header::X_CONTENT_TYPE_OPTIONS], "nosniff");
