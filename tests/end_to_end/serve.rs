@@ -256,6 +256,13 @@ fn val_too_much_work_is_refused_with_advice() {
     assert_eq!(server.get(&format!("{wide}=10000,1")).status, 200);
     let line = "/v1/collections/world/profile?line=0,0;314572,0&samples=4096&resolution_m=5.12&feature_min_m=0";
     assert!(refused(line).contains("Request a smaller area"));
+    // A line across the whole map has the detail of the map's coarsest level, also with few samples.
+    let across = server.get("/v1/collections/world/profile?line=-80000,0;80000,1&samples=3").json();
+    let level = server.get("/v1/collections/world").json()["tile_grid"]["resolutions_m"][0].clone();
+    assert_eq!(across["resolution_m"], level, "{across}");
+    // A spacing between two lattices is interpolated between the points of the finer one.
+    let between = server.get("/v1/collections/world/point?x=0&y=0&resolution_m=0.03").json();
+    assert_eq!(between["resolution_m"], json!(0.02), "{between}");
     // A single point of the same ground is cheap.
     assert_eq!(server.get("/v1/collections/world/point?x=0&y=0&resolution_m=5.12").status, 200);
 }
@@ -579,6 +586,17 @@ fn val_releases_are_served() {
             assert!(one["x_m"].as_array().unwrap().len() > 1);
             tracks += 1;
         }
+        // Points and profiles are interpolated between the cells of the file, whatever spacing is requested.
+        let [x, y] = [g.x(cols / 2) + 0.3 * g.cell[0], g.y(rows / 2) + 0.4 * g.cell[1]];
+        let height = |path: &str, pointer: &str| {
+            let answer = server.get(&format!("/v1/collections/{id}/{path}")).json();
+            assert_eq!(answer["resolution_m"].as_f64(), collection["cell_m"].as_f64(), "{id} {path}");
+            answer.pointer(pointer).unwrap().clone()
+        };
+        let own = height(&format!("point?x={x}&y={y}"), "/elevation_m");
+        assert_eq!(height(&format!("point?x={x}&y={y}&resolution_m=1000"), "/elevation_m"), own);
+        let line = format!("profile?line={x},{y};{},{}&samples=2", g.x(g.cols - 1), g.y(0));
+        assert_eq!(height(&line, "/elevation_m/0"), own);
         // Beyond its edge there is no data, whatever the sample spacing.
         let [_, _, east, north] = [0, 1, 2, 3].map(|k| collection["bounds_m"][k].as_f64().unwrap());
         for step in [g.cell[0], 4.0 * g.cell[0], 64.0 * g.cell[0]] {

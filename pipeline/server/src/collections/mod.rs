@@ -81,6 +81,15 @@ impl Collection {
         }
     }
 
+    /// Spacing of the samples that values are interpolated between when they are requested `step_m` apart: that of a lattice of a world, that of the
+    /// file of a raster.
+    pub fn between_m(&self, step_m: f64) -> f64 {
+        match &self.ground {
+            Ground::World(world) => world.lattice_m(step_m),
+            Ground::Raster(raster) => raster.grid.finest_m,
+        }
+    }
+
     /// Description for clients.
     pub fn describe(&self) -> Value {
         let [cell_m, spacing_m] = self.spacings_m();

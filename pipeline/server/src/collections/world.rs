@@ -286,9 +286,9 @@ impl World {
         self.spacing_m() * (1u64 << zoom) as f64
     }
 
-    /// Coarsest sample spacing, m.
-    pub fn coarsest_m(&self) -> f64 {
-        self.step_m(self.zoom_max)
+    /// Spacing of the lattice whose points samples `step_m` apart are taken from, m.
+    pub fn lattice_m(&self, step_m: f64) -> f64 {
+        self.step_m(self.zoom_below(step_m))
     }
 
     /// Largest number of doublings with a spacing of at most `step_m`.

@@ -121,14 +121,22 @@ fn operations() -> Vec<Operation> {
     let point = vec![
         required(query("x", number(-1e12, 1e12), "Easting, m")),
         required(query("y", number(-1e12, 1e12), "Northing, m")),
-        query("resolution_m", number(1e-6, 1e9), "Spacing of the samples to interpolate between, m"),
+        query(
+            "resolution_m",
+            number(1e-6, 1e9),
+            "Spacing of the samples to interpolate between, m; a raster has its own",
+        ),
     ];
     let corners = format!("{PLACE}(;{PLACE}){{1,{}}}", CORNERS_MAX - 1);
     let samples = json!({ "type": "integer", "minimum": 2, "maximum": SAMPLES_MAX });
     let profile = vec![
         required(query("line", text(&corners, "0,0;10,5"), "Corners of the line, m")),
         query("samples", samples, "Number of samples along the line"),
-        query("resolution_m", number(1e-6, 1e9), "Spacing of the ground samples to interpolate between, m"),
+        query(
+            "resolution_m",
+            number(1e-6, 1e9),
+            "Spacing of the ground samples to interpolate between, m; a raster has its own",
+        ),
     ];
     let with_selection = |mut parameters: Vec<Value>| {
         parameters.extend(selection());

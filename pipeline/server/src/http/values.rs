@@ -52,7 +52,7 @@ pub async fn point(
         "rock_share": first(&s.rock),
         "albedo": first(&s.albedo),
         "rock_potential": first(&s.rock_potential),
-        "resolution_m": step_m,
+        "resolution_m": collection.between_m(step_m),
     })))
 }
 
@@ -73,11 +73,8 @@ pub async fn profile(
         .ok_or_else(|| Problem::bad_request("`line` has no length; give at least two different positions"))?;
     let apart_m = distances_m[count - 1] / (count - 1) as f64;
     let [_, finest_m] = collection.spacings_m();
-    // A spacing of the lattice, so that slightly different lines share tiles.
-    let coarsest_m = match &collection.ground {
-        Ground::World(world) => world.coarsest_m(),
-        Ground::Raster(_) => f64::INFINITY,
-    };
+    // A spacing of the map, so that slightly different lines share tiles.
+    let coarsest_m = collection.grid().resolution_m(0);
     let unasked_m = || (finest_m * libm::exp2(libm::floor(libm::log2(apart_m / finest_m)).max(0.0))).min(coarsest_m);
     let step_m = query.number("resolution_m", [1e-6, 1e9])?.unwrap_or_else(unasked_m);
     let mut selection = selection(&collection, &query)?;
@@ -96,7 +93,7 @@ pub async fn profile(
         "x_m": places.iter().map(|p| p[0]).collect::<Vec<_>>(),
         "y_m": places.iter().map(|p| p[1]).collect::<Vec<_>>(),
         "elevation_m": heights.into_iter().map(finite).collect::<Vec<_>>(),
-        "resolution_m": step_m,
+        "resolution_m": collection.between_m(step_m),
         "feature_min_m": feature_min_m,
     })))
 }
