@@ -126,7 +126,10 @@ fn val_pixels_are_the_ground_at_their_centres() {
     let described = server.get("/v1/collections/world").json();
     let grid = &described["tile_grid"];
     let [west, north] = [0, 1].map(|k| grid["origin_m"][k].as_f64().unwrap());
-    let offset = server.get("/v1/collections/world/xyz/elevation/tilejson.json").json()["offset_m"].as_f64().unwrap();
+    let tilejson = server.get("/v1/collections/world/xyz/elevation/tilejson.json").json();
+    let offset = tilejson["offset_m"].as_f64().unwrap();
+    // Pixels of 655.36 m where a web-Mercator client expects 611.50 m.
+    assert!((tilejson["vertical_scale"].as_f64().unwrap() - 0.9331).abs() < 1e-4, "{tilejson}");
     for level in [16, 13, 9, 3, 0] {
         let step = grid["resolutions_m"][level].as_f64().unwrap();
         let side = 256.0 * step;

@@ -6,7 +6,7 @@ use super::patch::sun;
 use super::service::{Service, selection};
 use super::{Base, On, Pairs, Plain, Problem, Query, Segments};
 use crate::collections::{Collection, Ground};
-use crate::grid::{TileIndex, WINDOW_TILE, WINDOW_ZOOM, of_web_mercator};
+use crate::grid::{TILE, TileIndex, WINDOW_TILE, WINDOW_ZOOM, of_web_mercator};
 use crate::layers::{ELEVATION_SPAN_M, Layer, STEP_M, Style};
 use axum::Json;
 use axum::extract::State;
@@ -14,6 +14,9 @@ use axum::http::HeaderMap;
 use axum::response::Response;
 use serde_json::{Value, json};
 use std::sync::Arc;
+
+/// Length of the equator that web-Mercator clients assume, m.
+const EQUATOR_M: f64 = 40_075_016.685_578_49;
 
 /// Query parameters of tiles.
 pub const KNOWN: [&str; 4] = ["sun_azimuth_deg", "sun_elevation_deg", "exaggeration", "phenomena"];
@@ -143,7 +146,8 @@ pub async fn tilejson(
         "bounds": window_degrees(&collection),
         "scheme": "xyz",
         "description": "A planar map placed in one tile of the web-Mercator map: distances and areas that a client computes from \
-                        longitude and latitude are meaningless; use `metres_per_pixel`.",
+                        longitude and latitude are meaningless; use `metres_per_pixel`. For true slopes, multiply heights by `vertical_scale`.",
+        "vertical_scale": vertical_scale(collection.grid().resolution_m(0)),
         "metres_per_pixel": (0..collection.grid().levels).map(|l| collection.grid().resolution_m(l)).collect::<Vec<_>>(),
     });
     let (_, middle_m) = heights(&collection);
@@ -160,6 +164,12 @@ pub async fn tilejson(
         json.extend(encoding);
     }
     Ok(Json(json))
+}
+
+/// Factor on heights that makes slopes true in a web-Mercator client: ratio of the distances that the client assumes to the true ones, whose pixels of
+/// level 0 are `resolution_m` wide.
+fn vertical_scale(resolution_m: f64) -> f64 {
+    EQUATOR_M / (TILE << WINDOW_ZOOM) as f64 / resolution_m
 }
 
 /// The finest level of a layer that is offered to web-Mercator clients.
@@ -193,6 +203,13 @@ mod tests {
         for text in ["", "-1", "+1", "1.0", "0x1", " 1", "4294967296"] {
             assert!(integers(["0", text]).is_err(), "{text}");
         }
+    }
+
+    /// Zoom 8 has 65 536 pixels around the equator, each 611.5 m wide.
+    #[test]
+    fn val_slopes_are_true_with_the_vertical_scale() {
+        assert!((vertical_scale(655.36) - 0.933_069).abs() < 1e-6);
+        assert_eq!(vertical_scale(1.0), 2.0 * vertical_scale(2.0));
     }
 
     /// The range of `elevation`, 838.8608 m, is centred on the middle height, to within half a metre.
