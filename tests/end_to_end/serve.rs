@@ -295,6 +295,14 @@ fn val_worlds_with_other_cells_are_distinct() {
     assert_eq!(scale, 200);
     let png = server.get("/v1/collections/world/patch?origin=0,4&size=50,40&format=png&field=albedo");
     assert!(png.header("grid-note").unwrap().starts_with("values are "), "{}", png.head);
+    // An image states its sun, in the answer and in the file.
+    let image =
+        "/v1/collections/world/patch?origin=0,4&size=50,40&field=image&sun_azimuth_deg=100&sun_elevation_deg=20.5";
+    let sun = "sun at azimuth 100 and elevation 20.5 degrees";
+    assert_eq!(server.get(&format!("{image}&format=raw")).header("grid-note"), Some(sun));
+    assert!(String::from_utf8_lossy(&server.get(image).body).contains(sun));
+    let zero = |origin: &str| server.get(&format!("/v1/collections/world/patch?origin={origin}&size=8,8"));
+    assert_eq!(zero("-0,0").header("etag"), zero("0,0").header("etag"));
 }
 
 /// ETags, ranges and encodings; a smooth version of the same ground; four quarter turns give the original.

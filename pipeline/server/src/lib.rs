@@ -74,4 +74,4 @@ pub fn revision() -> String {
 }
 
 /// Version of the response formats; increment it when the output of a layer or a format changes.
-const ANSWERS: u32 = 1;
+const ANSWERS: u32 = 2;

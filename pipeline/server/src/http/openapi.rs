@@ -269,7 +269,7 @@ fn problems(method: &str) -> Vec<(&'static str, &'static str)> {
         ("413", "A limit is exceeded"),
         ("414", "The URL is too long"),
         ("421", "Host not allowed"),
-        ("422", "Beyond the end of the world"),
+        ("422", "Beyond the end of the world, or an image of one row or column"),
         ("429", "The client has too many requests in progress"),
         ("500", "Internal error"),
         ("503", "The server is busy"),

@@ -12,6 +12,7 @@ use axum::response::Response;
 use sastrugi_imaging::{RenderParameters, Scene, Sun, render};
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
+use std::borrow::Cow;
 use std::sync::Arc;
 
 /// Query parameters of patches.
@@ -236,6 +237,9 @@ impl Treatment {
                 Answer::new(media(format), bytes)
             }
         };
+        if self.field == "image" {
+            notes.push(self.sun_words());
+        }
         let place = self.has_place().then(|| format!("{:?},{:?}", g.x(0), g.y(g.rows - 1)));
         let named = [
             ("grid-rows", g.rows.to_string()),
@@ -256,15 +260,20 @@ impl Treatment {
     }
 
     fn kind(&self) -> Values {
-        let unitless =
-            |description: &'static str| Values::Figures { unit: "1".into(), description: description.into() };
+        let unitless = |description: Cow<'static, str>| Values::Figures { unit: "1".into(), description };
         match self.field {
-            "albedo" => unitless("albedo, share of the light that is reflected"),
-            "class" => unitless("share of the cell that rocks cover"),
-            "rock_potential" => unitless("potential rock cover, share of the ground"),
-            "image" => unitless("brightness, I/F"),
+            "albedo" => unitless("albedo, share of the light that is reflected".into()),
+            "class" => unitless("share of the cell that rocks cover".into()),
+            "rock_potential" => unitless("potential rock cover, share of the ground".into()),
+            "image" => unitless(format!("brightness, I/F; {}", self.sun_words()).into()),
             _ => Values::default(),
         }
+    }
+
+    /// Direction of the sun of an image.
+    fn sun_words(&self) -> String {
+        let Sun { azimuth_deg, elevation_deg } = self.sun;
+        format!("sun at azimuth {azimuth_deg} and elevation {elevation_deg} degrees")
     }
 }
 

@@ -69,7 +69,7 @@ impl Query {
     /// Text that is not a finite number within bounds.
     pub fn number(&self, name: &str, [low, high]: [f64; 2]) -> Result<Option<f64>, Problem> {
         let Some(text) = self.text(name) else { return Ok(None) };
-        let value = f64::from_str(text).ok().filter(|v| (low..=high).contains(v));
+        let value = real(text).filter(|v| (low..=high).contains(v));
         value.map(Some).ok_or_else(|| refused(name, text, &format!("a number from {low} to {high}")))
     }
 
@@ -133,9 +133,14 @@ impl Query {
 /// Name of the parameter that carries the token for images, whose requests cannot carry a header.
 pub const TOKEN: &str = "token";
 
+/// A number; -0 is 0, so that the same request has the same tag.
+fn real(text: &str) -> Option<f64> {
+    f64::from_str(text).ok().map(|value| value + 0.0)
+}
+
 fn place(text: &str) -> Option<[f64; 2]> {
     let (a, b) = text.split_once(',')?;
-    let number = |text: &str| f64::from_str(text.trim()).ok().filter(|v| v.abs() <= FARTHEST_M);
+    let number = |text: &str| real(text.trim()).filter(|v| v.abs() <= FARTHEST_M);
     Some([number(a)?, number(b)?])
 }
 
@@ -172,6 +177,9 @@ mod tests {
         assert!(query(&[("y", "1")]).is_err() && query(&[("x", "1"), ("x", "1")]).is_err());
         assert!(query(&[("size", "1,2,3")]).unwrap().pair("size").is_err());
         assert_eq!(query(&[("n", "")]).unwrap().numbers("n").unwrap(), Some(vec![]));
+        let zero = query(&[("x", "-0"), ("size", "-0.0,-0")]).unwrap();
+        let shown = format!("{:?} {:?}", zero.number("x", [-1.0, 1.0]).unwrap(), zero.pair("size").unwrap());
+        assert_eq!(shown, "Some(0.0) Some([0.0, 0.0])");
     }
 
     fn refusal<T: std::fmt::Debug>(result: Result<T, Problem>) -> String {
