@@ -268,6 +268,10 @@ fn val_too_much_work_is_refused_with_advice() {
     assert_eq!(between["resolution_m"], json!(0.02), "{between}");
     // A single point of the same ground is cheap.
     assert_eq!(server.get("/v1/collections/world/point?x=0&y=0&resolution_m=5.12").status, 200);
+    // Only a world on a DEM points to it.
+    let coarse = server.get("/v1/collections/world/point?x=0&y=0&resolution_m=1e9");
+    let detail = coarse.json()["detail"].as_str().unwrap().to_owned();
+    assert!(coarse.status == 400 && detail.contains("at most") && !detail.contains("DEM"), "{detail}");
 }
 
 /// Defaults of a request are part of the cache key of its answer: two files of one world have different answers.
@@ -543,7 +547,15 @@ fn val_jobs_prepare_tiles_in_advance() {
     assert_eq!(server.send("DELETE", "/v1/jobs/2", &[], "").status, 409);
     assert_eq!(order("[0, 0, 1e9, 1e9]").status, 413);
     assert_eq!(order("[5, 0, 1, 1]").status, 400);
-    assert_eq!(server.get("/v1/jobs").json()["jobs"].as_array().unwrap().len(), 2);
+    // A job states what it generates, also what was not requested.
+    let body =
+        "{\"collection\": \"world\", \"bounds_m\": [0, 0, 1, 1], \"phenomena\": [2, 1], \"feature_min_m\": null}";
+    let taken = server.send("POST", "/v1/jobs", &["Content-Type: application/json"], body).json();
+    assert_eq!(
+        (&taken["resolution_m"], &taken["phenomena"], &taken["feature_min_m"]),
+        (&json!(0.02), &json!([2, 1]), &json!(0.0))
+    );
+    assert_eq!(server.get("/v1/jobs").json()["jobs"].as_array().unwrap().len(), 3);
 }
 
 /// The terrains of a release are served with their maps and tracks; their pixels at the finest level are their cells.
@@ -883,7 +895,11 @@ fn val_elaborated_dems_are_served() {
     }
     assert!(server.get(&format!("{c}/point?x=1000&y=2150")).json()["elevation_m"].is_null());
     let coarse = server.get(&format!("{c}/patch?origin=1130,2150&size=5,5&resolution_m=20"));
-    assert_eq!(coarse.status, 400, "{}", coarse.json());
+    assert!(
+        coarse.status == 400 && coarse.json()["detail"].as_str().unwrap().contains("the DEM itself"),
+        "{}",
+        coarse.json()
+    );
     assert_eq!(server.get(&format!("{c}/study?origin=1130,2150&size=5,5")).status, 400);
     // TileJSON offers steps of 4 mm and 10 cm for pixels of suitable size, and fine steps throughout.
     for (layer, maxzoom) in [("terrarium", 8 + 4), ("terrain_rgb", 8 + 4), ("elevation", 8 + 7)] {

@@ -572,8 +572,9 @@ impl World {
         let zoom = self.zoom_below(step_m);
         let own_m = self.step_m(zoom);
         if step_m > 2.0 * own_m {
+            let more = if self.served.dem().is_some() { "; for coarser samples use the DEM itself" } else { "" };
             return Err(Problem::bad_request(format!(
-                "`resolution_m` must be at most {} m, got {step_m} m; for coarser samples use the DEM itself",
+                "`resolution_m` must be at most {} m, got {step_m} m{more}",
                 2.0 * own_m
             )));
         }

@@ -1,6 +1,7 @@
 //! Jobs: tiles of an area, generated in advance.
 
 use super::extract::Body;
+use super::problem::shortened;
 use super::service::Service;
 use super::{Plain, Problem, Segments};
 use crate::collections::Ground;
@@ -11,8 +12,7 @@ use axum::Json;
 use axum::extract::State;
 use axum::http::{StatusCode, header};
 use axum::response::{IntoResponse, Response};
-use serde::Deserialize;
-use serde_json::{Value, json};
+use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::sync::atomic::{AtomicU64, Ordering};
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -30,18 +30,59 @@ const FARTHEST_M: f64 = 1e12;
 const WAIT: Duration = Duration::from_millis(200);
 
 /// Body of a job request.
-#[derive(Clone, Debug, Deserialize)]
-#[serde(deny_unknown_fields)]
+#[derive(Clone, Debug, PartialEq)]
 pub struct Order {
     collection: String,
     /// West, south, east and north, m.
     bounds_m: [f64; 4],
-    #[serde(default)]
     resolution_m: Option<f64>,
-    #[serde(default)]
     phenomena: Option<Vec<usize>>,
-    #[serde(default)]
     feature_min_m: f64,
+}
+
+impl TryFrom<Map<String, Value>> for Order {
+    type Error = Problem;
+
+    /// Members that are null count as absent.
+    fn try_from(mut body: Map<String, Value>) -> Result<Self, Problem> {
+        let mut member = |name: &str| body.remove(name).filter(|value| !value.is_null());
+        let [collection, bounds, resolution, phenomena, feature_min] = MEMBERS.map(&mut member);
+        if let Some(name) = body.keys().next() {
+            let (shown, known) = (shortened(name), MEMBERS.join(", "));
+            return Err(Problem::bad_request(format!("unknown member `{shown}`; a job has {known}")));
+        }
+        let number = |value: &Value| value.as_f64();
+        let collection = collection.as_ref().and_then(Value::as_str).map(str::to_owned);
+        let bounds =
+            bounds.as_ref().and_then(|value| all(value, number)).and_then(|edges| <[f64; 4]>::try_from(edges).ok());
+        Ok(Self {
+            collection: collection.ok_or_else(|| must_be("collection", "the id of a world"))?,
+            bounds_m: bounds.ok_or_else(|| must_be("bounds_m", "four numbers: west, south, east and north, m"))?,
+            resolution_m: given(resolution, number).map_err(|()| must_be("resolution_m", "a number"))?,
+            phenomena: given(phenomena, |value| all(value, |one| usize::try_from(one.as_u64()?).ok()))
+                .map_err(|()| must_be("phenomena", "a list of numbers of processes, such as [1, 3]"))?,
+            feature_min_m: given(feature_min, number)
+                .map_err(|()| must_be("feature_min_m", "a number"))?
+                .unwrap_or(0.0),
+        })
+    }
+}
+
+/// Members of the body of a job request.
+const MEMBERS: [&str; 5] = ["collection", "bounds_m", "resolution_m", "phenomena", "feature_min_m"];
+
+fn must_be(name: &str, right: &str) -> Problem {
+    Problem::bad_request(format!("`{name}` must be {right}"))
+}
+
+/// The elements of a list if all are right.
+fn all<T>(list: &Value, right: impl Fn(&Value) -> Option<T>) -> Option<Vec<T>> {
+    list.as_array()?.iter().map(right).collect()
+}
+
+/// A member that may be absent.
+fn given<T>(value: Option<Value>, right: impl Fn(&Value) -> Option<T>) -> Result<Option<T>, ()> {
+    value.map(|value| right(&value).ok_or(())).transpose()
 }
 
 /// State of a job.
@@ -83,8 +124,8 @@ impl Job {
         };
         json!({
             "id": self.id, "collection": self.order.collection, "bounds_m": self.order.bounds_m,
-            "resolution_m": self.order.resolution_m, "state": state, "tiles": self.tiles,
-            "tiles_made": self.made.load(Ordering::Relaxed), "detail": detail,
+            "resolution_m": self.order.resolution_m, "phenomena": self.order.phenomena, "feature_min_m": self.order.feature_min_m,
+            "state": state, "tiles": self.tiles, "tiles_made": self.made.load(Ordering::Relaxed), "detail": detail,
         })
     }
 
@@ -106,7 +147,9 @@ impl Job {
 
 impl Jobs {
     fn get(&self, id: &str) -> Result<Arc<Job>, Problem> {
-        let found = id.parse().ok().and_then(|id: u64| locked(&self.all).get(&id).cloned());
+        // `+1` and `01` are no numbers of jobs.
+        let number = id.parse().ok().filter(|number: &u64| number.to_string() == id);
+        let found = number.and_then(|number| locked(&self.all).get(&number).cloned());
         found.ok_or_else(|| Problem::not_found("no such job; /v1/jobs lists them"))
     }
 
@@ -197,12 +240,11 @@ impl Area {
 }
 
 /// `POST /v1/jobs`
-pub async fn order(
-    State(service): State<Arc<Service>>,
-    _: Plain,
-    Body(order): Body<Order>,
-) -> Result<Response, Problem> {
+pub async fn order(State(service): State<Arc<Service>>, _: Plain, Body(body): Body) -> Result<Response, Problem> {
+    let mut order = Order::try_from(body)?;
     let area = Area::of(&service, &order)?;
+    // The spacing that is used, also if none was requested.
+    order.resolution_m = Some(area.world.step_m(area.zoom));
     let job = service.jobs.add(order, area.count[0] * area.count[1])?;
     let described = job.describe();
     let place = format!("/v1/jobs/{}", job.id);
@@ -299,5 +341,40 @@ mod tests {
         assert!(all[7].end(Progress::Done) && !all[7].end(Progress::Cancelled));
         assert_eq!(add().unwrap().id, JOBS_MAX as u64 + 1);
         assert!(jobs.get("8").is_err() && jobs.get("9").is_ok() && add().is_err());
+        assert!(["+9", "09", " 9", "9.0", "-9", ""].iter().all(|id| jobs.get(id).is_err()));
+    }
+
+    /// What is wrong is said in the words of the API; null stands for an absent member.
+    #[test]
+    fn val_bodies_of_jobs_are_read() {
+        let order = |members: Value| match members {
+            Value::Object(body) => Order::try_from(body).map_err(|problem| problem.detail().to_owned()),
+            other => panic!("{other}"),
+        };
+        let bounds = json!([0, -1, 2.5, 1]);
+        let least = order(json!({ "collection": "world", "bounds_m": bounds })).unwrap();
+        assert_eq!((least.bounds_m, least.feature_min_m), ([0.0, -1.0, 2.5, 1.0], 0.0));
+        let with = |name: &str, value: Value| order(json!({ "collection": "world", "bounds_m": bounds, name: value }));
+        for name in ["resolution_m", "phenomena", "feature_min_m"] {
+            assert_eq!(with(name, Value::Null), Ok(least.clone()), "{name}");
+        }
+        assert_eq!(with("phenomena", json!([3, 1])).unwrap().phenomena, Some(vec![3, 1]));
+        for (name, value, said) in [
+            ("phenomena", json!([-1]), "`phenomena` must be a list of numbers of processes, such as [1, 3]"),
+            ("phenomena", json!("1"), "`phenomena` must be a list of numbers of processes, such as [1, 3]"),
+            ("bounds_m", json!([0, 0, 1, null]), "`bounds_m` must be four numbers: west, south, east and north, m"),
+            ("bounds_m", json!([0, 0, 1]), "`bounds_m` must be four numbers: west, south, east and north, m"),
+            ("bounds_m", Value::Null, "`bounds_m` must be four numbers: west, south, east and north, m"),
+            ("collection", json!(7), "`collection` must be the id of a world"),
+            ("resolution_m", json!("fine"), "`resolution_m` must be a number"),
+            ("feature_min_m", json!(true), "`feature_min_m` must be a number"),
+            (
+                "zoom",
+                json!(1),
+                "unknown member `zoom`; a job has collection, bounds_m, resolution_m, phenomena, feature_min_m",
+            ),
+        ] {
+            assert_eq!(with(name, value.clone()), Err(said.to_owned()), "{name} {value}");
+        }
     }
 }

@@ -298,7 +298,7 @@ fn order() -> Value {
             },
             "resolution_m": { "type": ["number", "null"], "exclusiveMinimum": 0, "maximum": 1e9 },
             "phenomena": { "type": ["array", "null"], "items": { "type": "integer", "minimum": 1, "maximum": 99 } },
-            "feature_min_m": number(0.0, 1e9),
+            "feature_min_m": { "type": ["number", "null"], "minimum": 0, "maximum": 1e9 },
         },
     })
 }
