@@ -13,7 +13,7 @@ use std::collections::HashMap;
 use std::fs;
 use std::io::{Read, Write};
 use std::path::Path;
-use std::time::Duration;
+use std::time::{Duration, Instant};
 
 const PATCH: &str = "/v1/collections/world/patch?origin=-1,2&size=300,200&resolution_m=0.02";
 const TILES: &str = "/v1/collections/world/styles";
@@ -158,6 +158,62 @@ fn val_pixels_are_the_ground_at_their_centres() {
     }
 }
 
+/// A coarse tile shows the share of rock that a fine patch has on average: rocks narrower than two pixels count, though they are left out of the heights.
+#[test]
+fn val_coarse_tiles_show_the_share_of_rock() {
+    let folder = area();
+    world(folder.path());
+    let server = Server::start(folder.path(), &["world.toml"], &[]);
+    // Without craters, whose rims have more rocks.
+    let phenomena = "phenomena=1,3";
+    let fine = format!(
+        "/v1/collections/world/patch?origin=0,0&size=512,512&resolution_m=0.16&field=class&format=raw&{phenomena}"
+    );
+    let rocks = server.get(&fine).floats();
+    assert!(rocks.iter().all(|rock| [0.0, 1.0].contains(rock)));
+    let mean = rocks.iter().map(|rock| f64::from(*rock)).sum::<f64>() / rocks.len() as f64;
+    // Pixels of 82 m, and rocks of at most 5 m.
+    let tile = server.get(&format!("{TILES}/class/map/tiles/world/3/3/4?{phenomena}"));
+    assert_eq!(tile.status, 200);
+    for [_, _, _, opacity] in rgba(&tile.body) {
+        let share = f64::from(opacity) / 255.0 / 0.85;
+        // The fine patch is 82 m wide, and opacities are steps of 0.005.
+        assert!((share - mean).abs() < 0.08 * mean + 0.003, "{share} {mean}");
+    }
+}
+
+/// Work ends within 50 ms after its last client has left. The best of some trials counts, because other programs may hold the processors.
+#[test]
+fn val_abandoned_work_ends_soon() {
+    let folder = area();
+    world(folder.path());
+    let server = Server::start(folder.path(), &["world.toml", "--threads", "1"], &[]);
+    let mut watch = server.client().unwrap();
+    let mut running = || watch.get("/v1/library").unwrap().json()["running"].as_u64().unwrap();
+    let mut best = Duration::MAX;
+    for k in 0..12 {
+        let mut client = server.client().unwrap();
+        // One tile.
+        let x = f64::from(100 * k) * 256.0 * 2.56;
+        let path = format!("/v1/collections/world/patch?origin={x},0&size=256,256&resolution_m=2.56&format=raw");
+        write!(client.stream(), "GET {path} HTTP/1.1\r\nHost: localhost\r\n\r\n").unwrap();
+        let asked = Instant::now();
+        while running() == 0 {
+            assert!(asked.elapsed() < Duration::from_secs(60), "the window was refused, or done at once");
+            std::thread::sleep(Duration::from_millis(1));
+        }
+        std::thread::sleep(Duration::from_millis(10));
+        assert_eq!(running(), 1, "such a window takes seconds");
+        drop(client);
+        let left = Instant::now();
+        while running() > 0 {
+            std::thread::sleep(Duration::from_micros(200));
+        }
+        best = best.min(left.elapsed());
+    }
+    assert!(best < Duration::from_millis(50), "{best:?}");
+}
+
 fn rgba(png: &[u8]) -> Vec<[u8; 4]> {
     let mut reader = png::Decoder::new(std::io::Cursor::new(png)).read_info().unwrap();
     let mut bytes = vec![0; reader.output_buffer_size().unwrap()];
@@ -204,9 +260,13 @@ fn val_wrong_requests_are_refused() {
         (404, "/%2e%2e/secret.txt".to_owned()),
         (404, "/v1/collections/..%2f..%2fetc%2fpasswd".to_owned()),
         (413, format!("{c}/patch?origin=0,0&size=1000,1000")),
+        // An image may have a quarter of the samples.
+        (413, format!("{c}/patch?origin=0,0&size=159,159&field=image")),
         (414, long),
         (422, format!("{c}/patch?origin=1e14,0&size=5,5&resolution_m=0.005")),
+        (422, format!("{c}/patch?origin=0,0&size=3,1&field=image")),
     ];
+    assert_eq!(server.get(&format!("{c}/patch?origin=0,0&size=158,158&field=image")).status, 200);
     for (status, path) in &cases {
         let answer = server.get(path);
         assert_eq!(answer.status, *status, "{path}: {}", String::from_utf8_lossy(&answer.body));

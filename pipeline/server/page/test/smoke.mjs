@@ -493,6 +493,26 @@ for (const [kind, { collection: ground }] of rides) await check(`the track of a 
   return `${pixels} pixels`;
 });
 
+await check('altered pixels are noticed', async () => {
+  const warning = (one) => one.$eval('#message p', (text) => /alters image pixels/.test(text.textContent));
+  await visit();
+  must(!await warning(page), 'the page warns of pixels that are as they should be');
+  const other = await browser.newPage();
+  try {
+    // As browsers do that protect against fingerprinting.
+    await other.evaluateOnNewDocument(() => {
+      const read = CanvasRenderingContext2D.prototype.getImageData;
+      CanvasRenderingContext2D.prototype.getImageData = function (...box) { const image = read.apply(this, box); image.data[0] ^= 1; return image; };
+    });
+    await other.goto(`${url}/`, { waitUntil: 'load' });
+    await other.evaluate(() => window.sastrugi.ready);
+    must(await warning(other), 'the page does not warn');
+  } finally {
+    await other.close();
+    await page.bringToFront();
+  }
+});
+
 await check('a dense screen gets the next finer level', async () => {
   await page.setViewport({ width: 480, height: 320, deviceScaleFactor: 2 });
   await visit(at(finest * 2));
