@@ -117,17 +117,16 @@ impl Drives {
         let unless_stopped = |cells: [Cell; N]| {
             if stop.load(Ordering::Relaxed) { ControlFlow::Break(()) } else { f(cells) }
         };
+        still_wanted(stop)?;
         let paths = self.paths(table, wanted).map_err(Problem::internal)?;
+        still_wanted(stop)?;
         let files = TableFiles::new(table, paths);
         let files = wanted.iter().fold(files, |files, (column, text)| files?.selecting(column, text));
         files.and_then(|files| files.visit(columns, unless_stopped)).map_err(|error| {
             tracing::warn!(release = %self.release.folder().display(), %error, "cannot read a table");
             Problem::internal(format!("table `{}` of the release cannot be read", table.name))
         })?;
-        if stop.load(Ordering::Relaxed) {
-            return Err(Problem::unavailable("the request was cancelled"));
-        }
-        Ok(())
+        still_wanted(stop)
     }
 
     /// The files of a table, checked; of a table with one file per terrain, only that of the wanted terrain.
@@ -159,6 +158,11 @@ impl Drives {
         })?;
         Ok(has)
     }
+}
+
+/// Ends a request that nobody waits for.
+fn still_wanted(stop: &AtomicBool) -> Result<(), Problem> {
+    if stop.load(Ordering::Relaxed) { Err(Problem::unavailable("the request was cancelled")) } else { Ok(()) }
 }
 
 /// The files of a table that the manifest lists.
