@@ -113,7 +113,7 @@ impl Search<'_> {
 
     fn tables(&self, log_variance: f64) -> Tables {
         let s = self.statistics;
-        let transform = Transform::new(&s.probabilities, &s.heights_m, s.covariance.variance(), log_variance);
+        let transform = Transform::new(&s.probabilities, &s.heights_m, s.cells, s.covariance.variance(), log_variance);
         Tables { log_variance, correlation: transform.normal_correlation(), transform }
     }
 

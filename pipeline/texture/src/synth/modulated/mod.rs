@@ -223,7 +223,8 @@ impl Modulated {
         let torus = torus(lags::reach(&statistics.covariance), shape, range_cells, parameters.periodic);
         check_range(range_m, range_cells, torus, statistics.cell_m)?;
         let variance_m2 = statistics.covariance.variance();
-        let transform = Transform::new(&statistics.probabilities, &statistics.heights_m, variance_m2, log_variance);
+        let Statistics { probabilities, heights_m, cells, .. } = statistics;
+        let transform = Transform::new(probabilities, heights_m, *cells, variance_m2, log_variance);
         let table = transform.normal_correlation();
         let covariance_m2 = spectrum::covariance_on_torus(statistics, torus);
         let made = Self::of_transform(&covariance_m2, [shape, torus], transform, &table, log_variance, range_cells);
