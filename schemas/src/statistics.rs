@@ -53,16 +53,20 @@ pub struct LagCovariances {
 /// Parameters of the amplitude field of a residual that is rough in patches.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Modulation {
-    /// Variance of the logarithm of the amplitude; 0 for a residual that is equally rough everywhere.
+    /// Variance of the logarithm of the amplitude that textures have: the measured one, or the part of it with which their covariance can be kept.
     pub log_variance: f64,
+    /// Measured variance; 0 for a residual that is equally rough everywhere.
+    pub measured_log_variance: f64,
+    /// Its standard error.
+    pub log_variance_error: f64,
     /// Distance over which the correlation of the logarithm falls to 1/e, m.
     pub range_m: f64,
+    /// Number of independent patches that the site holds; 0 if the residual has no differences to measure them by.
+    pub patches: f64,
     /// Lags of the flatness, cells.
     pub lags: Vec<u32>,
     /// Measured flatness `<d^4> / <d^2>^2` of the increments d over each lag, both axes together; 3 for a normal residual.
     pub flatness: Vec<f64>,
-    /// Flatness of the fitted model.
-    pub fitted_flatness: Vec<f64>,
 }
 
 /// Distributions of differences between cells, and joint statistics of the magnitudes of wavelets.
@@ -128,9 +132,7 @@ impl Statistics {
         self.check_quantiles("heights_m", &self.heights_m)?;
         self.covariance.check().map_err(|e| e.within("statistics.covariance"))?;
         self.laplacian.check().map_err(|e| e.within("statistics.laplacian"))?;
-        ParameterError::not_negative("log_variance", self.modulation.log_variance)
-            .and(ParameterError::positive("range_m", self.modulation.range_m))
-            .map_err(|e| e.within("statistics.modulation"))?;
+        self.modulation.check().map_err(|e| e.within("statistics.modulation"))?;
         for difference in &self.wavelets.differences {
             self.check_quantiles("wavelets.differences.quantiles_m", &difference.quantiles_m)?;
             let weights: f64 = difference.stencil.iter().map(|(_, _, weight)| weight * weight).sum();
@@ -210,6 +212,25 @@ impl LagCovariances {
     /// Covariance at lag 0.
     pub fn variance(&self) -> f64 {
         self.values[self.cols.len() - 1]
+    }
+}
+
+impl Modulation {
+    /// Checks parameters read from a file.
+    ///
+    /// # Errors
+    /// A negative variance, error or number; a range that is not positive.
+    pub fn check(&self) -> Result<(), ParameterError> {
+        let Self { log_variance, measured_log_variance, log_variance_error, patches, .. } = *self;
+        for (key, value) in [
+            ("log_variance", log_variance),
+            ("measured_log_variance", measured_log_variance),
+            ("log_variance_error", log_variance_error),
+            ("patches", patches),
+        ] {
+            ParameterError::not_negative(key, value)?;
+        }
+        ParameterError::positive("range_m", self.range_m).map(drop)
     }
 }
 
@@ -295,7 +316,7 @@ mod tests {
     fn val_damaged_sections_are_refused() {
         /// A damaged table, and what damages it.
         type Damage = (&'static str, fn(&mut Statistics));
-        let damages: [Damage; 17] = [
+        let damages: [Damage; 18] = [
             ("statistics.version", |s| s.version = 2),
             ("statistics.cell_m", |s| s.cell_m[1] = 0.0),
             ("statistics.probabilities", |s| s.probabilities[0] = 0.1),
@@ -308,6 +329,7 @@ mod tests {
             ("statistics.covariance.values", |s| s.covariance.values[1] = -1.0),
             ("statistics.laplacian.values", |s| s.laplacian.values.clear()),
             ("statistics.modulation.range_m", |s| s.modulation.range_m = 0.0),
+            ("statistics.modulation.log_variance_error", |s| s.modulation.log_variance_error = -0.1),
             ("statistics.wavelets.differences.quantiles_m", |s| s.wavelets.differences[0].quantiles_m[2] = f64::NAN),
             ("statistics.wavelets.differences.stencil", |s| s.wavelets.differences[0].stencil.clear()),
             ("statistics.wavelets.mean_log", |s| s.wavelets.octaves = 2),

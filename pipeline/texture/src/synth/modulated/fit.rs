@@ -1,42 +1,71 @@
-//! Variance and range of the amplitude from the flatness of increments.
+//! Variance and range of the amplitude from the logarithms of wavelets.
+//!
+//! The residual is mapped to products `y = A G` first, by the quantiles that a log variance v implies ([`transform::quantiles`]): whatever
+//! monotone map the heights went through drops out. Their mixed differences d over blocks of 2 x 2 cells (Haar's diagonal wavelet, 4 x 4 cells in all), which
+//! no slope reaches and white noise little, are normal given A, with a standard deviation that is proportional to A where patches are wider. Hence
+//!
+//! `Cov(ln |d|, ln |d'|) = v rho~(h) + asin^2(r_d(h)) / 2`, `r_d(h) = c_d(h) exp(v (1 - rho(h)))`
+//!
+//! rho~ the correlation of ln A averaged over the cells of d and d', c_d the correlation of d. The second term is exact for normal variables:
+//! a quarter of the sum of `(2 r)^(2 k) / (k^2 C(2 k, k))`, from `<ln x^2 He_2k(x)> = (-1)^(k - 1) 2^k (k - 1)!`. v is the slope of a least-squares fit over all lags but 0,
+//! at the range with the least misfit. The mean that is subtracted is that of a finite site: rho~ is taken less its mean over all pairs of cells.
+//! This v must be the one that y was made with, which a secant iteration finds.
+//!
+//! The standard error counts patches: n = the site's cells over those of `rho^2`, and of the squared correlation of y, whose quantiles are as uncertain;
+//! `sqrt(2 / n) (v + pi^2 / 8 / cells of a patch) / (1 - s)`, s the slope of the iteration.
 
-use super::transform::{NormalCorrelation, Transform};
-use super::{LOG_VARIANCE_MAX, Modulated, RANGE_CELLS_FITTED, RANGE_CELLS_MIN};
-use crate::synth::statistics::{lags, spectrum};
-use sastrugi_numeric::{Geometry, Grid, Streams, sums};
+use super::transform::{self, Transform};
+use super::{ERROR_MAX, LOG_VARIANCE_MAX, Modulated, RANGE_CELLS_FITTED, RANGE_CELLS_MIN};
+use crate::covariance::masked_covariance;
+use crate::synth::statistics::{lags, spectrum, tails};
+use rayon::prelude::*;
+use sastrugi_numeric::{Geometry, Grid, sums};
 use sastrugi_schemas::statistics::{Modulation, Statistics};
+use std::f64::consts::PI;
 
-/// Rows and columns of the fields that are synthesised for a candidate.
-const SIDE: usize = 320;
 /// Longest lag of the flatness, cells.
 const LAG_MAX: usize = 64;
-/// Variances of the logarithm and ranges, cells, of the first candidates, beside 0.
-const LOG_VARIANCES: [f64; 7] = [0.1, 0.25, 0.45, 0.7, 1.0, 1.4, 1.9];
-const RANGES: [f64; 6] = [RANGE_CELLS_MIN, 3.0, 6.0, 12.0, 24.0, RANGE_CELLS_FITTED];
-/// Largest error of the covariance that a candidate may have, as a share of the variance,
-const ERROR_MAX: f64 = 0.05;
-/// and largest variance of its one-cell increments, over the measured one.
+/// Ranges that are tried, in equal steps of their logarithm.
+const RANGES: usize = 64;
+/// Lags of the logarithms reach this share of a side,
+const LAG_SHARE: usize = 3;
+/// and ranges this share.
+const RANGE_SHARE: f64 = 1.0 / 6.0;
+/// Rows and columns of cells that a mixed difference holds.
+const SUPPORT: usize = 4;
+/// Log variance and range, in the longer side of a cell, from which the iteration starts.
+const START: [f64; 2] = [0.3, 8.0];
+/// Most steps of the iteration.
+const STEPS: usize = 8;
+/// Slopes of the iteration that are believed.
+const SLOPES: [f64; 2] = [-0.5, 0.75];
+/// Change of the log variance at which the iteration ends: absolute, and relative.
+const TOLERANCES: [f64; 2] = [2e-3, 5e-3];
+/// Smallest magnitude of a difference whose logarithm is told apart, over the mean magnitude.
+const FLOOR: f64 = 1e-3;
+/// Rows and columns of the torus on which the error of the covariance is foreseen.
+const SIDE: usize = 320;
+/// Largest variance of the one-cell increments of a texture, over the measured one.
 const INCREMENT_RATIO_MAX: f64 = 1.1;
-/// Rounds of refinement: each moves to the best neighbour, or halves the steps.
-const ROUNDS: usize = 5;
-/// First steps of the refinement: of the variance, and of the logarithm of the range.
-const STEPS: [f64; 2] = [0.12, 0.35];
+/// Bisections of the log variance that keeps the covariance.
+const BISECTIONS: usize = 6;
 
-/// The amplitude of a residual whose heights, probabilities and covariance `statistics` holds already.
+/// The amplitude of a residual whose heights and covariance `statistics` holds already.
 pub fn measure(residual: &Grid, statistics: &Statistics) -> Modulation {
     let longest = lags::reach(&statistics.covariance).into_iter().min().unwrap_or(1).clamp(1, LAG_MAX);
     let octaves = std::iter::successors(Some(1_usize), |lag| Some(lag * 2)).take_while(|lag| *lag <= longest);
     let measured: Vec<(usize, f64)> =
         octaves.map(|lag| (lag, flatness_at(residual, lag))).take_while(|(_, f)| f.is_finite() && *f > 0.0).collect();
-    let covariance_m2 = spectrum::covariance_on_torus(statistics, [SIDE; 2]);
-    let search = Search { statistics, covariance_m2: &covariance_m2, measured: &measured };
-    let best = search.best();
+    let site = Site { residual, statistics };
+    let found = site.solved();
     Modulation {
-        log_variance: best.log_variance,
-        range_m: best.range * search.unit_m(),
+        log_variance: site.keeping_covariance(found.log_variance, found.range),
+        measured_log_variance: found.log_variance,
+        log_variance_error: found.error,
+        range_m: found.range * site.unit_m(),
+        patches: found.patches,
         lags: measured.iter().map(|(lag, _)| *lag as u32).collect(),
         flatness: measured.iter().map(|(_, flatness)| *flatness).collect(),
-        fitted_flatness: best.flatness,
     }
 }
 
@@ -79,104 +108,247 @@ pub fn flatness_at(z: &Grid, lag: usize) -> f64 {
     fourth / (second * second)
 }
 
-/// A variance and a range, and what they give.
-#[derive(Clone)]
-struct Candidate {
+/// A residual and its statistics.
+struct Site<'a> {
+    residual: &'a Grid,
+    statistics: &'a Statistics,
+}
+
+/// An amplitude, and how well it is known.
+struct Found {
     log_variance: f64,
     /// Range in the longer side of a cell.
     range: f64,
-    flatness: Vec<f64>,
-    /// Sum of squared differences of the logarithms of the flatness.
-    misfit: f64,
+    /// Standard error of the log variance.
+    error: f64,
+    /// Number of independent patches that the site holds.
+    patches: f64,
 }
 
-/// What all candidates with a variance of the logarithm share.
-struct Tables {
+/// A least-squares fit to the covariance of logarithms.
+struct Step {
     log_variance: f64,
-    transform: Transform,
-    correlation: NormalCorrelation,
+    range: f64,
+    /// Mean of the squared correlation of ln A over all pairs of cells.
+    patch_share: f64,
 }
 
-struct Search<'a> {
-    statistics: &'a Statistics,
-    /// Covariance on the torus of the candidates, m2.
-    covariance_m2: &'a [f64],
-    /// Lags in cells, and the flatness.
-    measured: &'a [(usize, f64)],
+/// A lag and what is measured at it.
+struct Lag {
+    /// Rows and columns, without sign.
+    at: [usize; 2],
+    /// Pairs of cells at this lag and at its opposite.
+    pairs: f64,
+    /// Covariance of the logarithms.
+    logs: f64,
+    /// Correlation of the mixed differences.
+    differences: f64,
 }
 
-impl Search<'_> {
+impl Site<'_> {
     /// The longer side of a cell, m.
     fn unit_m(&self) -> f64 {
         self.statistics.cell_m[0].max(self.statistics.cell_m[1])
     }
 
-    fn tables(&self, log_variance: f64) -> Tables {
-        let s = self.statistics;
-        let transform = Transform::new(&s.probabilities, &s.heights_m, s.cells, s.covariance.variance(), log_variance);
-        Tables { log_variance, correlation: transform.normal_correlation(), transform }
-    }
-
-    fn candidate(&self, tables: &Tables, range: f64) -> Candidate {
+    /// A range in the longer side of a cell as cells along columns and along rows.
+    fn range_cells(&self, range: f64) -> [f64; 2] {
         let [dx, dy] = self.statistics.cell_m;
-        let range_cells = [dy, dx].map(|side| range * self.unit_m() / side);
-        let Tables { log_variance, transform, correlation } = tables;
-        let shapes = [[SIDE; 2]; 2];
-        let made = Modulated::of_transform(
-            self.covariance_m2,
-            shapes,
-            transform.clone(),
-            correlation,
-            *log_variance,
-            range_cells,
-        );
-        // The same random numbers for every candidate, so that only the parameters differ.
-        let heights_m = made.make(&Streams::for_seed(0, "modulation-fit"));
-        let field = Grid::new(Geometry::square(SIDE, SIDE, 1.0), heights_m);
-        let flatness: Vec<f64> = self.measured.iter().map(|(lag, _)| flatness_at(&field, *lag)).collect();
-        let off = |(made, (_, wanted)): (&f64, &(usize, f64))| libm::log(made / wanted);
-        let keeps_covariance =
-            made.covariance_error() <= ERROR_MAX && made.increment_ratio(self.covariance_m2) <= INCREMENT_RATIO_MAX;
-        let misfit = match keeps_covariance {
-            true => flatness.iter().zip(self.measured).map(off).map(|d| d * d).sum(),
-            false => f64::INFINITY,
-        };
-        Candidate { log_variance: *log_variance, range, flatness, misfit }
+        [dy, dx].map(|side| range * self.unit_m() / side)
     }
 
-    /// The best candidate: of a grid, then of its neighbourhood.
-    fn best(&self) -> Candidate {
-        let mut best = self.candidate(&self.tables(0.0), RANGES[0]);
-        for log_variance in LOG_VARIANCES {
-            let tables = self.tables(log_variance);
-            best = RANGES.iter().map(|&range| self.candidate(&tables, range)).fold(best, better);
-        }
-        let mut steps = STEPS;
-        for _ in 0..ROUNDS {
-            let next = self.around(&best, steps).into_iter().fold(best.clone(), better);
-            if next.misfit == best.misfit {
-                steps = steps.map(|step| 0.5 * step);
+    /// Largest lags, rows and columns, cells.
+    fn reach(&self) -> [usize; 2] {
+        let longest = self.range_cells(RANGE_CELLS_FITTED);
+        let sides = [self.residual.rows(), self.residual.cols()];
+        [0, 1].map(|axis| (longest[axis].ceil() as usize).min(sides[axis] / LAG_SHARE).max(1))
+    }
+
+    /// Ranges that the site may show.
+    fn ranges(&self) -> Vec<f64> {
+        let [dx, dy] = self.statistics.cell_m;
+        let side = (self.residual.rows() as f64 * dy).min(self.residual.cols() as f64 * dx) / self.unit_m();
+        let longest = (RANGE_SHARE * side).clamp(RANGE_CELLS_MIN, RANGE_CELLS_FITTED);
+        let step = libm::log(longest / RANGE_CELLS_MIN) / (RANGES - 1) as f64;
+        (0..RANGES).map(|k| RANGE_CELLS_MIN * libm::exp(step * k as f64)).collect()
+    }
+
+    /// The log variance that is found in the products that it implies.
+    fn solved(&self) -> Found {
+        self.iterated().unwrap_or(Found { log_variance: 0.0, range: RANGE_CELLS_MIN, error: 0.0, patches: 0.0 })
+    }
+
+    /// The same; `None` if the residual has no mixed differences, or none but 0.
+    fn iterated(&self) -> Option<Found> {
+        let [mut before, range] = START;
+        let mut step = self.step(before, range)?;
+        let (mut found_before, mut now, mut slope) = (step.log_variance, step.log_variance, 0.0);
+        for _ in 0..STEPS {
+            step = self.step(now, step.range)?;
+            if (now - before).abs() > 1e-9 {
+                slope = ((step.log_variance - found_before) / (now - before)).clamp(SLOPES[0], SLOPES[1]);
             }
-            best = next;
+            let next = (now + (step.log_variance - now) / (1.0 - slope)).clamp(0.0, LOG_VARIANCE_MAX);
+            (before, found_before) = (now, step.log_variance);
+            let change = (next - now).abs();
+            now = next;
+            if change < TOLERANCES[0] + TOLERANCES[1] * now {
+                break;
+            }
         }
-        best
+        let shares = step.patch_share + share_of_heights(&self.products(now), self.reach());
+        let [down, across] = self.range_cells(step.range);
+        let own_noise = PI * PI / 8.0 / (0.5 * PI * down * across);
+        Some(Found {
+            log_variance: now,
+            range: step.range,
+            error: (2.0 * shares).sqrt() * (now + own_noise) / (1.0 - slope),
+            patches: 1.0 / step.patch_share,
+        })
     }
 
-    /// Four neighbours of a candidate: smaller and larger variances, shorter and longer ranges.
-    fn around(&self, centre: &Candidate, [vary, stretch]: [f64; 2]) -> [Candidate; 4] {
-        let [below, here, above] =
-            [-vary, 0.0, vary].map(|by| self.tables((centre.log_variance + by).clamp(0.0, LOG_VARIANCE_MAX)));
-        let range = |by: f64| (centre.range * libm::exp(by)).clamp(RANGE_CELLS_MIN, RANGES[RANGES.len() - 1]);
-        [
-            self.candidate(&below, centre.range),
-            self.candidate(&above, centre.range),
-            self.candidate(&here, range(-stretch)),
-            self.candidate(&here, range(stretch)),
-        ]
+    /// The residual as products `A G`.
+    fn products(&self, log_variance: f64) -> Grid {
+        let Statistics { probabilities, heights_m, cells, .. } = self.statistics;
+        let (from, to) = distinct(heights_m, &transform::quantiles(probabilities, *cells, log_variance));
+        self.residual.map(|z| if z.is_finite() { tails::interpolated(&from, &to, z) } else { f64::NAN })
+    }
+
+    /// The amplitude in the products that a log variance implies; the range is that of the correlation between differences.
+    fn step(&self, log_variance: f64, range: f64) -> Option<Step> {
+        let differences = mixed_differences(&self.products(log_variance));
+        let lags = measured_lags(&differences, self.reach())?;
+        let [down, across] = self.lines(range, |line, k| line(k));
+        let wanted: Vec<f64> = lags
+            .iter()
+            .map(|lag| {
+                let rho = down[lag.at[0]] * across[lag.at[1]];
+                let r = (lag.differences * libm::exp(log_variance * (1.0 - rho))).clamp(-1.0, 1.0);
+                lag.logs - 0.5 * libm::asin(r) * libm::asin(r)
+            })
+            .collect();
+        let fits = self.ranges().into_iter().map(|range| self.at_range(&lags, &wanted, range));
+        let (_, log_variance, range) = fits.reduce(|best, next| if next.0 < best.0 { next } else { best })?;
+        let squared = self.lines(range / 2f64.sqrt(), |line, k| line(k));
+        let log_variance = log_variance.min(LOG_VARIANCE_MAX);
+        Some(Step { log_variance, range, patch_share: share(&lags, &squared) })
+    }
+
+    /// Misfit and log variance of a range, and the range.
+    fn at_range(&self, lags: &[Lag], wanted: &[f64], range: f64) -> (f64, f64, f64) {
+        let mean = share(lags, &self.lines(range, |line, k| line(k)));
+        // Two differences hold each other's cells at these distances, in rows and in columns.
+        let [down, across] = self.lines(range, |line, k| {
+            let pair = |apart: f64| line(k - apart) + line(k + apart);
+            (4.0 * line(k) + 3.0 * pair(1.0) + 2.0 * pair(2.0) + pair(3.0)) / 16.0
+        });
+        let [gg, ge, ee] = lags.iter().zip(wanted).skip(1).fold([0.0; 3], |[gg, ge, ee], (lag, e)| {
+            let g = down[lag.at[0]] * across[lag.at[1]] - mean;
+            [gg + g * g, ge + g * e, ee + e * e]
+        });
+        let log_variance = if gg > 0.0 { (ge / gg).max(0.0) } else { 0.0 };
+        (ee - log_variance * ge, log_variance, range)
+    }
+
+    /// A function of the correlation of ln A along columns and along rows, at each lag up to the largest.
+    fn lines(&self, range: f64, f: impl Fn(&dyn Fn(f64) -> f64, f64) -> f64) -> [Vec<f64>; 2] {
+        let (ranges, reach) = (self.range_cells(range), self.reach());
+        [0, 1].map(|axis| {
+            let line = |k: f64| libm::exp(-(k / ranges[axis]) * (k / ranges[axis]));
+            (0..=reach[axis]).map(|k| f(&line, k as f64)).collect()
+        })
+    }
+
+    /// A log variance, or the part of it with which the covariance of a texture can be kept.
+    fn keeping_covariance(&self, log_variance: f64, range: f64) -> f64 {
+        let s = self.statistics;
+        let covariance_m2 = spectrum::covariance_on_torus(s, [SIDE; 2]);
+        let keeps = |log_variance: f64| {
+            let variance_m2 = s.covariance.variance();
+            let transform = Transform::new(&s.probabilities, &s.heights_m, s.cells, variance_m2, log_variance);
+            let table = transform.normal_correlation();
+            let shapes = [[SIDE; 2]; 2];
+            let range_cells = self.range_cells(range);
+            let made = Modulated::of_transform(&covariance_m2, shapes, transform, &table, log_variance, range_cells);
+            made.covariance_error() <= ERROR_MAX && made.increment_ratio(&covariance_m2) <= INCREMENT_RATIO_MAX
+        };
+        if log_variance == 0.0 || keeps(log_variance) {
+            return log_variance;
+        }
+        let halved = (0..BISECTIONS).fold([0.0, log_variance], |[low, high], _| {
+            let middle = 0.5 * (low + high);
+            if keeps(middle) { [middle, high] } else { [low, middle] }
+        });
+        halved[0]
     }
 }
 
-/// The candidate with the smaller misfit; the first if equal.
-fn better(a: Candidate, b: Candidate) -> Candidate {
-    if b.misfit < a.misfit { b } else { a }
+/// Distinct heights and the mean product of each.
+fn distinct(heights_m: &[f64], products: &[f64]) -> (Vec<f64>, Vec<f64>) {
+    let pairs: Vec<(f64, f64)> = heights_m.iter().copied().zip(products.iter().copied()).collect();
+    let mean = |same: &[(f64, f64)]| (same[0].0, sums::mean(&same.iter().map(|(_, y)| *y).collect::<Vec<f64>>()));
+    pairs.chunk_by(|a, b| a.0 == b.0).map(mean).unzip()
+}
+
+/// Haar's diagonal wavelet of 4 x 4 cells: the mixed difference of four blocks of 2 x 2 cells; NaN around cells without data. At least 4 x 4 cells.
+pub(super) fn mixed_differences(y: &Grid) -> Grid {
+    let geometry = Geometry { rows: y.rows() + 1 - SUPPORT, cols: y.cols() + 1 - SUPPORT, ..y.geometry };
+    let line = |r: usize| {
+        let [a, b, c, d] = [0, 1, 2, 3].map(|k| y.row(r + k));
+        let down: Vec<f64> = (0..y.cols()).map(|k| (a[k] + b[k]) - (c[k] + d[k])).collect();
+        (0..geometry.cols).map(move |k| (down[k] + down[k + 1]) - (down[k + 2] + down[k + 3]))
+    };
+    Grid::new(geometry, (0..geometry.rows).into_par_iter().flat_map_iter(line).collect())
+}
+
+/// Logarithms of magnitudes about their mean; `None` if all are 0 or there are none.
+fn logarithms(differences: &Grid) -> Option<Grid> {
+    let mean_of = |values: &Grid| sums::mean(&sums::finite(&values.values));
+    let floor = FLOOR * mean_of(&differences.map(f64::abs));
+    if floor.is_nan() || floor == 0.0 {
+        return None;
+    }
+    let logs = differences.map(|d| if d.is_finite() { libm::log(d.abs().max(floor)) } else { f64::NAN });
+    let mean = mean_of(&logs);
+    Some(logs.map(|v| v - mean))
+}
+
+/// Covariances of logarithms and of differences at half of all lags, the first of which is 0.
+fn measured_lags(differences: &Grid, reach: [usize; 2]) -> Option<Vec<Lag>> {
+    let logs = logarithms(differences)?;
+    let [logs, differences] = [&logs, differences].map(|grid| masked_covariance(&grid.values, grid.cols(), reach));
+    let variance = differences.covariance(0, 0)?;
+    let at = |(row, col): (isize, isize)| {
+        let (pairs, sum) = logs.at(row, col).filter(|(pairs, _)| *pairs > 0)?;
+        Some(Lag {
+            at: [row.unsigned_abs(), col.unsigned_abs()],
+            pairs: both_ways((row, col)) * pairs as f64,
+            logs: sum / pairs as f64,
+            differences: differences.covariance(row, col)? / variance,
+        })
+    };
+    Some(logs.lags().filter_map(at).collect())
+}
+
+/// A lag and its opposite; one at lag 0.
+fn both_ways(lag: (isize, isize)) -> f64 {
+    if lag == (0, 0) { 1.0 } else { 2.0 }
+}
+
+/// Mean of a correlation over all pairs of cells; it is 0 beyond the lags.
+fn share(lags: &[Lag], [down, across]: &[Vec<f64>; 2]) -> f64 {
+    let cells = lags[0].pairs;
+    lags.iter().map(|lag| lag.pairs * down[lag.at[0]] * across[lag.at[1]]).sum::<f64>() / (cells * cells)
+}
+
+/// Mean of the squared correlation of products over all pairs of cells.
+fn share_of_heights(products: &Grid, reach: [usize; 2]) -> f64 {
+    let found = masked_covariance(&products.values, products.cols(), reach);
+    let Some((cells, squares)) = found.at(0, 0) else { return 0.0 };
+    let of_lag = |(row, col): (isize, isize)| {
+        let (pairs, sum) = found.at(row, col).filter(|(pairs, _)| *pairs > 0)?;
+        let correlation = sum / pairs as f64 / (squares / cells as f64);
+        Some(both_ways((row, col)) * pairs as f64 * correlation * correlation)
+    };
+    found.lags().filter_map(of_lag).sum::<f64>() / (cells as f64 * cells as f64)
 }

@@ -4,7 +4,7 @@
 //! [`super::modulated`] and [`super::wavelet_statistics`] need, so that the DEM itself need not be published with a fit. Each statistic is a
 //! mean over cells, or pairs and groups of cells, that all have data.
 //!
-//! Cost: one masked covariance; for each octave of wavelets eight transforms; some 15 sorts; about 60 fields of 320 x 320 cells for the
+//! Cost: one masked covariance; for each octave of wavelets eight transforms; some 15 sorts; about ten masked covariances for the
 //! modulation: a few seconds for 1024 x 1024 cells on one core. Memory: 180 bytes per cell, on any number of threads.
 
 pub mod lags;
