@@ -182,8 +182,8 @@ fn val_addresses_are_checked_first() {
         (&["-o", "a", "--cache", "s3://b/../c"], "expected s3://bucket"),
         (&["-o", "s3://b/part-1", "--shard", "1/2"], "a shard is a folder"),
         (&["-o", "gs://b/c"], "give a folder, or s3://bucket/prefix"),
-        (&["-o", "a", "--work", "s3://b/c"], "give a path on this machine"),
-        (&["-o", "s3://b/c", "--work", "gs://b"], "give a path on this machine"),
+        (&["-o", "a", "--work", "s3://b/c"], "must be a path on this machine"),
+        (&["-o", "s3://b/c", "--work", "gs://b"], "must be a path on this machine"),
         (&["-o", "a", "--cache", "gs://b/c"], "give a folder, or s3://bucket/prefix"),
         (&["-o", "a", "--cache", "S3://b/c"], "give a folder, or s3://bucket/prefix"),
         (&["-o", "a", "--cache", "s3:/bucket"], "give a folder, or s3://bucket/prefix"),
@@ -212,7 +212,7 @@ fn val_addresses_are_checked_first() {
         &["analyze", "a.mcap", "-o", "gs://b/logs.parquet"],
     ] {
         let call = called(Command::new(program()).args(arguments).current_dir(path));
-        let says = call.stderr.contains("give a path on this machine") || call.stderr.contains("give a folder, or s3");
+        let says = call.stderr.contains("a path on this machine") || call.stderr.contains("give a folder, or s3");
         assert!(call.code == 2 && says, "{arguments:?}: {} {}", call.code, call.stderr);
     }
     assert_eq!(fs::read_dir(path).unwrap().count(), 2);

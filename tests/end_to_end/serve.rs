@@ -301,7 +301,9 @@ fn val_wrong_requests_are_refused() {
 fn val_too_much_work_is_refused_with_advice() {
     let folder = area();
     world(folder.path());
-    let server = Server::start(folder.path(), &["world.toml"], &[]);
+    let fine = "kind = \"planetary\"\nseed = 11\nsize_px = [30, 20]\ncell_m = 0.0001\nbasic_spacing_m = 0.0001\nprocesses = [{ kind = \"texture\" }]\n";
+    write(folder.path(), "fine.toml", fine);
+    let server = Server::start(folder.path(), &["world.toml", "fine.toml"], &[]);
     let refused = |path: &str| {
         let answer = server.get(path);
         let detail = answer.json()["detail"].as_str().unwrap().to_owned();
@@ -328,8 +330,8 @@ fn val_too_much_work_is_refused_with_advice() {
     assert_eq!(between["resolution_m"], json!(0.02), "{between}");
     // A single point of the same ground is cheap.
     assert_eq!(server.get("/v1/collections/world/point?x=0&y=0&resolution_m=5.12").status, 200);
-    // Only a world on a DEM points to it.
-    let coarse = server.get("/v1/collections/world/point?x=0&y=0&resolution_m=1e9");
+    // Only a world on a DEM points to it. The coarsest lattice of a world has 2^40 times its basic spacing.
+    let coarse = server.get("/v1/collections/fine/point?x=0&y=0&resolution_m=1e9");
     let detail = coarse.json()["detail"].as_str().unwrap().to_owned();
     assert!(coarse.status == 400 && detail.contains("at most") && !detail.contains("DEM"), "{detail}");
 }
