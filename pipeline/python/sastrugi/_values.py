@@ -54,7 +54,9 @@ def heights(values: Any) -> npt.NDArray[np.float64]:
         raise SastrugiError(f"heights must be an array (rows, columns), got {found.ndim} dimensions", USAGE)
     # Masked arrays have it.
     filled = getattr(found, "filled", None)
-    return np.asarray(found if filled is None else filled(np.nan))
+    plain = np.asarray(found if filled is None else filled(np.nan))
+    # The Rust side counts strides in whole elements. Those of a field of packed records are not: it would read other bytes.
+    return plain if plain.flags.aligned else plain.copy()
 
 
 def _shown(value: Any) -> str:

@@ -53,6 +53,19 @@ def test_arrays_of_any_layout(tmp_path):
         assert np.array_equal(np.load(tmp_path / f"{name}.npy"), array), name
 
 
+def test_arrays_of_any_memory(tmp_path):
+    """A field of packed records, as tables of points are read, values at odd addresses, and those of other machines."""
+    values = np.arange(12.0).reshape(3, 4)
+    records = np.zeros((3, 4), dtype=[("z", "<f8"), ("class", "<i4")])
+    records["z"] = values
+    odd = np.frombuffer(b"x" + values.tobytes(), dtype="<f8", offset=1).reshape(3, 4)
+    assert records["z"].strides == (48, 12) and not odd.flags.aligned
+    for name, array in {"field": records["z"], "odd": odd, "big-endian": values.astype(">f8"), "single": values.astype("f4")}.items():
+        dem = Heightfield(array, cell=1.0)
+        dem.save(tmp_path / f"{name}.npy")
+        assert np.array_equal(dem.values, values) and np.array_equal(np.load(tmp_path / f"{name}.npy"), values), name
+
+
 def test_masks_are_holes(tmp_path):
     """Of a masked array, as rasters are read elsewhere, the hidden cells are holes, whatever lies under the mask."""
     array = np.ma.masked_equal(np.array([[1, -9999], [3, 4]], dtype=np.int32), -9999)
