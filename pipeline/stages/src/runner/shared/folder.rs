@@ -165,7 +165,10 @@ impl Shared for Folder {
     }
 
     fn mark_used(&self, name: &str) {
-        // Refused on a cache that is only read, and for the files of other users: they age from their publication.
+        if self.is_read_only {
+            return;
+        }
+        // Refused for the files of other users: they age from their publication.
         let _ = File::open(self.root.join(name).join(RECORD)).and_then(|file| file.set_modified(SystemTime::now()));
     }
 

@@ -53,7 +53,7 @@ pub trait Shared: Debug + Send + Sync {
     /// The place cannot be written to; a result that changed after it was written, which is removed.
     fn publish(&self, name: &str, record: &Record, folder: &Path) -> Result<bool, Error>;
 
-    /// Notes that an entry was used, where that is cheap.
+    /// Notes that an entry was used, where that is cheap and the place is not only read.
     fn mark_used(&self, name: &str) {
         let _ = name;
     }

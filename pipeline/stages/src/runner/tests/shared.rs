@@ -152,6 +152,10 @@ fn val_a_cache_can_be_only_read() {
     run_fresh(diamond, shared.path());
     fs::write(entry(shared.path(), "b").join(FILE), "b < A").unwrap();
     fs::remove_dir_all(entry(shared.path(), "c")).unwrap();
+    let used = || fs::metadata(entry(shared.path(), "a").join("record.json")).unwrap().modified().unwrap();
+    let record = fs::File::open(entry(shared.path(), "a").join("record.json")).unwrap();
+    record.set_modified(SystemTime::now() - hours(50)).unwrap();
+    let before = used();
     let area = Area::new();
     let place = Folder::open(shared.path(), true).unwrap();
     let (graph, cache) = (diamond(&area), area.cache().sharing(Some(Sharing::new(Box::new(place)))));
@@ -160,6 +164,7 @@ fn val_a_cache_can_be_only_read() {
     assert_eq!((area.ran(), tally.read_only), (vec!["b".to_owned(), "c".to_owned()], true));
     assert_eq!((tally.fetched, tally.published, tally.problems), (2, 0, BTreeSet::new()));
     assert_eq!(fs::read_to_string(entry(shared.path(), "b").join(FILE)).unwrap(), "b < A");
+    assert_eq!(used(), before, "an entry that was read keeps its age");
     assert_eq!(Folder::open(shared.path(), true).unwrap().list().unwrap().len(), 3);
 }
 
