@@ -1,8 +1,9 @@
 //! Releases in an object store, `s3://bucket/prefix`.
 //!
-//! A release is assembled in the work area and then uploaded: its content first, then the checksums, the manifest last. Without a manifest
-//! there is no release, so an interrupted upload never looks like one; the next upload resumes it. Nothing that exists is overwritten:
-//! objects with the same bytes are kept, others are refused.
+//! A release is assembled in the work area and then uploaded: its checksums first, which no other release has, then its content, the manifest
+//! last. Checksums and manifest are created only if they do not exist, so two releases never mix: whoever created the checksums has the address.
+//! Without a manifest there is no release, so an interrupted upload never looks like one; the next upload resumes it. Nothing that exists is
+//! overwritten: objects with the same bytes are kept, others are refused.
 
 use crate::error::Error;
 use crate::runner::cache::Cache;
@@ -137,20 +138,32 @@ pub fn upload(release: &Release, bucket: &Bucket, progress: &dyn Progress) -> Re
     let total = artifacts.iter().map(|artifact| artifact.bytes).sum();
     let done = AtomicU64::new(0);
     progress.copied(0, total);
+    let sums = release.path(SUMS);
+    claim(bucket, SUMS, &sums, &sha256(&sums)?)?;
     artifacts.par_iter().try_for_each(|artifact| {
         create(bucket, &artifact.path, &release.path(&artifact.path), &artifact.sha256)?;
         let before = done.fetch_add(artifact.bytes, Ordering::Relaxed);
         progress.copied(before + artifact.bytes, total);
         Ok::<(), Error>(())
     })?;
-    let sums = release.path(SUMS);
-    create(bucket, SUMS, &sums, &sha256(&sums)?)?;
-    create(bucket, MANIFEST, &manifest, &manifest_sha256)
+    claim(bucket, MANIFEST, &manifest, &manifest_sha256)
 }
 
 /// Creates an object, or finds it with the same bytes.
 fn create(bucket: &Bucket, name: &str, path: &Path, sha256: &str) -> Result<(), Error> {
-    if bucket.create_from(name, path)? || bucket.sha256(name)?.is_some_and(|there| there == sha256) {
+    let is_created = bucket.create_from(name, path)?;
+    created_or_same(bucket, name, is_created, sha256)
+}
+
+/// The same in one request, also for a large file: of two that create it at the same time, the second is refused.
+fn claim(bucket: &Bucket, name: &str, path: &Path, sha256: &str) -> Result<(), Error> {
+    let bytes = file::read(path).map_err(|e| Error::at(path, e))?;
+    let is_created = bucket.create(name, &bytes)?;
+    created_or_same(bucket, name, is_created, sha256)
+}
+
+fn created_or_same(bucket: &Bucket, name: &str, is_created: bool, sha256: &str) -> Result<(), Error> {
+    if is_created || bucket.sha256(name)?.is_some_and(|there| there == sha256) {
         return Ok(());
     }
     Err(occupied(bucket, name))
@@ -243,10 +256,24 @@ mod tests {
         bucket.remove("dem/a.asc").unwrap();
         let refused = upload(&release(two.path(), "# Other"), &bucket, &Silent).unwrap_err();
         assert!(
-            matches!(&refused, Error::Usage(why) if why.contains("one of an unfinished upload (README.md)")),
+            matches!(&refused, Error::Usage(why) if why.contains("one of an unfinished upload (SHA256SUMS)")),
             "{refused}"
         );
         assert!(!bucket.contains(MANIFEST).unwrap());
+        upload(&first, &bucket, &Silent).unwrap();
+        assert_eq!(bucket.list("").unwrap().len(), 4);
+    }
+
+    /// An upload that has just begun has the address: nothing of another release is uploaded, not even large files, which have no condition.
+    #[test]
+    fn val_the_checksums_claim_the_address() {
+        let (one, two) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        let bucket = Bucket::in_memory("s3://bucket/demo").unwrap();
+        let first = release(one.path(), "# Demo");
+        assert!(bucket.create_from(SUMS, &first.path(SUMS)).unwrap());
+        let before = bucket.list("").unwrap();
+        assert!(upload(&release(two.path(), "# Other"), &bucket, &Silent).is_err());
+        assert_eq!(bucket.list("").unwrap(), before);
         upload(&first, &bucket, &Silent).unwrap();
         assert_eq!(bucket.list("").unwrap().len(), 4);
     }

@@ -256,7 +256,7 @@ impl Bucket {
         Ok(is_there.then(|| hashed.finish().2))
     }
 
-    /// Creates an object; false if it exists already and stays as it is.
+    /// Creates an object in one request; false if it exists already and stays as it is. Stores take up to 5 GB.
     ///
     /// # Errors
     /// The request failed.
