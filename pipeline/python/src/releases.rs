@@ -59,11 +59,13 @@ impl Table {
 
     /// The values of a column: an array of floats (NaN for null) or integers, otherwise a list.
     fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
-        let cells = py.detach(|| self.0.column(name)).map_err(unusable)?;
         let table = self.0.table();
-        // A column that was read is one of the table.
-        let column_type = table.position(name).map_or(ColumnType::Text, |place| table.columns[place].column_type);
-        values(py, column_type, cells)
+        let place = table.position(name).ok_or_else(|| {
+            let known: Vec<&str> = table.columns.iter().map(|column| column.name).collect();
+            usage(format!("table {} has no column {name}; known: {}", table.name, known.join(", ")))
+        })?;
+        let cells = py.detach(|| self.0.column(name)).map_err(unusable)?;
+        values(py, table.columns[place].column_type, cells)
     }
 
     /// The rows as an `ArrowArrayStream` (Arrow PyCapsule interface). The schema is that of the table, whatever is asked for.

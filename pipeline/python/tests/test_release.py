@@ -49,8 +49,9 @@ def test_tables_in_numpy(release):
     assert np.array_equal(np.stack(samples["wheel_contact_z_m"]), contact, equal_nan=True)
     units = {column.name: column.unit for column in samples.columns}
     assert (units["x_m"], units["outcome"]) == ("m", "")
-    with pytest.raises(sastrugi.SastrugiError, match="table samples has no column x; known: terrain_id, mission_id"):
+    with pytest.raises(sastrugi.SastrugiError, match="^table samples has no column x; known: terrain_id, mission_id") as refused:
         samples["x"]
+    assert refused.value.code == 2
     with pytest.raises(sastrugi.SastrugiError, match="there is no table mission; known: terrains") as refused:
         release.table("mission")
     assert refused.value.code == 2
