@@ -199,8 +199,8 @@ def fit(
     seed: of the replicates.
     parameters: as in a study (`sastrugi kinds covariance`): mode, trim, model, bootstrap, statistics, inner_scale_m, noise_sigma_m ...
 
-    Notes on how a file was read, such as a cell size that was assumed, are issued as warnings. The file that `save` writes is that of the program for the same file and parameters. Ctrl-C returns at once; the fit then ends in the
-    background without effect.
+    Notes on how a file was read, such as a cell size that was assumed, are issued as warnings. The file that `save` writes is that of the program
+    for the same file and parameters. Ctrl-C returns within two seconds; the fit then ends in the background without effect.
 
     >>> site = Fit({"model": "exponential", "parameters": {"sigma_m": 0.05, "range_m": 0.2}}).texture(
     ...     16.0, 0.1, seed=1, phase="gaussian", periodic=False)

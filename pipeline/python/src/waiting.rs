@@ -1,7 +1,7 @@
 //! Long calls: the work runs on a thread of its own, while the caller waits for it, reports its progress, and watches for Ctrl-C.
 //!
 //! Kernels cannot be stopped halfway. On Ctrl-C the caller gets its `KeyboardInterrupt` within about two seconds; a run starts no further items, and
-//! those in progress end in the background without effect (files appear only when they are complete).
+//! what is in progress ends in the background. Its result is dropped; a file that it was to write may still appear, complete.
 
 use crate::errors::{refused, usage};
 use pyo3::prelude::*;
