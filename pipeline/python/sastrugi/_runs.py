@@ -90,6 +90,12 @@ def traverse(
     rules: keys of `[[missions]]`, such as length_m.
     roughness: keys of `[roughness]`, which decides where missions may start and end.
     parameters: keys of `[[traverse]]`.
+
+    >>> from sastrugi import terrain
+    >>> ground = terrain("multifractal", seed=3, size_px=[320, 300])
+    >>> driven = traverse(ground, Path(tempfile.mkdtemp()) / "drive", missions=2, seed=9, rules={"length_m": 5.0, "border_m": 1.5})
+    >>> len(driven.missions()), driven.summary["failures"]
+    (2, [])
     """
     refuse_stated(rules or {}, count="missions")
     more = {} if replicates is None else {"replicates": replicates}
@@ -201,6 +207,13 @@ def analyze(
     group: label of the rows.
 
     Raises SastrugiError (65) for the first log that cannot be used.
+
+    >>> from sastrugi import terrain
+    >>> ground = terrain("multifractal", seed=3, size_px=[320, 300])
+    >>> driven = traverse(ground, Path(tempfile.mkdtemp()) / "drive", missions=2, seed=9, rules={"length_m": 5.0, "border_m": 1.5})
+    >>> rows = analyze([driven.recording(mission) for mission in driven.missions()])
+    >>> len(rows), "max_pitch_deg" in rows[0]
+    (2, True)
     """
     settings = to_json({
         "topic": topic,
