@@ -134,6 +134,12 @@ fn val_the_wheel_runs_in_an_empty_environment() {
     assert!(installed.contains(&"numpy") && installed.contains(&"sastrugi"), "{installed:?}");
     assert!(installed.iter().all(|name| ["numpy", "pip", "sastrugi", "setuptools"].contains(name)), "{installed:?}");
 
+    // With the terms of what it contains.
+    let same = "import importlib.metadata as m, pathlib, sys\n\
+        [notice] = [file for file in m.files('sastrugi') if file.name == 'THIRD-PARTY.md']\n\
+        assert notice.read_text() == pathlib.Path(sys.argv[1]).read_text(encoding='utf-8')";
+    check(&called(Command::new(bin.join("python")).args(["-c", same]).arg(root().join("THIRD-PARTY.md"))));
+
     pip(vec!["--requirement".into(), root().join("tests/python/requirements.txt").into()]);
     let inside = |script: &[&str]| {
         let mut command = Command::new(bin.join("python"));

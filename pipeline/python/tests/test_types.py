@@ -20,6 +20,9 @@ def test_names():
     ours = {name for name in dir(_native) if not name.startswith("_")}
     assert functions | classes == ours
     assert all(inspect.isclass(getattr(_native, name)) for name in classes)
+    for node in (node for node in STUB.body if isinstance(node, ast.ClassDef)):
+        stated = {item.name for item in node.body if isinstance(item, ast.FunctionDef) and not item.name.startswith("_")}
+        assert stated == {name for name in dir(getattr(_native, node.name)) if not name.startswith("_")}, node.name
 
 
 def test_parameters():
