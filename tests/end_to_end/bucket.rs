@@ -133,6 +133,11 @@ fn val_an_interrupted_upload_is_no_release() {
     fs::remove_file(server.object("a/small/fit/fit.json")).unwrap();
     assert_eq!(server.call(path, &["verify", "s3://terrains/a/small", "--quiet"]).code, 4);
     assert_eq!(server.call(path, &["verify", "s3://terrains/a", "--quiet"]).code, 65);
+    // The server itself refuses to replace the checksums: without a manifest, nothing else keeps another release away.
+    write(path, "other.toml", &small_study().replace("name = \"small\"", "name = \"other\""));
+    let other = ["run", "other.toml", "-o", "s3://terrains/a/small", "--work", "other.work", "--quiet"];
+    let call = server.call(path, &other);
+    assert!(call.code == 2 && call.stderr.contains("unfinished upload"), "{} {}", call.code, call.stderr);
     succeeds(&server.call(path, &run));
     assert_eq!(differing(&whole, &sums(&server.object("a/small"))), [""; 0]);
     succeeds(&server.call(path, &["verify", "s3://terrains/a/small", "--quiet"]));
