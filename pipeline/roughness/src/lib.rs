@@ -86,4 +86,4 @@ pub use profiles::{ProfileBin, profile_spectra};
 pub use ride::Ride;
 pub use spectrum::{SpectralMap, SpectrumBin, default_slope_band, power_spectrum, psd_slope};
 pub use structure::{Autocorrelation, Direction, StructureBin, autocorrelation, lags_of, structure_function};
-pub use summary::{DescribeSettings, Summary, describe};
+pub use summary::{DescribeSettings, Summary, describe, describe_classified};

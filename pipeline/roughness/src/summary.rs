@@ -89,7 +89,11 @@ pub struct Summary {
 /// assert!((summary.heights.relief_m - 4.9).abs() < 1e-12);
 /// ```
 pub fn describe(dem: &Grid, settings: &DescribeSettings) -> Summary {
-    let classes = classify(&moore_gradient(dem), &settings.thresholds);
+    describe_classified(dem, &classify(&moore_gradient(dem), &settings.thresholds), settings)
+}
+
+/// As [`describe`], from a class map of the surface, before closing, which was made with these thresholds.
+pub fn describe_classified(dem: &Grid, classes: &Grid<u8>, settings: &DescribeSettings) -> Summary {
     let window_m = settings.band_window_m.unwrap_or(BAND_CELLS * dem.geometry.mean_cell());
     let (band_rms_m, window) = band_rms(dem, window_m);
     let (map, size) = (SpectralMap::of(dem), dem.geometry.size());
@@ -102,7 +106,7 @@ pub fn describe(dem: &Grid, settings: &DescribeSettings) -> Summary {
         rms_slope: rms_slope(dem),
         band_rms_m,
         band_window_m: 0.5 * (window[0] + window[1]),
-        shares: shares(&classes, settings.border_m),
+        shares: shares(classes, settings.border_m),
         share_border_m: settings.border_m,
         areal,
         psd_slope: psd_slope(&spectrum, slope_band_cycles_m, size[0].min(size[1])),
@@ -166,6 +170,22 @@ mod tests {
         assert!(whole.shares.low < 1.0 && whole.shares.high > 0.0, "{:?}", whole.shares);
         let all_high = DescribeSettings { thresholds: ClassThresholds::new(1e-12, 2e-12).unwrap(), ..settings };
         assert_eq!(describe(&dem, &all_high).shares.high, 1.0);
+    }
+
+    /// Shares are those of the given classes; nothing else depends on them.
+    #[test]
+    fn val_given_classes_are_used() {
+        let mut s = Streams::for_seed(3, "summary-test").stream("noise");
+        let g = Geometry::square(60, 70, 0.5);
+        let dem = Grid::new(g, (0..g.len()).map(|_| 0.2 * s.normal()).collect());
+        let settings = DescribeSettings { border_m: 1.0, ..DescribeSettings::default() };
+        let own = classify(&moore_gradient(&dem), &settings.thresholds);
+        let described = describe(&dem, &settings);
+        assert!(described.shares.low < 1.0, "{:?}", described.shares);
+        assert_eq!(format!("{:?}", describe_classified(&dem, &own, &settings)), format!("{described:?}"));
+        let low = describe_classified(&dem, &Grid::filled(g, 0), &settings);
+        assert_eq!(low.shares, Shares { low: 1.0, semi: 0.0, high: 0.0 });
+        assert_eq!(format!("{:?}", Summary { shares: described.shares, ..low }), format!("{described:?}"));
     }
 
     #[test]

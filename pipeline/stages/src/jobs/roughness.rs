@@ -8,7 +8,7 @@ use crate::operations::roughness::settings;
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use sastrugi_numeric::Grid;
-use sastrugi_roughness::{Summary, classify, close_disk, describe, moore_gradient};
+use sastrugi_roughness::{Summary, classify, close_disk, describe_classified, moore_gradient};
 use sastrugi_schemas::study::RoughnessSection;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_store::{dem, digest};
@@ -137,8 +137,8 @@ impl Job for RoughnessJob {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let read = dem::read(&work.parent(&self.field.item, HEIGHTS)?).map_err(input_error)?;
         let settings = settings(&self.section)?;
-        let summary = describe(&read.grid, &settings);
         let raw = classify(&moore_gradient(&read.grid), &settings.thresholds);
+        let summary = describe_classified(&read.grid, &raw, &settings);
         let closed = close_disk(&raw, self.section.closing_radius_m);
         dem::write_classes(&work.output(CLASSES), &closed, &read.info.crs).map_err(JobError::io)?;
         dem::write_classes(&work.output(CLASSES_RAW), &raw, &read.info.crs).map_err(JobError::io)?;
