@@ -319,7 +319,7 @@ impl Data {
 
     /// Parameters of a surface.
     pub fn surface(&self, id: &str) -> Option<&SurfaceRow> {
-        self.surfaces.iter().find(|s| s.surface_id == id)
+        of_key(&self.surfaces, |s| &s.surface_id, id).first()
     }
 
     /// Structure function of a surface in a direction: lags with a positive value.
@@ -477,6 +477,17 @@ mod tests {
         assert_eq!(without.len(), 250);
         assert!(without.iter().all(|id| id.starts_with("large-terrain-plain-")), "{without:?}");
         assert!(without == without_curves(7, &terrains) && without != without_curves(8, &terrains));
+    }
+
+    /// Every surface is found by its id, and no other.
+    #[test]
+    fn prop_surfaces_are_found_by_their_ids() {
+        let data = crate::tests::made_up::full(1, 24);
+        assert!(data.surfaces.len() > 3);
+        for surface in &data.surfaces {
+            assert_eq!(data.surface(&surface.surface_id).map(|found| &found.surface_id), Some(&surface.surface_id));
+        }
+        assert!(["", "nothing", "zzz"].iter().all(|id| data.surface(id).is_none()));
     }
 
     /// A variant belongs to the run whose id it extends after a hyphen, the longest of several; other ids are not runs.
