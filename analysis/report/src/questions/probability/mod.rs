@@ -103,6 +103,10 @@ fn introduction(groups: &[Split]) -> String {
 
 /// Missions with several starts, by group: those of the plain run, or of the first variant that has any.
 fn groups(data: &Data) -> Vec<Split<'_>> {
+    // Without starts, every variant would be looked at, each time among all missions.
+    if data.replicates.is_empty() {
+        return Vec::new();
+    }
     let variants: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).collect();
     let of = |variant: &str| {
         data.groups_of(data.missions.iter().filter(|m| m.variant.as_deref() == Some(variant)).collect())
