@@ -24,6 +24,12 @@ pub fn stream(data: &Data, item: &str, figure: &str) -> Stream {
 
 /// Median of a group's values, which are given with their terrains, and its sampling band.
 pub fn band(data: &Data, group: &str, figure: &str, values: &[(&str, f64)]) -> Option<Interval> {
+    median_interval(data, group, figure, values, BAND)
+}
+
+/// Interval of the median of values, which are given with their clusters: that of [`Clusters::interval`], but without a copy of the values
+/// for each bootstrap sample.
+pub fn median_interval(data: &Data, group: &str, figure: &str, values: &[(&str, f64)], level: f64) -> Option<Interval> {
     let mut values: Vec<(&str, f64)> = values.iter().copied().filter(|v| v.1.is_finite()).collect();
     // Resampling keeps the order, and the median of sorted values is fast.
     values.sort_by(|a, b| a.1.total_cmp(&b.1));
@@ -32,7 +38,7 @@ pub fn band(data: &Data, group: &str, figure: &str, values: &[(&str, f64)]) -> O
         let times = times(&drawn[0], clusters);
         sums::median_counted(items.iter().map(|(cluster, value)| (*value, times[*cluster])))
     };
-    cluster_interval(&[clusters], replicates(items.len()), BAND, &mut stream(data, group, figure), median)
+    cluster_interval(&[clusters], replicates(items.len()), level, &mut stream(data, group, figure), median)
 }
 
 /// Number of bootstrap samples for an interval of this many values: [`REPLICATES`] up to 10 000 of them.
@@ -173,9 +179,11 @@ mod tests {
             let names: Vec<String> = (0..n).map(|_| format!("t{}", s.below(9))).collect();
             let values: Vec<(&str, f64)> =
                 names.iter().map(|name| (name.as_str(), (4.0 * s.normal()).round())).collect();
-            let fast = band(&data, "group", "figure", &values);
+            let fast = [BAND, LEVEL].map(|level| median_interval(&data, "group", "figure", &values, level));
+            assert_eq!(band(&data, "group", "figure", &values), fast[0]);
             let pooled = Clusters::new(&[values]);
-            let slow = pooled.interval(&mut stream(&data, "group", "figure"), BAND, |pooled| sums::median(&pooled[0]));
+            let median = |pooled: &[Vec<f64>]| sums::median(&pooled[0]);
+            let slow = [BAND, LEVEL].map(|level| pooled.interval(&mut stream(&data, "group", "figure"), level, median));
             assert_eq!(fast, slow, "{n}");
         }
     }

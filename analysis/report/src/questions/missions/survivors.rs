@@ -3,7 +3,7 @@
 use super::METRICS;
 use crate::content::{Block, Numbers, TableBlock, count, number, text};
 use crate::data::{Data, Group, Mission};
-use crate::questions::clusters::{Clusters, LEVEL, block, paired, stream};
+use crate::questions::clusters::{LEVEL, block, median_interval, paired};
 use crate::questions::outcome::successful;
 use crate::questions::sql;
 use crate::render::number as set;
@@ -71,15 +71,12 @@ fn table(data: &Data, groups: &[Group<Mission>], pairs: &[(&str, Vec<&Mission>)]
             let here: Vec<(&str, f64)> = of(g).collect();
             let change = |before: usize| {
                 let difference = |p: &(&'_ str, Vec<&Mission>)| (metric.of)(p.1[g]) - (metric.of)(p.1[before]);
-                let values: Vec<(String, f64)> = pairs.iter().map(|p| (block(p.0).to_owned(), difference(p))).collect();
-                values.into_iter().filter(|v| v.1.is_finite()).collect::<Vec<_>>()
+                let values = pairs.iter().map(|p| (block(p.0), difference(p)));
+                values.filter(|v| v.1.is_finite()).collect::<Vec<(&str, f64)>>()
             };
             let changes = g.checked_sub(1).map(change).unwrap_or_default();
-            let interval = Clusters::new(&[changes.iter().map(|c| (c.0.as_str(), c.1)).collect()]).interval(
-                &mut stream(data, &group.name, &format!("paired {}", metric.column)),
-                LEVEL,
-                |pooled| sums::median(&pooled[0]),
-            );
+            let figure = format!("paired {}", metric.column);
+            let interval = median_interval(data, &group.name, &figure, &changes, LEVEL);
             let (low, high) = interval.map_or((f64::NAN, f64::NAN), |i| (i.low, i.high));
             numbers.row([
                 text(metric.name),
