@@ -42,7 +42,8 @@ class Course:
         errors = []
         for fx, fy in ((np.full(RAYS, 1e-6), np.full(RAYS, 2e-6)), fraction):
             x, y = self.terrain.x0 + (i + fx) * self.terrain.cell, self.terrain.y0 + (j + fy) * self.terrain.cell
-            errors.append(max(abs(self.ground(*at) - h) for *at, h in zip(x, y, self.terrain.height(x, y))))
+            heights = self.terrain.height(x, y)
+            errors.append(float(np.max([abs(self.ground(*at) - h) for *at, h in zip(x, y, heights)])))
         return errors
 
     def ground(self, x, y):
