@@ -110,7 +110,7 @@ fn stat_teams_arrive_over_hills() {
                 .filter_map(|seed| check_over_hills(name, &hills(500, per_million, minor, seed), shape))
                 .collect();
             let mean = |axis: usize| errors.iter().map(|e| e[axis]).sum::<f64>() / errors.len() as f64;
-            let largest = |axis: usize| errors.iter().map(|e| e[axis]).fold(0.0, f64::max);
+            let largest = |axis: usize| errors.iter().map(|e| e[axis]).max_by(f64::total_cmp).unwrap();
             let [depth_m, width_m] = [mean(0), mean(1)];
             println!(
                 "{name} {}: depth {depth_m:.2} (at most {:.2}), width {width_m:.2} (at most {:.2}) m, {} runs",

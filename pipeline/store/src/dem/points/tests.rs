@@ -348,7 +348,7 @@ fn val_gridding_of_measured_clouds() {
         assert!((0..2).all(|a| (g.origin[a] - other.origin[a]).abs() < 1e-9), "{:?} {:?}", g.origin, other.origin);
         assert_eq!((ours.grid.finite_count(), ours.info.crs.epsg), (held, epsg));
         let worst = ours.grid.values.iter().zip(&theirs.grid.values).filter(|(a, _)| a.is_finite());
-        let worst = worst.map(|(a, b)| (a - b).abs()).fold(0.0, f64::max);
+        let worst = worst.map(|(a, b)| (a - b).abs()).max_by(f64::total_cmp).unwrap();
         assert!(worst <= tolerance, "{worst}");
         let counts: Vec<u8> = counts.values.iter().flat_map(|n| n.to_le_bytes()).collect();
         assert_eq!(crate::digest::of_bytes(&counts), sha256);

@@ -52,7 +52,7 @@ fn wanted(covariance: &Covariance, g: &Geometry) -> Vec<f64> {
 }
 
 fn worst(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).fold(0.0, |m, (x, y)| f64::max(m, (x - y).abs()))
+    a.iter().zip(b).map(|(x, y)| (x - y).abs()).max_by(f64::total_cmp).unwrap()
 }
 
 /// `1 / M * sum of z(i) z(i + h)` by the definition, at one lag in cells south and east around the torus.
