@@ -1,4 +1,5 @@
-//! Progress of a run on stderr: a bar with ETA on a terminal, plain lines otherwise, only failures when quiet.
+//! Progress on stderr. Of a run: a bar with ETA on a terminal, plain lines otherwise, only failures when quiet. Of a verb without items: what it
+//! does and the time so far, on a terminal only.
 
 use crate::output::{counted, warn};
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
@@ -6,7 +7,7 @@ use sastrugi_stages::job::ItemRef;
 use sastrugi_stages::runner::progress::{End, Progress};
 use std::io::IsTerminal;
 use std::sync::{Mutex, PoisonError};
-use std::time::Instant;
+use std::time::{Duration, Instant};
 
 /// Steps of the bar per estimated second.
 const TICKS_PER_SECOND: f64 = 1000.0;
@@ -47,15 +48,33 @@ impl State {
     }
 }
 
+/// A line of this style that is drawn again and again, unless quiet or stderr is no terminal.
+fn on_terminal(quiet: bool, style: &str) -> Option<ProgressBar> {
+    (!quiet && std::io::stderr().is_terminal()).then(|| {
+        let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
+        bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
+        bar
+    })
+}
+
+/// Does the work of a verb, which may take minutes; meanwhile a terminal shows `doing` and the time so far.
+pub fn waiting<T>(doing: &str, quiet: bool, work: impl FnOnce() -> T) -> T {
+    let spinner = on_terminal(quiet, "{spinner} {msg}, {elapsed}");
+    if let Some(spinner) = &spinner {
+        spinner.set_message(doing.to_owned());
+        spinner.enable_steady_tick(Duration::from_millis(200));
+    }
+    let done = work();
+    if let Some(spinner) = &spinner {
+        spinner.finish_and_clear();
+    }
+    done
+}
+
 impl Reporter {
     /// A reporter; `quiet` suppresses everything but failures.
     pub fn new(quiet: bool) -> Self {
-        let bar = (!quiet && std::io::stderr().is_terminal()).then(|| {
-            let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());
-            let style = "{bar:32} {percent:>3}%  {elapsed} elapsed, {eta} left  {msg}";
-            bar.set_style(ProgressStyle::with_template(style).unwrap_or_else(|_| ProgressStyle::default_bar()));
-            bar
-        });
+        let bar = on_terminal(quiet, "{bar:32} {percent:>3}%  {elapsed} elapsed, {eta} left  {msg}");
         Self { quiet, bar, state: Mutex::default(), start: Instant::now() }
     }
 

@@ -5,6 +5,7 @@ use crate::Verdict;
 use crate::args::{Common, Compare};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
+use crate::progress::waiting;
 use sastrugi_stages::verbs::compare::{self, BlockEvidence, COPY_SIDE, Comparison, Copies, Quantity, Request, Side};
 use sastrugi_stages::verbs::releases::{self, Files};
 use sastrugi_stages::verbs::{numbers, parameters};
@@ -40,7 +41,7 @@ pub fn compare(args: &Compare, common: &Common) -> Verdict {
     };
     let (by_statistics, cell_m) = (args.statistics, cell(args.cell.as_deref())?);
     let request = Request { a, b, by_statistics, parameters: params, seed: args.seed, cell_m };
-    let (comparison, record) = compare::compare(&request)?;
+    let (comparison, record) = waiting("comparing", common.quiet, || compare::compare(&request))?;
     print(common.json, &record, &text(&comparison))?;
     Ok(if args.fail_on_difference && comparison.differs() { Code::Difference } else { Code::Done })
 }

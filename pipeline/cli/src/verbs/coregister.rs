@@ -5,6 +5,7 @@ use crate::Verdict;
 use crate::args::{Common, Coregister};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
+use crate::progress::waiting;
 use sastrugi_schemas::coregistration::Coregistration;
 use sastrugi_stages::operations::coregistration::{rounds, verdict};
 use sastrugi_stages::verbs::coregister::{self, Request};
@@ -20,7 +21,7 @@ pub fn coregister(args: &Coregister, common: &Common) -> Verdict {
     };
     let reading = Reading { window, masks: args.masks.all(), ..reading(&args.reading)? };
     let request = Request { a: &args.a, b: &args.b, output: args.output.as_deref(), options, reading };
-    let done = coregister::coregister(&request)?;
+    let done = waiting("aligning", common.quiet, || coregister::coregister(&request))?;
     let mut text = describe(&done.coregistration);
     args.output.iter().for_each(|output| text.push_str(&format!("\n{}: A minus B", output.display())));
     done.notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));

@@ -8,6 +8,7 @@ use crate::Verdict;
 use crate::args::{Common, Detrend, Fit, Obstacles, Roughness, Terrain, Texture};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print, significant, warn};
+use crate::progress::waiting;
 use sastrugi_schemas::fit::{FitFile, Quoted, SILL_OVER_RANGE, Source};
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::local::Local;
@@ -24,7 +25,7 @@ pub fn terrain(args: &Terrain, common: &Common) -> Verdict {
     let options = options(&args.writing, &args.output)?;
     let request =
         verbs::terrain::Request { spec: &args.spec, set: &args.set, seed: args.seed, output: &args.output, options };
-    print_summary(common, &verbs::terrain::terrain(&request)?)
+    print_summary(common, &waiting("generating", common.quiet, || verbs::terrain::terrain(&request))?)
 }
 
 /// `texture`.
@@ -58,7 +59,7 @@ pub fn texture(args: &Texture, common: &Common) -> Verdict {
         output: &args.output,
         options: options(&args.writing, &args.output)?,
     };
-    let made = verbs::texture::texture(&request)?;
+    let made = waiting("synthesising", common.quiet, || verbs::texture::texture(&request))?;
     // Also with --quiet: a warning says that the texture is hardly what was measured.
     let warnings = made["warnings"].as_array().into_iter().flatten().filter_map(Value::as_str);
     warnings.for_each(|warning| warn(&format!("sastrugi: warning: {warning}")));
@@ -127,7 +128,8 @@ pub fn fit(args: &Fit, common: &Common) -> Verdict {
         local: args.shown.local.as_deref().map(|prefix| Local { prefix, block_m: args.shown.local_block }),
         beside: shown.files(),
     };
-    let verbs::fit::Done { fit, source, notes: read_notes } = verbs::fit::fit(&request)?;
+    let verbs::fit::Done { fit, source, notes: read_notes } =
+        waiting("fitting", common.quiet, || verbs::fit::fit(&request))?;
     let fit = match fit {
         Ok(fit) => fit,
         Err(error) => return fit_failed(&source, error, common),
@@ -318,7 +320,7 @@ pub fn roughness(args: &Roughness, common: &Common) -> Verdict {
         ride: ride_request(args),
         wind: wind_settings(args),
     };
-    let (described, read_notes) = verbs::roughness::roughness(&request)?;
+    let (described, read_notes) = waiting("measuring", common.quiet, || verbs::roughness::roughness(&request))?;
     let summary = &described.summary;
     let h = &summary.heights;
     let percent = |share: f64| if share.is_nan() { "none".to_owned() } else { format!("{:.2} %", 100.0 * share) };

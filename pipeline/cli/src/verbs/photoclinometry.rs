@@ -5,6 +5,7 @@ use crate::Verdict;
 use crate::args::{Common, Photoclinometry};
 use crate::failure::Code;
 use crate::output::{columns, print, significant};
+use crate::progress::waiting;
 use sastrugi_stages::verbs::photoclinometry::{self, Request};
 use serde_json::Value;
 
@@ -13,7 +14,7 @@ pub fn photoclinometry(args: &Photoclinometry, common: &Common) -> Verdict {
     let options = options(&args.writing, &args.output)?;
     let seed = args.seed.unwrap_or(0);
     let request = Request { images: &args.images, set: &args.set, seed, output: &args.output, options };
-    let result = photoclinometry::photoclinometry(&request)?;
+    let result = waiting("inverting", common.quiet, || photoclinometry::photoclinometry(&request))?;
     print(common.json, &result, &as_text(&result))?;
     Ok(Code::Done)
 }

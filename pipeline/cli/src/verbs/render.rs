@@ -5,6 +5,7 @@ use crate::Verdict;
 use crate::args::{Common, Render};
 use crate::failure::Code;
 use crate::output::{print, significant};
+use crate::progress::waiting;
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::{self, numbers, parameters};
 use serde_json::{Value, json};
@@ -38,7 +39,7 @@ pub fn render(args: &Render, common: &Common) -> Verdict {
         output: &args.output,
         options: options(&args.writing, &args.output)?,
     };
-    let result = verbs::render::render(&request)?;
+    let result = waiting("rendering", common.quiet, || verbs::render::render(&request))?;
     print(common.json, &result, &as_text(&result))?;
     Ok(Code::Done)
 }
