@@ -63,10 +63,15 @@ pub fn checkout(name: &str) -> PathBuf {
     copy
 }
 
-/// A checkout with the compiled libraries, so that only what the walk touches is built again.
+/// Settings of cargo with which our own rooms, most of which the walk compiles again, are not optimised; other packages stay as they were compiled.
+const QUICKLY: &str = "[profile.release]\nopt-level = 0\n\n[profile.release.package.\"*\"]\nopt-level = 3\n";
+
+/// A checkout with the compiled libraries of other packages.
 fn scratch() -> PathBuf {
     let copy = checkout("walk");
     sastrugi_tests::copy_build(&copy.join("target"));
+    fs::create_dir_all(copy.join(".cargo")).unwrap();
+    fs::write(copy.join(".cargo/config.toml"), QUICKLY).unwrap();
     copy
 }
 
