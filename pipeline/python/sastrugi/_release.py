@@ -113,8 +113,8 @@ class Mission:
 
     terrain_id: str
     mission_id: str
-    # Not hashed: a dict cannot be. Equal missions have equal keys.
-    row: dict[str, Any] = field(hash=False)
+    # Neither hashed nor compared: nulls are NaN, which equals nothing. Equal missions have equal keys.
+    row: dict[str, Any] = field(compare=False)
 
     @property
     def id(self) -> str:
