@@ -8,8 +8,7 @@ mod every_stage;
 
 use every_stage::EveryStage;
 use sastrugi_tests::{
-    area, called, differing, program, routed_study, run_in_shards, run_with_kills, sastrugi_in, sums, textured_study,
-    write,
+    area, differing, program, routed_study, run_in_shards, run_with_kills, sastrugi_in, sums, textured_study, write,
 };
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -106,21 +105,11 @@ fn gold_the_traversal_study_is_the_same_everywhere() {
 /// Transforms and phases query the CPU directly, which this does not reach; `emulated.rs` compares whole releases without wide vectors.
 #[test]
 fn gold_the_cpu_changes_nothing() {
-    let study = sastrugi_fixtures::study("quickstart.toml");
-    let (plain, masked) = (area(), area());
-    let quick = |folder: &Path, tunables: Option<&str>| {
-        let mut command = Command::new(program());
-        command.arg("run").arg(&study).args(["-o", "release", "--quiet"]).current_dir(folder);
-        if let Some(tunables) = tunables {
-            command.env("GLIBC_TUNABLES", tunables);
-        }
-        let call = called(&mut command);
-        assert_eq!(call.code, 0, "{}", call.stderr);
-        sums(&folder.join("release"))
-    };
-    let a = quick(plain.path(), None);
-    let b = quick(masked.path(), Some("glibc.cpu.hwcaps=-FMA,-AVX2"));
-    assert_same(&a, &b, "without FMA and AVX2");
+    let study = EveryStage::new();
+    let plain = study.release("plain", &mut Command::new(program()));
+    let narrow = ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2");
+    let masked = study.release("masked", Command::new(program()).env(narrow.0, narrow.1));
+    assert_same(&plain, &masked, "without FMA and AVX2");
 }
 
 /// A build for the CPU at hand (FMA, AVX2, AVX-512 if it has them) gives the same bytes. The profile `native`
