@@ -108,7 +108,7 @@ fn val_the_wheel_runs_in_an_empty_environment() {
     let target = folder.path().join("target");
     copy_build(&target);
     let mut build = Command::new(&python);
-    build.args(["-m", "maturin", "build", "--release", "--offline", "--out"]).arg(folder.path().join("wheels"));
+    build.args(["-m", "maturin", "build", "--release", "--locked", "--out"]).arg(folder.path().join("wheels"));
     build.arg("--interpreter").arg(&python).env("CARGO_TARGET_DIR", &target).current_dir(sources());
     check(&called(&mut build));
     let wheels: Vec<PathBuf> =
