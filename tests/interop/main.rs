@@ -595,7 +595,7 @@ fn stat_fits_of_numpy_fields_on_slopes() {
     fits_of_numpy_fields("quick");
 }
 
-/// The same for 200 fields, 64 without their slope, 40 with intervals.
+/// The same for 300 fields, 64 without their slope, 60 with intervals.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_many_fits_of_numpy_fields_on_slopes() {

@@ -361,17 +361,17 @@ fn holds(ends: [Option<f64>; 2], value: f64) -> bool {
     ends[0].is_none_or(|low| low <= value) && ends[1].is_none_or(|high| value <= high)
 }
 
-/// Default fits of 120 exponential fields with 99 replicates. A quarter of the fields each is level or on slopes of 20, 50 and 100 %; every
-/// other one has 15 % holes. `SASTRUGI_FIELDS` sets another number of fields; 200 gave 95.0, 95.5 and 94.0 %, and 2.5 % warned.
+/// Default fits of 200 exponential fields with 99 replicates. A quarter of the fields each is level or on slopes of 20, 50 and 100 %; every
+/// other one has 15 % holes. `SASTRUGI_FIELDS` sets another number of fields.
 ///
-/// * Nominal 95 % intervals cover the truth in 95 +- 8 % (binomial standard deviation 2.0 points; 99 replicates add 1: false alarm
+/// * Nominal 95 % intervals cover the truth in 95 +- 7 % (binomial standard deviation 1.5 points; 99 replicates add 1: false alarm
 ///   below 1e-3).
-/// * At most 7 % of the fits warn. A true share of 2 % passes with probability 0.999, one of 10 % with 0.14.
+/// * At most 5 % of the fits warn. A true share of 2 % passes with probability 0.997, one of 5 % with 0.58.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_intervals_cover_and_exponentials_do_not_warn() {
     let s = with_bootstrap("exponential", 99);
-    let fields: u64 = std::env::var("SASTRUGI_FIELDS").ok().and_then(|n| n.parse().ok()).unwrap_or(120);
+    let fields: u64 = std::env::var("SASTRUGI_FIELDS").ok().and_then(|n| n.parse().ok()).unwrap_or(200);
     let fits: Vec<FitFile> = (0..fields)
         .into_par_iter()
         .map(|seed| fit(&slopes::of_table(seed), &s, &Streams::for_seed(seed, "fit")).unwrap().fit)
@@ -382,10 +382,10 @@ fn stat_intervals_cover_and_exponentials_do_not_warn() {
         let holding = fits.iter().filter(|fit| holds(fit.intervals.as_ref().unwrap().values[name], truth));
         let share = holding.count() as f64 / fields as f64;
         println!("coverage of {name}: {:.1} %", 100.0 * share);
-        assert!((share - 0.95).abs() <= 0.08, "{name}: {share}");
+        assert!((share - 0.95).abs() <= 0.07, "{name}: {share}");
     }
     let share = warning_share("exponential, 99 replicates", fits.into_iter().map(|fit| fit.warnings).collect());
-    assert!(share <= 0.07, "{share}");
+    assert!(share <= 0.05, "{share}");
 }
 
 /// Share of fields whose fit as an exponential, without replicates, warns.
