@@ -6,7 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
-use sastrugi_tests::{Called, area, called, copy_build, program};
+use sastrugi_tests::{Called, area, called, copy_build, outside_package, program};
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -110,7 +110,7 @@ fn val_the_wheel_runs_in_an_empty_environment() {
     let mut build = Command::new(&python);
     build.args(["-m", "maturin", "build", "--release", "--locked", "--out"]).arg(folder.path().join("wheels"));
     build.arg("--interpreter").arg(&python).env("CARGO_TARGET_DIR", &target).current_dir(sources());
-    check(&called(&mut build));
+    check(&called(outside_package(&mut build)));
     let wheels: Vec<PathBuf> =
         fs::read_dir(folder.path().join("wheels")).unwrap().map(|entry| entry.unwrap().path()).collect();
     let [wheel] = &wheels[..] else { panic!("{wheels:?}") };

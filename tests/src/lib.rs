@@ -32,11 +32,20 @@ pub fn program() -> PathBuf {
 pub fn copy_build(target: &Path) {
     let to = target.join("release");
     std::fs::create_dir_all(&to).expect("a folder");
-    let libraries = "find deps -name '*.rlib' -o -name '*.rmeta' -o -name '*.so'; find .fingerprint build -type f";
+    let libraries =
+        "find deps -name '*.rlib' -o -name '*.rmeta' -o -name '*.so' -o -name '*.a'; find .fingerprint build -type f";
     let line = format!("{{ {libraries}; }} | xargs -d '\\n' cp -p --parents -t '{}'", to.display());
     let from = program().with_file_name("");
     let call = called(Command::new("bash").args(["-euo", "pipefail", "-c", &line]).current_dir(from));
     assert_eq!(call.code, 0, "{}", call.stderr);
+}
+
+/// Keeps from a command, such as a build in a [copy][copy_build], what cargo tells this test of its own package: build scripts of other packages that
+/// read these variables would run again.
+pub fn outside_package(command: &mut Command) -> &mut Command {
+    let is_told = |name: &str| name.starts_with("CARGO_PKG_") || name.starts_with("CARGO_MANIFEST_");
+    let told = std::env::vars_os().map(|(name, _)| name).filter(|name| name.to_str().is_some_and(is_told));
+    told.fold(command, |command, name| command.env_remove(name))
 }
 
 /// Result of a call of the program.

@@ -46,7 +46,9 @@ fn inserted(text: &str, after: &str, lines: &str) -> String {
 
 /// Runs a command line in a folder; its output is shown when it fails.
 pub fn run(folder: &Path, line: &str) {
-    let output = Command::new("bash").args(["-euo", "pipefail", "-c", line]).current_dir(folder).output().unwrap();
+    let mut command = Command::new("bash");
+    command.args(["-euo", "pipefail", "-c", line]).current_dir(folder);
+    let output = sastrugi_tests::outside_package(&mut command).output().unwrap();
     let [out, err] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
     assert!(output.status.success(), "{line}\n{out}{err}");
 }
@@ -63,10 +65,11 @@ pub fn checkout(name: &str) -> PathBuf {
     copy
 }
 
-/// Settings of cargo with which our own rooms, most of which the walk compiles again, are not optimised; other packages stay as they were compiled.
-const QUICKLY: &str = "[profile.release]\nopt-level = 0\n\n[profile.release.package.\"*\"]\nopt-level = 3\n";
+/// Settings of cargo with which the rooms that use a generator, all of which the walk compiles again, are not optimised.
+const QUICKLY: &str = "[profile.release.package]\n\
+    sastrugi-stages.opt-level = 0\nsastrugi-server.opt-level = 0\nsastrugi-cli.opt-level = 0\n";
 
-/// A checkout with the compiled libraries of other packages.
+/// A checkout with the compiled libraries, so that only what the walk touches is built again.
 fn scratch() -> PathBuf {
     let copy = checkout("walk");
     sastrugi_tests::copy_build(&copy.join("target"));
