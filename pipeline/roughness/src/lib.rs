@@ -5,7 +5,7 @@
 //! Every function takes a DEM in metres, with NaN for no data, and documents how it treats such cells. Roughness classes
 //! are the codes [`LOW`], [`SEMI`], [`HIGH`] and [`NO_CLASS`].
 //!
-//! The ways through the room, each from a DEM:
+//! Where to start, each time from a DEM:
 //!
 //! * Classes: [`moore_gradient`], then [`classify`] by [`ClassThresholds`], then [`close_disk`] and [`shares`].
 //! * Scale by scale: [`band_rms`], [`power_spectrum`] and [`psd_slope`]; after [`level`], [`LagSums`] and [`structure_function`], and

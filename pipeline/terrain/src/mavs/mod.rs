@@ -18,7 +18,7 @@
 //! surface is part of; so adjacent tiles match.
 //!
 //! # Example
-//! A surface scaled to an RMS height of 3 cm at the wavelengths that shake a vehicle.
+//! A surface scaled to an RMS height of 3 cm at the wavelengths that excite a vehicle.
 //! ```
 //! use sastrugi_numeric::Streams;
 //! use sastrugi_roughness::{Detrended, Detrender, WaveBand};

@@ -8,9 +8,9 @@
 //! share of members at least as far from the mean is an exact p-value whatever the statistic's distribution. Sigma and b are not
 //! reported, since the texture was given them.
 //!
-//! Halves of a site differ from each other. Beside every distance therefore stands that of the two halves, and the same test with
-//! the site split into interleaved blocks instead, black and white like a chessboard: what differs from half to half is in both. It is
-//! shown beside the answers and is no part of them; bounds and p-values of the halves do not depend on it.
+//! Halves of a site differ from each other. Every distance is therefore shown beside the distance of the two halves, and beside the same
+//! test with the site split into interleaved blocks, black and white like a chessboard, each set of which contains what differs from half to
+//! half. Answers, bounds and p-values do not depend on these.
 //!
 //! Cost: one fit, and per simulation a refit and two surfaces of half a site of at most two million cells; for the interleaved blocks the
 //! same again, with surfaces of the complete site.

@@ -26,7 +26,7 @@
 //! # Split halves, and any texture
 //! A texture has its site's sigma and b by construction: comparing those would be circular, and is not done here. A texture is
 //! instead judged by statistics that were not fitted, on ground that was not fitted ([`halves`]). A texture of any origin, whose generator is
-//! not known, is judged by what blocks of its site give against each other ([`blocks`]).
+//! not known, is judged by how far blocks of its site differ from each other ([`blocks`]).
 //!
 //! # Error rates
 //! Equality: Holm's (1979) adjustment, so that the probability of any wrong `different` is at most alpha (0.05) over all

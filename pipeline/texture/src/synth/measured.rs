@@ -1,6 +1,6 @@
 //! A measured residual to copy from, and how much of it a texture repeats.
 //!
-//! [`super::quilting`] and [`super::exemplar`] make a texture of cells of the site itself, so they need the residual (the DEM less its
+//! [`super::quilting`] and [`super::exemplar`] make a texture of cells of the site itself, so they need the residual (the DEM minus its
 //! background), not its statistics. The texture is then derived from the DEM: the DEM licence extends to it, and it cannot be published
 //! where the DEM cannot.
 //!

@@ -1,9 +1,9 @@
-//! What the methods have in common that repeat more of a site than its covariance: [`super::modulated`], [`super::wavelet_statistics`],
+//! Common to the methods that repeat more of a site than its covariance: [`super::modulated`], [`super::wavelet_statistics`],
 //! [`super::quilting`] and [`super::exemplar`].
 //!
 //! They are a second family beside [`super::Texture`], because little of it applies to them. A [`super::Kernel`] aims at a covariance
-//! model, on cells of any size, turned and stretched as asked, and knows its mean covariance. These methods repeat the measured residual
-//! ([`Source`]): the DEM less its background, or statistics of that. Hence:
+//! model, on cells of any size, rotated and stretched as requested, and knows its mean covariance. These methods repeat the measured residual
+//! ([`Source`]): the DEM minus its background, or statistics of that. Hence:
 //!
 //! * the cells are those of the site;
 //! * directions, heights and long waves are the site's: a tile has no `ratio`, `azimuth_deg`, `outer_m`, `marginal` and `marginal_m`;

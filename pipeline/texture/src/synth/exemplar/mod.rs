@@ -3,17 +3,17 @@
 //! # What
 //! The first cells lie on a wide grid, farther apart than the residual is correlated, and are drawn from the site at random. Cells between them follow on grids
 //! of half the spacing, down to every cell (`sampling.rs`). Each takes its detail from the place of the site whose neighbourhood is most like its own
-//! known one: `neighbours` cells, nearest first. Compared are the places that continue a neighbour as the site does, and places at
-//! random: `scan` on grids of 8 cells and wider, an eighth of that on each finer one, at least 8. Long waves are thus searched widely, fine ones
-//! follow them.
+//! known one: `neighbours` cells, nearest first. The candidates are the places that continue a neighbour as the site does, and random places:
+//! `scan` of them on grids of 8 cells and wider, an eighth of that on each finer grid, at least 8. The search is thus wide for long waves, which
+//! short waves then follow.
 //!
-//! A cell gets the detail of its place (its height above the weighted mean of the neighbourhood) on the level of its own neighbourhood. Heights as
-//! they are, the rule of the sources, took a third of the standard deviation from two real sites: no place fits a wide neighbourhood well, and a flat one
-//! fits it least badly.
+//! A cell gets the detail of its place (its height above the weighted mean of the neighbourhood) on the level of its own neighbourhood. Copying
+//! heights unchanged, as the sources do, took a third of the standard deviation from two real sites: no place fits a wide neighbourhood well, and a
+//! flat one fits it least badly.
 //!
 //! # Copies
 //! Places that continue a neighbour copy runs of the site, as long as they fit best; the first cells, drawn alone, end each run after about one
-//! spacing. A run keeps the level it began with, so it copies details: hardly a cell has the very height of its source.
+//! spacing. A run keeps the level it began with, so it copies details: hardly any cell has exactly the height of its source.
 //! [`super::measured::Copies`] reports both.
 //!
 //! # Sources
@@ -31,8 +31,8 @@
 //! * Features wider than a few spacings are not seen as a whole. [`super::quilting`] keeps them up to the width of a patch.
 //! * Pieces of different places meet between the first cells, and roughen the smallest increments where the site is smooth: by 29 % along ridges
 //!   that are correlated over 3 cells (1 across), so that a ratio of increments of 2.4 became 1.9.
-//! * A site that is not stationary gives a texture that mixes its kinds of ground. A repeated feature (a furrow) need not stay in step.
-//! * The standard deviation has no bias that was found, but a tile with few first cells is a small sample: of tiles of 128 x 128 cells in an independent
+//! * A site that is not stationary gives a texture that mixes its kinds of ground. Periodic features (furrows) may fall out of phase.
+//! * No bias of the standard deviation was found, but a tile with few first cells is a small sample: of tiles of 128 x 128 cells in an independent
 //!   program, a synthetic site rough in patches gave 1.08 +- 0.06 of it and 1.07 +- 0.06 of the increments (spacing 8), two measured ones 1.00 +-
 //!   0.04 and 0.98 +- 0.01, 0.89 +- 0.15 and 0.97 +- 0.11 (spacing 32). The logarithm of the increments' flatness was lower, by 0.1, 0.9 and 0.2.
 //! * A gap in the site costs only the places whose neighbourhood it covers by more than 30 %. The DEM licence extends to the texture.

@@ -7,7 +7,7 @@
 //!
 //! (`transform.rs`). r is solved for at every lag, so that the covariance of z, with its anisotropy, is that of the residual. Negative
 //! eigenvalues of r are set to 0 and the others scaled to unit variance, which changes the covariance of z by about the same share of its variance as r
-//! ([`Modulated::covariance_error`], the largest change at any lag). Smooth ground has the least room, where patches are narrower than its waves.
+//! ([`Modulated::covariance_error`], the largest change at any lag). That change is largest on smooth ground whose waves are longer than the patches.
 //!
 //! | parameter | unit, range | meaning |
 //! |---|---|---|
@@ -47,7 +47,7 @@
 //! | gullies, 50 cm | 0.10 (0.01), 24 | 131, 99, 55, 25, 14, 8.7 | 9.9, 9.4, 8.7, 7.6, 6.5, 5.6 | 8.7, 8.4, 7.8, 6.9, 5.9, 5.8 |
 //! | volcanic cone, 1 m | 0.70 (0.34), 32 | 6.7, 6.7, 6.9, 7.5, 8.3, 6.4 | 19, 16, 13, 9.3, 6.6, 4.7 | 3.7, 3.7, 3.6, 3.5, 3.5, 3.6 |
 //!
-//! So: right where roughness comes in patches; too low where rims and steps on smooth ground make it, which are not patches; too high where quiet
+//! The flatness is thus right where roughness comes in patches, too low where it comes from rims and steps on smooth ground, and too high where quiet
 //! ground is far quieter than log-normal. Not reproduced either: third-order structure (the field looks the same with its axes reversed), ridges, and
 //! whatever else needs aligned phases: use `wavelet_statistics`.
 //!

@@ -1,4 +1,4 @@
-//! Least-error cut between a patch and what lies there already.
+//! Least-error cut between a patch and the patches already laid.
 
 /// Widths of the strips of a patch that lie on earlier patches, cells: north and west, then south and east.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]

@@ -47,7 +47,7 @@
 //! * Cells near the border of a site or of a wide gap lie in few patches and occur seldom.
 //! * Gaps of less than about 13 cells are closed first, by direct sampling from the site itself ([`super::exemplar`]). Patches with a wider gap are not
 //!   used: a site with many gets smaller patches; below [`PATCH_MIN`] cells it is refused.
-//! * No statistic is beyond the site's: a texture from one boulder never shows two kinds. The DEM licence extends to it.
+//! * A texture shows nothing that the site does not have: from one boulder it never makes a second kind. The DEM licence extends to it.
 //!
 //! # Cost
 //! Per patch two transforms (three where a part of the site is searched) of at most 16 384 blocks and of at most 32 blocks for each cell of the

@@ -1,4 +1,4 @@
-//! Search of the place of a site whose patch fits best onto what lies there already.
+//! Search for the place of a site whose patch best fits the patches already laid.
 //!
 //! # Mismatch
 //! With t the known heights of a patch and z(s) the site's at the same cells of a patch from s, as vectors over these cells:
@@ -6,11 +6,11 @@
 //! `mismatch(s) = |t - z(s)|^2 / (|t| |z(s)|) = a + 1/a - 2 r`
 //!
 //! where a is the ratio of `|z(s)|` to `|t|`, and r their correlation. The sum `|t - z|^2` of Efros and Freeman is `|t|^2 (1 + a^2 - 2 a r)`,
-//! least at a = r: of patches that correlate with their surroundings by r, it prefers those that are calmer than these by the factor r, and each patch
-//! laid is calmer than those before. The mismatch is least at a = 1, and 1/a fits as well as a does.
+//! least at a = r: of patches whose correlation with their surroundings is r, it prefers those that are calmer than these by the factor r, so that each
+//! patch is calmer than those before. The mismatch is least at a = 1, and 1/a fits as well as a does.
 //!
 //! # Use
-//! Without more, the roughest or the calmest part of a site takes over, because like fits like. So the mismatch is multiplied by a cost,
+//! With this mismatch alone, the roughest or the calmest part of a site takes over, because like fits like. So it is multiplied by a cost,
 //!
 //! `1 + evenness max(0, u(s) - v)`
 //!

@@ -1,4 +1,4 @@
-//! Weighted differences between neighbouring cells: their distributions, and fields that have given ones.
+//! Weighted differences between neighbouring cells: their distributions, and fields with given distributions of them.
 //!
 //! Differences D_i z (increments over 1, 2, 4 ... cells along rows and columns and over one cell along diagonals, the Laplacian, the height
 //! itself) are the finite-difference wavelets of a surface. A distribution is imposed on each by the monotone map between quantiles,
@@ -6,7 +6,7 @@
 //!
 //! `z + F^-1[ F( sum w_i D_i' (d_i - D_i z) ) / sum w_i |F D_i|^2 ]`, `1 / w_i` the sum of the squared weights of D_i
 //!
-//! (Heeger and Bergen 1995, with differences in place of subbands). Repeated, all distributions are met nearly.
+//! (Heeger and Bergen 1995, with differences in place of subbands). After a few repetitions all distributions are nearly met.
 
 use crate::synth::statistics::{spectrum, tails};
 use rayon::prelude::*;

@@ -1,5 +1,5 @@
-//! A field with the wavelet statistics of a residual: distributions of its differences, its covariance, and how the magnitudes of its
-//! wavelets go together across octaves and directions.
+//! A field with the wavelet statistics of a residual: distributions of its differences, its covariance, and the joint statistics of the
+//! magnitudes of its wavelets across octaves and directions.
 //!
 //! From a normal field on a torus, `rounds` times, in this order:
 //! 1. magnitudes: each band of the field ([`Wavelets`]: octaves j, four directions) is a complex field u with logarithm
@@ -11,7 +11,7 @@
 //! 3. differences: the distributions of increments (lags of 1, 2, 4 ... 64 cells along rows and columns, 1 along diagonals), of the Laplacian
 //!    and of the heights are imposed by quantiles (`differences.rs`).
 //!
-//! [`FINISHING`] rounds of 2 and 3 end it. The number of rounds is fixed and all sums run in a fixed order.
+//! [`FINISHING`] rounds of steps 2 and 3 follow. The number of rounds is fixed and all sums run in a fixed order.
 //!
 //! Source: Portilla and Simoncelli 2000, International Journal of Computer Vision 40, 49, doi:10.1023/A:1026553619983 (joint statistics, reached by
 //! projections from noise); Heeger and Bergen 1995, SIGGRAPH, 229, doi:10.1145/218380.218446 (distributions); Dowson and Landau 1982, Journal of
@@ -39,7 +39,7 @@
 //! and the covariance of heights alone, at 0.35 with joint logarithms of magnitudes (step 1) and at 0.23 with the spectra of the Laplacian
 //! as well. All of this was measured with 0 in holes, before they were filled (`filling.rs`).
 //!
-//! Limits. Statistics are those of the whole residual: a site with unlike parts becomes one with patches of each, to 128 cells wide.
+//! Limits. Statistics are those of the whole residual: a site whose parts differ becomes a texture with patches of each, up to 128 cells wide.
 //! Every realisation has nearly the same covariance and distributions, so realisations differ less than parts of a site do. Edges
 //! longer than the coarsest wavelets, and shapes (a boulder's outline), are not reproduced. A torus of fewer cells than the residual
 //! exaggerates the tails, because its extremes are those of the residual; textures that are not periodic are cut from one of at least

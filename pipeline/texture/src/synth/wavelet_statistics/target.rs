@@ -1,4 +1,4 @@
-//! A covariance that a field on a torus shall have at the lags of a table, and nothing said beyond them.
+//! The target covariance of a field on a torus: given at the lags of a table, unspecified beyond them.
 //!
 //! Each mode is multiplied by the root of the wanted power over the field's own, both smoothed in the same way: their covariances are
 //! multiplied by Bartlett's window over the lags of the table, whose transform is nowhere negative. A field whose covariance is the table's at
