@@ -247,7 +247,7 @@ mod tests {
         assert_eq!(names, ["a", "a-2", "a-2-2", "a-3", "unnamed", "unnamed-2"]);
     }
 
-    /// Counts on the head of the page; what there is none of is left out.
+    /// Counts at the head of the page; kinds that the release lacks are left out.
     #[test]
     fn val_the_head_counts_what_there_is() {
         let mut data = crate::tests::made_up::empty();

@@ -48,7 +48,7 @@ impl State {
     }
 }
 
-/// A line of this style that is drawn again and again, unless quiet or stderr is no terminal.
+/// A line of this style that is redrawn repeatedly, unless quiet or stderr is not a terminal.
 fn on_terminal(quiet: bool, style: &str) -> Option<ProgressBar> {
     (!quiet && std::io::stderr().is_terminal()).then(|| {
         let bar = ProgressBar::with_draw_target(Some(0), ProgressDrawTarget::stderr());

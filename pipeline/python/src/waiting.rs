@@ -86,7 +86,7 @@ pub fn waited<T: Send + 'static>(
     watched(py, None, move |_| work())
 }
 
-/// Does work that tells a listener; `progress(done, total, what)` is called on the caller's thread.
+/// Does work that reports to a listener; `progress(done, total, what)` is called on the caller's thread.
 pub fn watched<T: Send + 'static>(
     py: Python<'_>,
     progress: Option<&Bound<'_, PyAny>>,

@@ -53,7 +53,7 @@ pub fn read(path: &Path) -> Result<String, Error> {
 /// As [`load`].
 ///
 /// # Examples
-/// All errors are told at once, each with its place in the text.
+/// All errors are reported at once, each with its place in the text.
 ///
 /// ```
 /// use sastrugi_stages::Error;

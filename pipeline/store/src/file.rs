@@ -5,7 +5,7 @@ use std::fs::{self, File, FileType};
 use std::io::{self, ErrorKind, Read};
 use std::path::Path;
 
-/// True for an address such as `s3://bucket/a` or `gs:/a`: a path that starts with a scheme. A single letter is none.
+/// True for an address such as `s3://bucket/a` or `gs:/a`: a path that starts with a scheme. A single letter is not a scheme.
 ///
 /// ```
 /// use sastrugi_store::file::is_address;

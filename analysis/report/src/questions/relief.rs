@@ -124,7 +124,7 @@ pub fn deviations(
     Ok(Some(figure(words, description, map, numbers(path, grid, own_range))))
 }
 
-/// A map that goes with heights, in plain colours over `range`; `title` is the quantity and its unit.
+/// A map that accompanies heights, in plain colours over `range`; `title` is the quantity and its unit.
 pub fn values(
     grid: &Grid,
     path: &str,

@@ -178,7 +178,7 @@ pub enum RecoverError {
 /// use sastrugi_imaging::photoclinometry::{Known, RecoverError, Settings, recover};
 /// use sastrugi_numeric::{Geometry, Grid, Streams};
 ///
-/// // An inversion is in the example of the crate; without images there is none.
+/// // The example of the crate shows an inversion; without images it is refused.
 /// let start = Grid::filled(Geometry::square(8, 8, 1.0), 0.0);
 /// let found = recover(&[], &start, &Known::default(), &Settings::default(), &Streams::for_seed(1, "example"));
 /// assert_eq!(found.unwrap_err(), RecoverError::TooFewImages(0));

@@ -201,7 +201,7 @@ fn whitening([uu, uv, vv]: [f64; 3]) -> [([f64; 2], f64); 2] {
 mod tests {
     use super::*;
 
-    /// The top and the curvature of a paraboloid are exact; a saddle, or a top beyond the neighbours, is none.
+    /// The top and the curvature of a paraboloid are exact; a saddle, or a top beyond the neighbours, does not count.
     #[test]
     fn val_a_paraboloid_is_found_exactly() {
         let of = |[u0, v0]: [f64; 2], [a, b, c]: [f64; 3]| {

@@ -152,8 +152,8 @@ fn check_alpha([site, texture]: [usize; 2], quantities: usize, alpha: f64) -> Re
     }
 }
 
-/// The smallest p-value that blocks of site and texture can have: one of all arrangements, of which two are alike where the numbers are equal
-/// (the sides are exchanged), and one of those drawn.
+/// The smallest p-value that blocks of site and texture can have: one arrangement of all (two if site and texture have equal numbers of blocks,
+/// because exchanging the sides gives the same distance), and no less than one of those drawn.
 fn least_p(site: usize, texture: usize) -> f64 {
     let arrangements = (1..=texture).fold(1.0, |all, k| all * (site + k) as f64 / k as f64);
     let alike = if site == texture { 2.0 } else { 1.0 };
@@ -456,7 +456,7 @@ mod tests {
         assert!((distances.interleaved.unwrap() - 1.0 / 1.5).abs() < 1e-12);
     }
 
-    /// Halves of seven columns of blocks: the middle one belongs to the west. A part of one block is none.
+    /// Halves of seven columns of blocks: the middle one belongs to the west. One block alone is not a part.
     #[test]
     fn val_halves_of_blocks() {
         let row: Vec<Block> = (0..7).map(|c| block([3, c], 1.0)).collect();
@@ -467,7 +467,7 @@ mod tests {
 
     /// Null: blocks of both sides are independent draws of one distribution. 400 pairs of 16 and 12 blocks, p <= 0.1 in at most 66 of 400: beyond
     /// that with probability 5e-5 (binomial), as the test is exact without widening. A texture that repeats itself, with blocks of a tenth of the
-    /// scatter, is told by its spread in all.
+    /// scatter, is detected by its spread in all of them.
     #[test]
     fn stat_permutations_are_exact_and_tell_repetition() {
         let mut stream = Streams::for_seed(2, "blocks-test").stream("values");

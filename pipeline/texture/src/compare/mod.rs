@@ -147,7 +147,7 @@ pub struct Comparison {
     pub what: &'static str,
     /// Every quantity.
     pub quantities: Vec<Quantity>,
-    /// For halves: the same quantities with interleaved blocks in place of the halves. They are no part of the answer.
+    /// For halves: the same quantities with interleaved blocks in place of the halves. They are not part of the answer.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub interleaved: Option<Vec<Quantity>>,
     /// For statistics: the blocks that were compared, and copies found.

@@ -219,7 +219,7 @@ pub fn check<P: ResidualParameters>(raw: &Value) -> Result<Box<dyn Method>, Para
     Ok(Box::new(Checked { tile, own }))
 }
 
-/// Refuses what only textures from a covariance have.
+/// Refuses parameters that only textures from a covariance have.
 ///
 /// # Errors
 /// A key of [`OF_COVARIANCE`].
