@@ -2,13 +2,14 @@
 //! of the cells inside the cloud hold a point.
 //!
 //! A cell is inside if its block of 4 x 4 cells and the eight neighbouring blocks all hold points, so that neither the outline of
-//! the cloud nor its large holes count. Sizes are tried from coarse to fine, starting well above the size that evenly distributed
-//! points would need,
+//! the cloud nor its large holes count. Sizes are tried from coarse to fine, starting well above the size that points evenly
+//! distributed over their bounding box, or along it if it is thin, would need: with m of n points in each cell,
 //!
-//! $$ 1 - e^{-n c^2 / A} = 3/4, \qquad c_0 = \sqrt{\ln 4 \; A / n}, $$
+//! $$ 1 - e^{-m} = 3/4, \qquad c_0 = \max\left( \sqrt{m w h / n}, \; m (w + h) / n \right), $$
 //!
-//! with n points in a bounding box of area A. If the share s of occupied cells passes three quarters between two sizes, the
-//! nearer one in the logarithm (s linear in between) is taken: the finer one if the two shares sum to more than 3/2.
+//! where w and h are width and height of the box; the grid then has no more than 2 n / m + 1 cells. If the share s of occupied
+//! cells passes three quarters between two sizes, the nearer one in the logarithm (s linear in between) is taken: the finer one
+//! if the two shares sum to more than 3/2.
 //!
 //! Cost: one pass over the points for every five sizes; one bit per cell.
 
@@ -70,17 +71,12 @@ fn size(k: i32) -> f64 {
     if power < 0 { digit / ten } else { digit * ten }
 }
 
-/// The first size that would suffice if the points were evenly distributed over their bounding box (or along a line).
+/// The first size that would suffice if the points were evenly distributed over their bounding box, or along it.
 fn first_guess(survey: &Survey) -> i32 {
     let [width, height] = [0, 1].map(|axis| survey.high[axis] - survey.low[axis]);
-    let n = survey.points as f64;
-    let cell = if width * height > 0.0 {
-        (POINTS_PER_CELL * width * height / n).sqrt()
-    } else if width + height > 0.0 {
-        POINTS_PER_CELL * (width + height) / n
-    } else {
-        1.0
-    };
+    let per_point = POINTS_PER_CELL / survey.points as f64;
+    let cell = (per_point * width * height).sqrt().max(per_point * (width + height));
+    let cell = if cell > 0.0 { cell } else { 1.0 };
     (-60..60).find(|k| size(*k) >= cell).unwrap_or(60)
 }
 

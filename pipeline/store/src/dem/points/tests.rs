@@ -264,6 +264,17 @@ fn val_a_cell_size_is_chosen() {
     }
 }
 
+/// However thin a cloud, its grid has few more cells than the cloud has points: 7 points along 4.98 m need cells of 0.99 m.
+#[test]
+fn val_a_thin_cloud_gets_few_cells() {
+    let places: Vec<[i32; 3]> = (0..7).map(|i| [100 + 830 * i, 100 + i % 2, 0]).collect();
+    for places in [places.clone(), places.iter().map(|[x, y, z]| [*y, *x, *z]).collect()] {
+        let gridded = grid_bytes(&plain(&ground(&places)), &GridSettings::default()).unwrap();
+        let g = gridded.dem.grid.geometry;
+        assert_eq!((g.cell, g.rows.min(g.cols), g.rows.max(g.cols)), ([1.0; 2], 1, 6));
+    }
+}
+
 /// Evenly scattered points, n per square metre: a share 1 - exp(-n c^2) of cells of side c holds some. For n = 100 the shares at 0.1 m
 /// and 0.2 m are 0.63 and 0.98, whose sum is above 3/2, so the finer size is chosen; for n = 60 they are 0.45 and 0.91: the coarser. With
 /// 10 000 cells or more the shares are known to 0.005.
