@@ -1,9 +1,11 @@
-//! Recordings, MCAP.
+//! Recordings, MCAP: all of it, and its summary alone.
 #![no_main]
 
 use sastrugi_fuzz::file;
-use sastrugi_store::mcap::read_log;
+use sastrugi_store::mcap::{describe_file, read_log};
 
 libfuzzer_sys::fuzz_target!(|bytes: &[u8]| {
-    let _ = read_log(&file("a.mcap", bytes));
+    let path = file("a.mcap", bytes);
+    let _ = read_log(&path);
+    let _ = describe_file(&path);
 });

@@ -24,14 +24,16 @@ pub use team::{TeamMcap, encode_team, write_team};
 use crate::PROGRAM;
 use crate::atomic::{self, Target};
 use crate::digest::ContentHash;
+use crate::guard::unless_panicking;
 use foxglove::messages as fox;
 use mcap::records::{MessageHeader, Metadata};
+use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use mcap::{Compression, WriteOptions, Writer};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::topics::{self, Recording, Topic};
 use std::collections::BTreeMap;
-use std::io::{self, Cursor};
+use std::io::{self, Cursor, Read, Seek};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -308,9 +310,12 @@ pub fn describe_bag(folder: &Path) -> Result<serde_json::Value, McapError> {
 /// # Errors
 /// [`McapError::Unusable`] for a file without a readable summary, [`McapError::Io`] for one that cannot be read.
 pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
-    let bytes = crate::file::read(path).map_err(|source| McapError::Io { path: path.to_owned(), source })?;
     let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
-    let summary = mcap::Summary::read(&bytes).map_err(|e| unusable(format!("not a complete MCAP file: {e}")))?;
+    let summary = unless_panicking(|| read_summary(path)).unwrap_or(Err(mcap::McapError::BadFooter));
+    let summary = summary.map_err(|error| match error {
+        mcap::McapError::Io(source) => McapError::Io { path: path.to_owned(), source },
+        error => unusable(format!("not a complete MCAP file: {error}")),
+    })?;
     let summary = summary.ok_or_else(|| unusable("the file has no summary: it is incomplete".to_owned()))?;
     let stats = summary.stats.ok_or_else(|| unusable("the summary has no statistics".to_owned()))?;
     let count = |id: &u16| stats.channel_message_counts.get(id).copied().unwrap_or(0);
@@ -323,6 +328,26 @@ pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
         "topics": topics,
         "metadata": summary.metadata_indexes.iter().map(|m| m.name.as_str()).collect::<Vec<_>>(),
     }))
+}
+
+/// The summary at the end of an MCAP file, if it has one; of the rest, nothing is read.
+fn read_summary(path: &Path) -> mcap::McapResult<Option<mcap::Summary>> {
+    let mut file = crate::file::open(path)?;
+    let options = SummaryReaderOptions::default().with_file_size(file.metadata()?.len());
+    let mut reader = SummaryReader::new_with_options(options);
+    while let Some(event) = reader.next_event() {
+        match event? {
+            SummaryReadEvent::ReadRequest(wanted) => {
+                let read = file.read(reader.insert(wanted))?;
+                reader.notify_read(read);
+            }
+            SummaryReadEvent::SeekRequest(to) => {
+                let place = file.seek(to)?;
+                reader.notify_seeked(place);
+            }
+        }
+    }
+    Ok(reader.finish())
 }
 
 /// The text of `metadata.yaml`, which makes the folder of a ROS 2 recording a bag.

@@ -427,6 +427,24 @@ fn prop_logs_are_read_back() {
     }
 }
 
+/// An attachment that ends within its own header, on which the parser of records panics: found by the fuzz target `log`.
+#[test]
+fn val_a_short_attachment_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("log.mcap");
+    std::fs::write(&path, include_bytes!("../../../../fuzz/seeds/log/short_attachment.mcap")).unwrap();
+    let error = read_log(&path).unwrap_err().to_string();
+    assert!(error.contains("the file is damaged after 0 messages: malformed record"), "{error}");
+    // The same record as the summary of a file.
+    let record = &std::fs::read(&path).unwrap()[8..8 + 9 + 41];
+    let mut bytes = ::mcap::MAGIC.to_vec();
+    bytes.extend_from_slice(record);
+    bytes.extend([&[2][..], &20_u64.to_le_bytes(), &8_u64.to_le_bytes(), &[0; 12], ::mcap::MAGIC].concat());
+    std::fs::write(&path, bytes).unwrap();
+    let error = describe_file(&path).unwrap_err().to_string();
+    assert!(error.contains("not a complete MCAP file"), "{error}");
+}
+
 /// A ROS 2 recording has the exact numbers of the recording, and its file nothing of the other flavour.
 #[test]
 fn prop_ros2_recordings_are_read_back() {

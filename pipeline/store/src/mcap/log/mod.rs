@@ -7,6 +7,7 @@ mod foxglove;
 mod ros2;
 
 use super::{McapError, bag_files};
+use crate::guard::unless_panicking;
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use sastrugi_schemas::log::{ImuStream, Log, PoseStream, TimedForce, TimedPose, TransformStream};
@@ -103,7 +104,7 @@ fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
             }
             Ok(LinearReadEvent::Record { data, opcode }) => {
                 let damaged = |e| unusable(format!("the file is damaged after {} messages: {e}", gathered.messages));
-                let record = mcap::parse_record(opcode, data).map_err(damaged)?;
+                let record = parse(opcode, data).map_err(damaged)?;
                 gathered.take(&record).map_err(unusable)?;
             }
             Err(mcap::McapError::UnexpectedEof) if gathered.begun => {
@@ -120,6 +121,13 @@ fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
         }
     }
     Ok(())
+}
+
+/// One record.
+fn parse(opcode: u8, data: &[u8]) -> Result<Record<'_>, String> {
+    // The parser panics on an attachment that ends within its own header.
+    let parsed = unless_panicking(|| mcap::parse_record(opcode, data));
+    parsed.ok_or_else(|| "malformed record".to_owned())?.map_err(|e| e.to_string())
 }
 
 /// A channel whose messages are read.
