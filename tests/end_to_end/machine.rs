@@ -93,6 +93,47 @@ fn val_machine_errors_are_not_failed_items() {
     assert_eq!(sums(&path.join("release")), before);
 }
 
+/// Every verb that writes a file says that the disk is full, and leaves neither the file nor a part of it; an earlier file stays.
+#[cfg(unix)]
+#[test]
+fn val_a_full_disk_leaves_no_part_of_a_file() {
+    let folder = area();
+    let path = folder.path();
+    let ground = sastrugi_in(path, &["terrain", "mavs_perlin", "-o", "ground.tif"]);
+    assert_eq!(ground.code, 0, "{}", ground.stderr);
+    study(path);
+    assert_eq!(run(path, &[]).code, 0);
+    write(path, "new.asc", "earlier");
+    let before = names(path);
+    for arguments in [
+        "terrain mavs_perlin -o new.tif",
+        "convert ground.tif new.asc",
+        "convert ground.tif new.npy",
+        "convert ground.tif new.png",
+        "convert ground.tif new.obj",
+        "convert ground.tif new.glb",
+        "convert ground.tif new.usda",
+        "hillshade ground.tif -o new.png",
+        "render ground.tif -o new.tif",
+        "pack release -o new.tar.zst",
+        "report release -o new",
+    ] {
+        let limited = format!("ulimit -f 8; exec {} {arguments}", program().display());
+        let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
+        assert!(call.code == 1 && call.stderr.contains("File too large"), "{arguments}: {} {}", call.code, call.stderr);
+        assert_eq!(names(path), before, "{arguments}");
+    }
+    assert_eq!(fs::read_to_string(path.join("new.asc")).unwrap(), "earlier");
+}
+
+/// Names in a folder, sorted.
+#[cfg(unix)]
+fn names(folder: &Path) -> Vec<std::ffi::OsString> {
+    let mut names: Vec<_> = fs::read_dir(folder).unwrap().map(|entry| entry.unwrap().file_name()).collect();
+    names.sort();
+    names
+}
+
 /// Pipes and devices, which may never end or never start, are not read, whether named on the command line or in a study.
 #[cfg(unix)]
 #[test]
@@ -163,6 +204,30 @@ fn val_a_lack_of_memory_does_not_crash() {
     let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
     assert!(call.code == 75 && call.stderr.contains("memory"), "{} {}", call.code, call.stderr);
     assert!(!path.join("out.tif").exists());
+}
+
+/// Wherever memory ends, in the reader, a kernel, the compressor or as threads start, the code is the same: of the file, nothing is wrong.
+#[cfg(unix)]
+#[test]
+fn val_a_lack_of_memory_is_no_fault_of_the_file() {
+    let folder = area();
+    let path = folder.path();
+    let size = "size_m=[300.0, 300.0]";
+    let made = sastrugi_in(path, &["terrain", "mavs_perlin", "--set", size, "-o", "ground.tif"]);
+    assert_eq!(made.code, 0, "{}", made.stderr);
+    let (mut short, mut whole) = (0, 0);
+    for kib in (100_000..300_000).step_by(8000) {
+        for verb in ["convert ground.tif new.tif", "hillshade ground.tif -o new.png"] {
+            let limited = format!("ulimit -v {kib}; exec {} {verb} --threads 2", program().display());
+            let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
+            assert!([0, 75].contains(&call.code), "{verb}, {kib} KiB: {} {}", call.code, call.stderr);
+            let outputs = names(path).len() - 1;
+            assert_eq!(outputs, usize::from(call.code == 0), "{verb}, {kib} KiB: {:?}", names(path));
+            *if outputs == 0 { &mut short } else { &mut whole } += 1;
+            ["new.tif", "new.png"].iter().for_each(|name| fs::remove_file(path.join(name)).unwrap_or_default());
+        }
+    }
+    assert!(short > 10 && whole > 4, "{short} {whole}");
 }
 
 /// A memory limit holds: no work is started that needs more. Without one, the same study runs, and `plan` states the memory that it needs.

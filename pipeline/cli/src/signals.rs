@@ -7,6 +7,7 @@ use signal_hook::consts::{SIGABRT, SIGHUP, SIGINT, SIGTERM, SIGXFSZ};
 use signal_hook::flag;
 use signal_hook::iterator::Signals;
 use std::io;
+use std::panic;
 use std::sync::Arc;
 use std::sync::atomic::AtomicBool;
 
@@ -19,11 +20,26 @@ pub fn listen() -> io::Result<()> {
     flag::register(SIGXFSZ, Arc::default())?;
     // When an allocation fails, the standard library prints a message and aborts. The call may succeed with more memory.
     flag::register_conditional_shutdown(SIGABRT, i32::from(Code::Retry as u8), Arc::new(AtomicBool::new(true)))?;
+    abort_where_zlib_lacks_memory();
     let mut signals = Signals::new([SIGINT, SIGTERM, SIGHUP])?;
     std::thread::Builder::new()
         .name("signals".to_owned())
         .spawn(move || signals.forever().for_each(|_| interrupted()))?;
     Ok(())
+}
+
+/// zlib-rs panics where it cannot allocate; that then ends as other failed allocations do.
+fn abort_where_zlib_lacks_memory() {
+    let report = panic::take_hook();
+    panic::set_hook(Box::new(move |info| {
+        let place = info.location().map_or("", |place| place.file());
+        let message = info.payload().downcast_ref::<String>().map_or("", String::as_str);
+        if place.contains("zlib-rs") && message.contains("MemError") {
+            warn("memory allocation failed in a compressor");
+            std::process::abort();
+        }
+        report(info);
+    }));
 }
 
 /// Files appear only when they are complete, so the process may exit at any time. What it leaves under temporary names, the next run removes.

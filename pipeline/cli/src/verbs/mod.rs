@@ -21,6 +21,7 @@ mod study;
 use crate::Verdict;
 use crate::args::{self, Arguments, Compress, Verb, Writing};
 use crate::failure::Failure;
+use sastrugi_stages::Error;
 use sastrugi_stages::remote::check_local;
 use sastrugi_stages::verbs::{Reading, numbers};
 use sastrugi_store::atomic;
@@ -68,7 +69,8 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
 /// Starts the thread pool of the kernels.
 pub fn start_threads(threads: Option<u16>) -> Result<(), Failure> {
     let threads = usize::from(threads.unwrap_or(0));
-    rayon::ThreadPoolBuilder::new().num_threads(threads).build_global().map_err(Failure::failed)
+    let started = rayon::ThreadPoolBuilder::new().num_threads(threads).build_global();
+    started.map_err(|e| Failure(Error::Retry(format!("threads cannot be started: {e}; try fewer `--threads`"))))
 }
 
 /// How a DEM is written to `output`.

@@ -11,12 +11,15 @@ use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOpti
 use geotiff_reader::geokeys::{GeoKeyDirectory, GeoKeyValue};
 use geotiff_reader::{GeoTiffFile, GeoTiffOpenOptions};
 use sastrugi_numeric::{Geometry, Grid};
+use std::error::Error;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
+use std::iter::successors;
 use std::ops::Range;
 use std::path::Path;
 use tiff::decoder::{Decoder, DecodingResult, Limits};
 use tiff::tags::Tag;
+use tiff_reader::TiffError;
 
 /// Raster bytes allowed per byte of file: Zstandard, the best case, stores 128 KiB of one value in 4 bytes.
 const MAX_EXPANSION: u64 = 1 << 15;
@@ -92,8 +95,14 @@ fn unreferenced<R: Read + Seek>(reader: R) -> Option<Decoder<R>> {
     (!referenced).then_some(decoder)
 }
 
-fn refused(error: &dyn std::error::Error) -> Refusal {
-    Refusal::new(format!("not a readable TIFF: {error}"))
+fn refused(error: &(dyn Error + 'static)) -> Refusal {
+    let cause = successors(Some(error), |&e| e.source()).find_map(|e| e.downcast_ref());
+    match cause {
+        Some(TiffError::DecodeOutputAllocationFailed { requested, .. }) => {
+            Refusal::lack_of_memory(format!("out of memory: {requested} bytes cannot be allocated"))
+        }
+        _ => Refusal::new(format!("not a readable TIFF: {error}")),
+    }
 }
 
 /// An open TIFF of heights, with nothing decoded yet.

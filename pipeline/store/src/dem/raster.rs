@@ -126,22 +126,35 @@ impl DemError {
 
 /// Reason why input or a request is unusable.
 #[derive(Debug, thiserror::Error)]
-#[error("{0}")]
-pub(crate) struct Refusal(String);
+#[error("{reason}")]
+pub(crate) struct Refusal {
+    reason: String,
+    /// The cause is a lack of memory, not the file.
+    lacks_memory: bool,
+}
 
 impl Refusal {
     pub(crate) fn new(reason: impl Into<String>) -> Self {
-        Self(reason.into())
+        Self { reason: reason.into(), lacks_memory: false }
+    }
+
+    /// A file that may be read once there is more memory.
+    pub(crate) fn lack_of_memory(reason: impl Into<String>) -> Self {
+        Self { reason: reason.into(), lacks_memory: true }
     }
 
     /// Error that blames the file.
     pub(crate) fn about(self, path: &Path) -> DemError {
-        DemError::Unusable { path: path.to_owned(), reason: self.0 }
+        let (path, reason) = (path.to_owned(), self.reason);
+        if self.lacks_memory {
+            return DemError::Io { path, source: io::Error::new(io::ErrorKind::OutOfMemory, reason) };
+        }
+        DemError::Unusable { path, reason }
     }
 
     /// Error that blames the request.
     pub(crate) fn unfit(self, path: &Path) -> DemError {
-        DemError::Unfit { path: path.to_owned(), reason: self.0 }
+        DemError::Unfit { path: path.to_owned(), reason: self.reason }
     }
 }
 
