@@ -160,6 +160,33 @@ fn val_fuzz_targets_use_the_locked_versions() {
     assert!(other.is_empty(), "copy Cargo.lock to fuzz/ and run `cargo update --workspace` there: {other:?}");
 }
 
+/// Every fuzz target is built by `fuzz/run`, starts from a seed, and has a row that states what it has run.
+#[test]
+fn val_every_fuzz_target_has_seeds_and_a_row() {
+    let root = sastrugi_fixtures::workspace_root();
+    let text = |file: &str| std::fs::read_to_string(root.join(file)).unwrap();
+    let below = |folder: &str| -> BTreeSet<String> {
+        let entries = std::fs::read_dir(root.join(folder)).unwrap().map(|entry| entry.unwrap().path());
+        entries.map(|path| path.file_stem().unwrap().to_str().unwrap().to_owned()).collect()
+    };
+    let targets = below("fuzz/targets");
+    assert!(targets.len() > 10, "{targets:?}");
+    let manifest = text("fuzz/Cargo.toml");
+    let built = manifest.split("[[bin]]").skip(1).map(|bin| bin.split('"').nth(1).unwrap().to_owned());
+    assert_eq!(built.collect::<BTreeSet<_>>(), targets);
+    for target in &targets {
+        assert!(std::fs::read_dir(root.join("fuzz/seeds").join(target)).unwrap().next().is_some(), "{target}");
+    }
+    let page = text("CONTRIBUTING.md");
+    let (_, table) = page.split_once("| target | reads |").unwrap();
+    let rows = table
+        .lines()
+        .skip(2)
+        .map_while(|line| line.strip_prefix("| `"))
+        .map(|row| row.split('`').next().unwrap().to_owned());
+    assert_eq!(rows.collect::<BTreeSet<_>>(), targets);
+}
+
 /// The build script of `stages` leaves modules of this name out of the revisions in cache keys.
 #[test]
 fn val_modules_named_tests_are_compiled_for_tests_only() {
