@@ -167,14 +167,14 @@ pub enum Verb {
     #[command(after_help = "A damaged release is not packed; the exit code is then 4.\n\n\
         Example:\n  sastrugi pack release -o release.tar")]
     Pack(Pack),
-    /// Test whether two releases, two DEMs or two fits are statistically the same, or a texture like its site.
+    /// Test whether two releases, two DEMs or two fits are statistically the same, or whether a texture matches its site.
     #[command(after_help = "The verdict on each quantity is: same (within the bounds), different, or cannot tell.\n\n\
         Two releases are compared file by file (hashes), then by the metrics in the tables missions and\n\
         terrains, group by group, with terrains as the independent units. `--fail-on-difference` exits\n\
         with code 4 when a metric is different or, for releases of the same study by the same version,\n\
         when a file is missing or any byte differs.\n\n\
-        With --split-half and --statistics, the distance between parts of the site stands beside every\n\
-        distance of the texture.\n\n\
+        With --split-half and --statistics, every distance of the texture is shown next to the distances\n\
+        between parts of the site.\n\n\
         Examples:\n  \
         sastrugi compare release other-release --margin 0.1\n  \
         sastrugi compare site.tif synthetic.tif --outer-scale 2\n  \
@@ -336,8 +336,8 @@ pub struct Run {
     /// Compute only what more than one of N shards needs, publish it to --cache, and write no release.
     #[arg(long, value_name = "N", value_parser = clap::value_parser!(u32).range(1..=i64::from(PARTS_MAX)), requires = "cache", conflicts_with_all = ["shard", "output"])]
     pub ancestors: Option<u32>,
-    /// Shared cache: a folder, or s3://BUCKET/PREFIX, that any number of runs may use at the same time, also over a network. Items in it are
-    /// copied, others are published to it.
+    /// Shared cache: a folder, or s3://BUCKET/PREFIX, that any number of runs may use at the same time, also over a network. Finished items
+    /// are copied from it; new ones are published to it.
     #[arg(long, value_name = "DIR|s3://...")]
     pub cache: Option<String>,
     /// Read the shared cache without writing to it.
@@ -606,10 +606,10 @@ pub struct Coregister {
 /// Masks with which the DEM of a fit was fitted.
 #[derive(Debug, Args)]
 pub struct ExemplarMasks {
-    /// With `--exemplar`: a `--mask` of the fit; all of them, in its order.
+    /// With `--exemplar`: the `--mask` files of the fit, all of them and in the same order.
     #[arg(long, value_name = "FILE", requires = "exemplar")]
     pub mask: Vec<PathBuf>,
-    /// With `--exemplar`: an `--exclude` of the fit, likewise.
+    /// With `--exemplar`: the `--exclude` files of the fit, likewise.
     #[arg(long, value_name = "FILE", requires = "exemplar")]
     pub exclude: Vec<PathBuf>,
 }
@@ -661,8 +661,8 @@ pub struct Texture {
     /// Factor on the heights of the texture: one number above 0, or with `--onto` a raster of factors, 0 or above.
     #[arg(long, value_name = "FACTOR|RASTER")]
     pub amplitude: Option<String>,
-    /// Only fill the holes of this DEM, with texture conditioned on their surroundings: of `fft_ma`, or of a method that repeats the
-    /// site. `--cell` gives the cell size of a DEM that states none.
+    /// Only fill the holes of this DEM, with texture conditioned on their surroundings; `--method` must be `fft_ma` or one that
+    /// repeats the site. `--cell` gives the cell size of a DEM that states none.
     #[arg(long, value_name = "DEM", conflicts_with_all = ["onto", "size", "tile", "phase", "covariance", "amplitude", "set"])]
     pub fill: Option<PathBuf>,
     /// Set any other parameter of the method (see `kinds`), `name=value`.
@@ -997,8 +997,8 @@ pub struct Compare {
     /// Fit one half of A, and compare textures of that fit with the other half in statistics that were not fitted.
     #[arg(long, conflicts_with_all = ["b", "window_b", "statistics"])]
     pub split_half: bool,
-    /// Judge B, a texture of any origin, against the site A by statistics of their blocks: what blocks of the site give against each
-    /// other is the reference.
+    /// Compare B, a texture of any origin, with the site A by statistics of their blocks; the reference is how far blocks of the site
+    /// differ from each other.
     #[arg(long)]
     pub statistics: bool,
     /// Exit with code 4 when any quantity is different (for releases of the same study and version: any byte).

@@ -101,7 +101,7 @@ pub fn title(data: &Data, id: &str, plain: &str) -> String {
 /// Meaning of the paper's mark, for a legend.
 pub fn mark_in_words(paper: &Paper, figure: &str) -> String {
     if paper.prints_changes_only(figure) {
-        "paper: its changes from our first median".into()
+        "paper: its changes added to our first median".into()
     } else {
         "paper's median".into()
     }

@@ -339,7 +339,7 @@ impl<'a> Inversion<'a> {
         let condition = problem.solve(Some([0.0, 0.0, 1.0])).map_or(f64::INFINITY, |fit| fit.condition);
         if condition > CONDITION_WARNING {
             self.warnings.push(format!(
-                "these suns hardly separate slopes from albedo: the condition number on level ground is {condition:.0}"
+                "these sun positions barely separate slopes from albedo: the condition number on level ground is {condition:.0}"
             ));
         }
     }

@@ -32,7 +32,7 @@ pub struct Request<'a> {
     pub a: Side<'a>,
     /// B; if absent, textures fitted to one half of A are compared with its other half.
     pub b: Option<Side<'a>>,
-    /// Judge B, a DEM of any origin, by the statistics of its blocks against those of A.
+    /// Compare B, a DEM of any origin, with A by statistics of their blocks.
     pub by_statistics: bool,
     /// Parameters of the comparison.
     pub parameters: Value,

@@ -207,7 +207,7 @@ pub fn encode(name: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Re
 
 /// The bytes of a file, and notes on what the format loses.
 fn render(path: &Path, grid: &Grid, crs: &Crs, options: &WriteOptions) -> Result<(Vec<u8>, Vec<String>), Refusal> {
-    let unknown = || Refusal::new(format!("the ending names no DEM format; use {WRITTEN_ENDINGS}"));
+    let unknown = || Refusal::new(format!("unknown extension; DEMs are written as {WRITTEN_ENDINGS}"));
     let codec = formats::of_name(path).ok_or_else(unknown)?;
     let render = codec.render.ok_or_else(|| Refusal::new("point clouds can be read but not written"))?;
     render(path, grid, crs, options)
