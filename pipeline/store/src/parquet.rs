@@ -5,6 +5,7 @@
 //! are sorted by their keys, which are never null; a `NaN` is stored as null, also within a list. Memory is bounded by one row
 //! group, whatever the number of rows.
 
+mod footer;
 mod stream;
 #[cfg(test)]
 mod tests;
@@ -512,7 +513,14 @@ impl<T: ArrowPrimitiveType> Lists<T> {
 }
 
 fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<File>, TableError> {
-    let file = crate::file::open(path).map_err(|e| TableError::io(path, e))?;
+    let io = |e| TableError::io(path, e);
+    let mut file = crate::file::open(path).map_err(io)?;
+    if !footer::is_sound(&mut file).map_err(io)? {
+        return Err(TableError::unusable(
+            path,
+            "the file is damaged: its footer has fields that Parquet does not define",
+        ));
+    }
     let builder = decoding(path, || ParquetRecordBatchReaderBuilder::try_new(file))?;
     let found = builder.schema();
     for (column, expected) in schema(table, None).fields().iter().enumerate() {

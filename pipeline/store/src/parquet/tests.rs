@@ -238,6 +238,16 @@ fn val_columns_are_visited_in_the_named_order() {
     assert!(files.visit(["pairs", "wheels"], |_| ControlFlow::Continue(())).is_err());
 }
 
+/// A footer of 15 kB with lists of up to 2^31 booleans in unknown fields, each skipped one by one: found by the fuzz target `tables`.
+#[test]
+fn val_lists_that_are_not_there_are_not_skipped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    fs::write(&path, include_bytes!("../../../../fuzz/seeds/tables/booleans.parquet")).unwrap();
+    let error = read_table::<SampleRow>(&path).unwrap_err().to_string();
+    assert!(error.contains("fields that Parquet does not define"), "{error}");
+}
+
 #[test]
 fn val_unusable_tables_are_refused() {
     let folder = tempfile::tempdir().unwrap();
