@@ -16,11 +16,14 @@ use sastrugi_store::{dem, digest, parquet};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
 use std::fs;
+use std::io::ErrorKind;
 use std::path::{Component, Path, PathBuf};
 
 /// Folders with data, so that the counts on the page are the same before and after sealing.
 const DATA_FOLDERS: [&str; 10] =
     ["classes", "dem", "fit", "image", "mcap", "photoclinometry", "route", TABLES, "terrain", "texture"];
+/// The one of these whose files are only counted.
+const RECORDINGS: &str = "mcap";
 const STUDY: &str = "study.toml";
 
 impl Data {
@@ -28,7 +31,7 @@ impl Data {
     ///
     /// # Errors
     /// [`ReportError::NotARelease`] for a folder that is not a release, [`ReportError::Shard`] for a shard of one; a file that exists but
-    /// cannot be read.
+    /// cannot be read; a file that the manifest lists and the report reads, but which is missing or not a regular file.
     pub fn open(folder: &Path) -> Result<Self, ReportError> {
         let release = Release { folder: folder.to_owned() };
         if folder.join(SHARD).is_file() {
@@ -42,7 +45,7 @@ impl Data {
         let terrains: Vec<TerrainRow> = release.rows()?;
         let without_curves = without_curves(study.seed, &terrains);
         let kept = |surface_id: &str| !without_curves.contains(surface_id);
-        let (contents, manifest) = contents(folder, &terrains)?;
+        let (contents, manifest) = release.contents(&terrains)?;
         let (version, failed) =
             manifest.map_or_else(|| (env!("CARGO_PKG_VERSION").into(), Vec::new()), |m| (m.version, m.failed));
         Ok(Self {
@@ -107,22 +110,10 @@ impl Data {
     }
 }
 
-/// Content hashes of the heightfields by path, and the manifest, checked, without its list of files; nothing before a release is sealed.
-fn contents(
-    folder: &Path,
-    terrains: &[TerrainRow],
-) -> Result<(BTreeMap<String, String>, Option<Manifest>), ReportError> {
-    let mut contents = BTreeMap::new();
-    if !folder.join(MANIFEST).is_file() {
-        return Ok((contents, None));
-    }
-    let paths: BTreeSet<&str> = terrains.iter().map(|terrain| terrain.path.as_str()).collect();
-    let manifest = sastrugi_store::release::for_each_artifact(folder, |artifact| {
-        if let Some(content) = artifact.origin.content_sha256.filter(|_| paths.contains(artifact.path.as_str())) {
-            contents.insert(artifact.path, content);
-        }
-    });
-    Ok((contents, Some(manifest.map_err(|e| read_error(MANIFEST, e))?)))
+/// True for the files that the report reads, now or when a figure needs them.
+fn is_read(path: &str) -> bool {
+    let folder = path.split_once('/').map_or("", |(folder, _)| folder);
+    path == STUDY || (folder != RECORDINGS && DATA_FOLDERS.contains(&folder))
 }
 
 /// A release folder.
@@ -168,7 +159,40 @@ impl Files for Release {
 }
 
 impl Release {
-    /// Reads a file if it exists. A path that leads out of the release counts as missing.
+    /// Content hashes of the heightfields by path, and the manifest, checked, without its list of files; nothing before a release is
+    /// sealed. The files that a manifest lists and the report reads must be there: without one, the page would leave something out in
+    /// silence.
+    fn contents(&self, terrains: &[TerrainRow]) -> Result<(BTreeMap<String, String>, Option<Manifest>), ReportError> {
+        let mut contents = BTreeMap::new();
+        if fs::symlink_metadata(self.folder.join(MANIFEST)).is_err() {
+            return Ok((contents, None));
+        }
+        let paths: BTreeSet<&str> = terrains.iter().map(|terrain| terrain.path.as_str()).collect();
+        let mut there = Ok(());
+        let manifest = sastrugi_store::release::for_each_artifact(&self.folder, |artifact| {
+            if there.is_ok() && is_read(&artifact.path) {
+                there = self.check_listed(&artifact.path);
+            }
+            if let Some(content) = artifact.origin.content_sha256.filter(|_| paths.contains(artifact.path.as_str())) {
+                contents.insert(artifact.path, content);
+            }
+        });
+        let manifest = manifest.map_err(|e| read_error(MANIFEST, e))?;
+        there.map(|()| (contents, Some(manifest)))
+    }
+
+    /// Refuses a file that the manifest lists, but which is missing or not a regular file.
+    fn check_listed(&self, path: &str) -> Result<(), ReportError> {
+        let fault = match fs::metadata(self.folder.join(path)) {
+            Ok(found) if found.is_file() => return Ok(()),
+            Ok(_) => "not a regular file",
+            Err(e) if matches!(e.kind(), ErrorKind::NotFound | ErrorKind::NotADirectory) => "missing",
+            Err(e) => return Err(read_error(path, e)),
+        };
+        Err(read_error(path, format!("{fault}, although {MANIFEST} lists it; `sastrugi verify` finds all such files")))
+    }
+
+    /// Reads a file if it exists. A folder, and a path that leads out of the release, count as missing; a pipe or a device is refused.
     fn read<T, E: Display>(
         &self,
         path: &str,
@@ -176,7 +200,7 @@ impl Release {
     ) -> Result<Option<T>, ReportError> {
         let inside = Path::new(path).components().all(|part| matches!(part, Component::Normal(_)));
         let file = self.folder.join(path);
-        if !inside || !file.is_file() {
+        if !inside || !file.exists() || file.is_dir() {
             return Ok(None);
         }
         read(&file).map(Some).map_err(|e| read_error(path, e))

@@ -30,7 +30,8 @@ pub struct Summary {
 ///
 /// # Errors
 /// A file `out`, or a folder that contains anything but a report; a file of the release that exists but cannot be read; a file that
-/// cannot be written. Missing parts of a release are not an error: the page leaves them out.
+/// cannot be written; a file that is missing or not a regular file, although the manifest lists it. Parts that a release does not have are not
+/// an error: the page leaves them out.
 ///
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {

@@ -5,7 +5,7 @@ use crate::{Companions, ReportError, Summary, render, render_with};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{FailedItem, Origin};
 use sastrugi_store::dem::{self, Crs};
-use sastrugi_store::release::{Head, PartWriter, ReleaseBuilder, TablePart};
+use sastrugi_store::release::{Head, PartWriter, ReleaseBuilder, TablePart, for_each_artifact};
 use std::collections::BTreeMap;
 use std::fs;
 use std::path::Path;
@@ -256,6 +256,80 @@ fn val_the_study_is_read() {
     };
     assert_eq!(creators("creators = [{ name = \"A\", orcid = \"0\" }, \"B\"]\n"), ["A", "B"]);
     assert_eq!(creators("[[study.creators]]\nname = \"C\"\n[[study.creators]]\nname = \"D\"\n"), ["C", "D"]);
+}
+
+/// Why a release cannot be read; `None` if it can.
+fn refusal(release: &Path) -> Option<String> {
+    let error = crate::data::Data::open(release).err()?;
+    assert!(error.unusable_input(), "{error}");
+    Some(error.to_string())
+}
+
+/// Of a sealed release, every file that the manifest lists and the report reads must be there: one that is missing, or that a folder
+/// replaces, is named. Recordings are not read. Without a manifest, whatever is missing is left out.
+#[test]
+fn val_listed_files_must_be_there() {
+    let folder = tempfile::tempdir().unwrap();
+    let [dest, aside, out] = ["release", "aside", "out"].map(|name| folder.path().join(name));
+    let mut builder = assembled(&dest);
+    builder.write_text("mcap/a/1.mcap", "recorded", Origin::default()).unwrap();
+    builder.seal(&dest).unwrap();
+    assert_eq!(refusal(&dest), None);
+    let mut listed = Vec::new();
+    for_each_artifact(&dest, |artifact| listed.push(artifact.path)).unwrap();
+    for kind in
+        ["study.toml", "classes/", "dem/", "fit/", "tables/missions/", "tables/samples/", "terrain/", "texture/"]
+    {
+        assert!(listed.iter().any(|path| path.starts_with(kind)), "{kind}");
+    }
+    let refused = |path: &str, fault: &str| {
+        format!(
+            "read {path} of the release: {fault}, although manifest.json lists it; `sastrugi verify` finds all such files"
+        )
+    };
+    for path in listed.iter().filter(|path| !path.starts_with("mcap/")) {
+        let file = dest.join(path);
+        fs::rename(&file, &aside).unwrap();
+        assert_eq!(refusal(&dest), Some(refused(path, "missing")));
+        fs::create_dir(&file).unwrap();
+        assert_eq!(refusal(&dest), Some(refused(path, "not a regular file")));
+        fs::remove_dir(&file).unwrap();
+        fs::rename(&aside, &file).unwrap();
+    }
+    fs::remove_file(dest.join("mcap/a/1.mcap")).unwrap();
+    assert_eq!(refusal(&dest), None);
+
+    // The same of the release to compare with; nothing is written.
+    let table = "tables/missions/part-0000.parquet";
+    fs::remove_file(dest.join(table)).unwrap();
+    let companions = Companions { against: Some(dest.clone()), ..Companions::default() };
+    let whole = assembled(&folder.path().join("whole"));
+    let error = render_with(whole.staging(), &companions, &out, &|_| ()).unwrap_err();
+    assert!(error.unusable_input() && error.to_string().contains(&format!("{table}: missing")), "{error}");
+    assert!(!out.exists());
+    fs::remove_file(dest.join("manifest.json")).unwrap();
+    assert_eq!(refusal(&dest), None);
+}
+
+/// A pipe in place of the manifest or of a file is refused, neither taken for a missing file nor waited for.
+#[cfg(unix)]
+#[test]
+fn val_pipes_are_not_missing_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    assembled(&dest).seal(&dest).unwrap();
+    let replaced_by_a_pipe = |path: &str| {
+        let file = dest.join(path);
+        fs::remove_file(&file).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&file).status().unwrap().success());
+        let refused = refusal(&dest).unwrap();
+        fs::remove_file(&file).unwrap();
+        refused
+    };
+    for path in ["tables/missions/part-0000.parquet", "manifest.json", "tables/fits/part-0000.parquet"] {
+        let refused = replaced_by_a_pipe(path);
+        assert!(refused.starts_with(&format!("read {path} of the release: ")), "{refused}");
+    }
 }
 
 #[test]
