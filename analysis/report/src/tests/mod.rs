@@ -503,6 +503,50 @@ fn val_claims_that_no_data_could_support_are_undecided() {
     assert_eq!(rows(&report(&data).0, "hypotheses")[0][1], "cannot tell: too few terrains");
 }
 
+/// One terrain in a group has no scatter, so no data could show equivalence: too few terrains, although every group has missions. The same
+/// where the terrains are paired, and for a difference.
+#[test]
+fn val_one_terrain_in_a_group_is_too_few() {
+    let groups = ["2.30", "2.60"];
+    let claims = [
+        serde_json::json!({ "statistic": "success", "groups": groups, "test": "equivalence", "margin": 50.0, "family": "a" }),
+        serde_json::json!({ "statistic": "success", "groups": groups, "test": "difference", "family": "b" }),
+    ];
+    let mut data = made_up::full(1, 24);
+    data.study.hypotheses = claims.into_iter().map(claim).collect();
+    for paired in [true, false] {
+        if !paired {
+            data.missions.iter_mut().enumerate().for_each(|(k, m)| m.pair_id = format!("{k}").into());
+        }
+        for row in rows(&report(&data).0, "hypotheses") {
+            assert_eq!(row[1], "cannot tell: too few terrains", "{paired} {row:?}");
+            assert_eq!([6, 7].map(|column| row[column].as_f64()), [Some(1.0); 2], "{paired} {row:?}");
+        }
+    }
+}
+
+/// Both groups have successful missions, but no pair has one in both: the verdict does not say that a group has none.
+#[test]
+fn val_groups_without_common_pairs_are_not_called_empty() {
+    let mut data = made_up::full(6, 24);
+    for mission in &mut data.missions {
+        let even = mission.pair_id.ends_with(['0', '2', '4', '6', '8']);
+        let fails = even == mission.terrain_id.starts_with("d2.60");
+        mission.outcome = if fails { "stuck" } else { "success" }.into();
+    }
+    let groups = ["2.30", "2.60"];
+    data.study.hypotheses = vec![
+        claim(serde_json::json!({ "statistic": "time_s", "groups": groups, "test": "difference", "family": "a" })),
+        claim(
+            serde_json::json!({ "statistic": "time_s", "groups": groups, "test": "equivalence", "margin": 1.0, "family": "b" }),
+        ),
+        claim(serde_json::json!({ "statistic": "time_s", "family": "c" })),
+    ];
+    for row in rows(&report(&data).0, "hypotheses") {
+        assert_eq!(row[1], "cannot tell: no paired missions have this metric in all groups", "{row:?}");
+    }
+}
+
 /// Six blocks reach 2 / 64 at best: enough for one claim at 5 %, too few for two in a family.
 #[test]
 fn val_family_size_decides_whether_terrains_suffice() {

@@ -8,13 +8,14 @@ use crate::questions::clusters::Pairing;
 use crate::questions::sql;
 use crate::render::number as set;
 use sastrugi_schemas::study::{Direction, HypothesisItem, HypothesisTest};
-use sastrugi_statistics::{Difference, Interval, MeanDifference, holm};
+use sastrugi_statistics::{Difference, Interval, holm};
 use std::collections::BTreeSet;
 
 /// A hypothesis after its test.
 struct Tested<'a> {
     claim: &'a HypothesisItem,
     words: String,
+    /// Terrains or blocks compared; empty where a group has no missions with the metric.
     of: String,
     /// What the estimate measures.
     what: &'static str,
@@ -106,10 +107,11 @@ fn test<'a>(
             Tested { what: "shift", estimate, way: difference.way(), ..tested }
         }
         (Measure::Pair(Difference { means, .. }), Some(margin)) => {
-            let of = |p: fn(&MeanDifference, f64) -> f64| means.map_or(f64::NAN, |d| p(&d, margin));
+            // With one terrain in a group, no data have a standard error: no p below 1 is possible.
+            let least_p = if means.is_some() { 0.0 } else { test.map_or(f64::NAN, |_| 1.0) };
+            let p = means.map_or(least_p, |d| d.equivalence_p(margin));
+            let beyond_p = means.map_or(f64::NAN, |d| d.beyond_p(margin));
             let estimate = means.map(|d| d.interval(1.0 - 2.0 * claim.alpha));
-            let (p, beyond_p) = (of(MeanDifference::equivalence_p), of(MeanDifference::beyond_p));
-            let least_p = if means.is_some() { 0.0 } else { f64::NAN };
             Tested { what: "difference of means", estimate, p, beyond_p, least_p, ..tested }
         }
     }
@@ -159,6 +161,7 @@ enum Outcome {
     Apart,
     CannotTell,
     NoMissions,
+    NoPairs,
     TooFew,
 }
 
@@ -172,6 +175,7 @@ impl Outcome {
             Self::Apart => "not supported: the groups differ by more than the margin",
             Self::CannotTell => "cannot tell",
             Self::NoMissions => "cannot tell: a group has no missions with this metric",
+            Self::NoPairs => "cannot tell: no paired missions have this metric in all groups",
             Self::TooFew => "cannot tell: too few terrains",
         }
     }
@@ -181,7 +185,7 @@ impl Outcome {
     }
 
     const fn is_open(self) -> bool {
-        matches!(self, Self::CannotTell | Self::NoMissions | Self::TooFew)
+        matches!(self, Self::CannotTell | Self::NoMissions | Self::NoPairs | Self::TooFew)
     }
 }
 
@@ -191,7 +195,8 @@ impl Tested<'_> {
         match self.claim.margin {
             Some(_) if found => Outcome::Equivalent,
             _ if found => self.direction(),
-            _ if self.p.is_nan() => Outcome::NoMissions,
+            _ if self.of.is_empty() => Outcome::NoMissions,
+            _ if self.p.is_nan() => Outcome::NoPairs,
             _ if self.least_adjusted > self.claim.alpha => Outcome::TooFew,
             // Bonferroni's adjustment over the family.
             Some(_) if self.beyond_p * self.family as f64 <= self.claim.alpha => Outcome::Apart,
