@@ -92,6 +92,30 @@ fn prop_a_full_report_is_sound() {
     assert!(page.contains("Settings differ"));
 }
 
+/// The residual of a texture is stored at amplitude 1, its heights are not: the verdict, the summary, the table and the legends say so.
+#[test]
+fn val_the_amplitude_of_a_texture_is_stated() {
+    let mut data = made_up::full(1, 24);
+    let words = [
+        "This is at amplitude 1; the file has 0.5 times these heights.",
+        "as synthesised, times 0.5",
+        "heights times 0.5",
+    ];
+    let page = |data: &Data| report(data).0.remove("index.html").unwrap();
+    let plain = page(&data);
+    assert!(!words.iter().any(|words| plain.contains(words)) && plain.contains("as synthesised"));
+    let texture = data.terrains.iter_mut().find(|t| t.terrain_id == "texture").unwrap();
+    texture.params = r#"{"fit":"jacksboro-corrected","method":"fft_ma","amplitude":0.5}"#.into();
+    let (files, _) = report(&data);
+    assert_sound(&files);
+    let page = &files["index.html"];
+    assert_eq!(page.matches(words[0]).count(), 2, "in the summary and in the section");
+    assert!(words.iter().all(|words| page.contains(words)));
+    let table: serde_json::Value = serde_json::from_str(&files["data/figures-of-texture.json"]).unwrap();
+    assert_eq!(table["columns"][3]["name"], "as synthesised, times 0.5");
+    assert!(table["title"].as_str().unwrap().ends_with("The residual of the texture is that at amplitude 1"));
+}
+
 /// Conditions of plain queries use only columns of their table.
 #[test]
 fn prop_conditions_name_columns_of_their_table() {

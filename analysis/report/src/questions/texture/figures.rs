@@ -37,13 +37,13 @@ pub fn residual_id(texture: &TerrainRow) -> String {
 pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
     let residual = residual_id(texture);
     let sides = [
-        ("measured", data.surface(fit)),
-        ("texture residual", data.surface(&residual)),
-        ("as synthesised", data.surface(&texture.terrain_id)),
+        ("measured".to_owned(), data.surface(fit)),
+        ("texture residual".to_owned(), data.surface(&residual)),
+        (super::synthesised(texture), data.surface(&texture.terrain_id)),
     ];
-    let present: Vec<(&str, &SurfaceRow)> = sides.into_iter().filter_map(|(name, s)| Some((name, s?))).collect();
+    let present: Vec<(String, &SurfaceRow)> = sides.into_iter().filter_map(|(name, s)| Some((name, s?))).collect();
     let columns: Vec<(&str, &str)> =
-        [("parameter", "")].into_iter().chain(present.iter().map(|(name, _)| (*name, ""))).collect();
+        [("parameter", "")].into_iter().chain(present.iter().map(|(name, _)| (name.as_str(), ""))).collect();
     let query = format!(
         "select * from 'tables/surfaces/*.parquet' where surface_id in ({})",
         [fit, &residual, &texture.terrain_id].map(quoted).join(", ")
@@ -58,8 +58,11 @@ pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
     if !present.is_empty() {
         numbers.row([text("lags of the exponent, m")].into_iter().chain(present.iter().map(|(_, s)| lags(s))));
     }
-    let caption =
-        "Residual of the fit; texture after the same detrending and trimming; texture as synthesised".to_owned();
+    let caption = format!(
+        "Residual of the fit; texture after the same detrending and trimming; texture as synthesised.{}",
+        super::residual_note(texture)
+    );
+    let caption = caption.trim_end_matches('.').to_owned();
     TableBlock { id: slug(&format!("figures-of-{}", texture.terrain_id)), caption, numbers }
 }
 

@@ -66,6 +66,26 @@ fn alone(texture: &TerrainRow) -> Option<String> {
     data::parameter(texture, "fit").filter(|_| data::parameter(texture, "onto").is_none())
 }
 
+/// The factor on the heights in the file of a texture; `None` if it is 1. The residual of the texture is taken before, so that it can be
+/// compared with that of the fit.
+fn amplitude(texture: &TerrainRow) -> Option<f64> {
+    let params: serde_json::Value = serde_json::from_str(&texture.params).ok()?;
+    params.get("amplitude")?.as_f64().filter(|factor| *factor != 1.0)
+}
+
+/// To which heights a comparison of residuals applies, after a sentence about them; empty at amplitude 1.
+fn at_amplitude(texture: &TerrainRow) -> String {
+    let words =
+        |factor: f64| format!(" This is at amplitude 1; the file has {} times these heights.", set::plain(factor, 4));
+    amplitude(texture).map_or_else(String::new, words)
+}
+
+/// Name of the surface in the file of a texture.
+fn synthesised(texture: &TerrainRow) -> String {
+    let words = |factor: f64| format!("as synthesised, times {}", set::plain(factor, 4));
+    amplitude(texture).map_or_else(|| "as synthesised".to_owned(), words)
+}
+
 /// Textures that are not placed onto a base, each with its fit.
 fn standing_alone(data: &Data) -> impl Iterator<Item = (&TerrainRow, String)> {
     data.of_stage("texture").filter_map(|texture| Some((texture, alone(texture)?)))
@@ -174,8 +194,10 @@ fn patches(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Vec<Figure>, 
             words("measured", "Measured.", caption),
         )?);
     }
+    let scaled =
+        amplitude(texture).map_or_else(String::new, |factor| format!(", heights times {}", set::plain(factor, 4)));
     let caption = format!(
-        "{}, {ground}; same scale and colours. It is not detrended, so it still has its long waves.",
+        "{}, {ground}{scaled}; same scale and colours. It is not detrended, so it still has its long waves.",
         texture.terrain_id
     );
     figures.extend(deviations(&synthetic, &texture.path, limit, "no data", words("synthetic", "Synthetic.", caption))?);
@@ -193,18 +215,17 @@ const RESIDUAL: Stroke = Stroke { paint: Paint::Series(1), width: 1.9, dash: "6 
 const SYNTHESISED: Stroke = Stroke { paint: Paint::Series(0), width: 1.4, dash: "2 3", opacity: 1.0 };
 
 /// Surfaces drawn in one frame: name, id, line.
-fn sides(fit: &str, texture: &TerrainRow) -> [(&'static str, String, Stroke); 3] {
+fn sides(fit: &str, texture: &TerrainRow) -> [(String, String, Stroke); 3] {
     [
-        ("measured residual", fit.to_owned(), MEASURED),
-        ("synthetic, residual", figures::residual_id(texture), RESIDUAL),
-        ("as synthesised", texture.terrain_id.clone(), SYNTHESISED),
+        ("measured residual".into(), fit.to_owned(), MEASURED),
+        ("synthetic, residual".into(), figures::residual_id(texture), RESIDUAL),
+        (synthesised(texture), texture.terrain_id.clone(), SYNTHESISED),
     ]
 }
 
 /// Curves of the residual (stored under the id of its fit) and of the texture.
 fn together(fit: &str, texture: &TerrainRow, points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Curve> {
-    let curve =
-        |(name, id, stroke): (&str, String, Stroke)| Curve { name: Some(name.into()), stroke, points: points(&id) };
+    let curve = |(name, id, stroke): (String, String, Stroke)| Curve { name: Some(name), stroke, points: points(&id) };
     sides(fit, texture).into_iter().map(curve).filter(|c| c.points.len() > 1).collect()
 }
 
@@ -226,7 +247,7 @@ impl Chart<'_> {
         Figure {
             id: slug(&format!("{}-{}", self.what, texture.terrain_id)),
             title: self.title.into(),
-            caption: with_measured(self.caption, self.measured, curves),
+            caption: format!("{}{}", with_measured(self.caption, self.measured, curves), residual_note(texture)),
             description: format!("{} {}.", self.caption, names_of(curves)),
             svg: plot.svg,
             numbers,
@@ -333,6 +354,11 @@ fn tiling(data: &Data, texture: &TerrainRow) -> Result<Option<Figure>, ReportErr
         ),
     };
     relief_of(&tiled, &texture.path, Some(style).filter(|s| s.range_m.0 < s.range_m.1), words)
+}
+
+/// What a caption says about curves of the residual of a texture whose heights were scaled.
+fn residual_note(texture: &TerrainRow) -> &'static str {
+    if amplitude(texture).is_some() { " The residual of the texture is that at amplitude 1." } else { "" }
 }
 
 /// The caption, with the note on the measured curve if there is one.

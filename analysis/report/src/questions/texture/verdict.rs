@@ -57,6 +57,12 @@ pub enum Answer {
 
 /// Answer and sentence for a texture of a fit; `None` where the release does not describe both surfaces.
 pub fn of_texture(data: &Data, texture: &TerrainRow, fit: &str) -> Option<(Answer, String)> {
+    let (answer, sentence) = of_residual(data, texture, fit)?;
+    Some((answer, sentence + &super::at_amplitude(texture)))
+}
+
+/// The same for the texture at amplitude 1, whose residual is stored.
+fn of_residual(data: &Data, texture: &TerrainRow, fit: &str) -> Option<(Answer, String)> {
     let fit = data.fits.iter().find(|f| f.fit_id == fit)?;
     let compared = compared(data, texture, fit)?;
     if fit.stationarity_p < ALPHA {
