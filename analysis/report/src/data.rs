@@ -68,6 +68,8 @@ pub struct Study {
     pub name: String,
     /// Title.
     pub title: String,
+    /// Version of the dataset; empty if the study states none.
+    pub version: String,
     /// A paragraph.
     pub description: String,
     /// Seed of every random stream.

@@ -321,6 +321,7 @@ fn study(toml: &str) -> Result<Study, String> {
     Ok(Study {
         name: text("name"),
         title: text("title"),
+        version: text("version"),
         description: text("description"),
         seed: item("seed").and_then(|v| v.as_integer()).and_then(|n| u64::try_from(n).ok()).unwrap_or_default(),
         date: text("date"),

@@ -183,6 +183,7 @@ fn head(data: &Data) -> Head {
     let title = if study.title.is_empty() { &study.name } else { &study.title };
     let facts = [
         ("study", study.name.clone()),
+        ("version", study.version.clone()),
         ("date", study.date.clone()),
         ("seed", study.seed.to_string()),
         ("licence", study.license.clone()),

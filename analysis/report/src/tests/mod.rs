@@ -527,6 +527,31 @@ fn val_claims_that_no_data_could_support_are_undecided() {
     assert_eq!(rows(&report(&data).0, "hypotheses")[0][1], "cannot tell: too few terrains");
 }
 
+/// The summary names each claim with its verdict and the reason for it.
+#[test]
+fn val_the_summary_names_the_claims() {
+    let mut data = made_up::full(3, 24);
+    let groups = ["2.30", "2.60"];
+    let success = serde_json::json!({ "statistic": "success", "groups": groups, "test": "difference" });
+    data.study.hypotheses = vec![claim(success.clone())];
+    let summary = |data: &Data| {
+        let page = report(data).0.remove("index.html").unwrap();
+        page.split("<section id=\"summary\">")
+            .nth(1)
+            .unwrap()
+            .split("</section>")
+            .next()
+            .unwrap()
+            .replace("&quot;", "\"")
+    };
+    let words = "\"success on a terrain differs from 2.30 to 2.60\" (cannot tell: too few terrains)";
+    let one = format!("One hypothesis was declared; the data cannot decide it: {words}.");
+    assert!(summary(&data).contains(&one), "{}", summary(&data));
+    data.study.hypotheses = vec![claim(success); 6];
+    let six = format!("Of 6 declared hypotheses, 6 are undecided: {}; and 2 more.", [words; 4].join("; "));
+    assert!(summary(&data).contains(&six), "{}", summary(&data));
+}
+
 /// One terrain in a group has no scatter, so no data could show equivalence: too few terrains, although every group has missions. The same
 /// where the terrains are paired, and for a difference.
 #[test]

@@ -250,6 +250,12 @@ fn val_the_study_is_read() {
     assert_eq!((plain.name.as_str(), plain.title.as_str(), plain.seed), ("made-up", "A <title>", 7));
     assert_eq!((plain.date.as_str(), plain.license.as_str()), ("2026-11-21", "CC0-1.0"));
     assert_eq!((plain.description.as_str(), plain.creators), ("Two hills.", vec!["A".to_owned(), "B".to_owned()]));
+    assert_eq!((plain.version.as_str(), study("version = \"1.2\"\n").version.as_str()), ("", "1.2"));
+    let facts = |version: &str| format!("<dt>version</dt><dd>{version}</dd>");
+    let page = report(folder.path()).0.remove("index.html").unwrap();
+    assert!(page.contains(&facts("1.2")), "the head of the page names the version of the dataset");
+    study("");
+    assert!(!report(folder.path()).0["index.html"].contains("<dt>version</dt>"));
     let creators = |toml: &str| {
         fs::write(folder.path().join("study.toml"), format!("[study]\n{toml}")).unwrap();
         crate::data::Data::open(folder.path()).unwrap().study.creators

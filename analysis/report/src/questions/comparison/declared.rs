@@ -11,6 +11,9 @@ use sastrugi_schemas::study::{Direction, HypothesisItem, HypothesisTest};
 use sastrugi_statistics::{Difference, Interval, holm};
 use std::collections::BTreeSet;
 
+/// Claims named in a sentence; the table has all.
+const NAMED_MAX: usize = 4;
+
 /// A hypothesis after its test.
 struct Tested<'a> {
     claim: &'a HypothesisItem,
@@ -49,9 +52,15 @@ pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, Mission>], pairing: &Pa
     ]
 }
 
-/// The number of supported, unsupported and undecided claims, in a sentence.
+/// The number of supported, unsupported and undecided claims, and each claim with its verdict, in a sentence.
 pub fn sentence<'a>(data: &'a Data, groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> String {
-    in_words(&tested(data, groups, pairing))
+    let tested = tested(data, groups, pairing);
+    let mut claims: Vec<String> =
+        tested.iter().take(NAMED_MAX).map(|t| format!("\"{}\" ({})", t.words, t.verdict())).collect();
+    if tested.len() > NAMED_MAX {
+        claims.push(format!("and {} more", set::count(tested.len() - NAMED_MAX)));
+    }
+    format!("{}: {}.", in_words(&tested).trim_end_matches('.'), claims.join("; "))
 }
 
 /// Every hypothesis with its test, adjusted over its family.
@@ -202,6 +211,17 @@ impl Tested<'_> {
             Some(_) if self.beyond_p * self.family as f64 <= self.claim.alpha => Outcome::Apart,
             Some(_) => Outcome::CannotTell,
             None => Outcome::NotSupported,
+        }
+    }
+
+    /// The verdict with its reason: the p that decided, or what kept it from deciding.
+    fn verdict(&self) -> String {
+        let words = self.outcome().words();
+        match self.outcome() {
+            Outcome::Supported | Outcome::Equivalent | Outcome::NotSupported | Outcome::CannotTell => {
+                format!("{words}, adjusted p {}", set::significant(self.adjusted, 2))
+            }
+            _ => words.to_owned(),
         }
     }
 
