@@ -184,6 +184,43 @@ fn prop_an_empty_release_has_a_page_without_empty_boxes() {
     assert!(!files["index.html"].contains("<section"));
 }
 
+/// A release without missions has a summary too: what it has, and how its routes or rovers fared, with the first picture of the page.
+#[test]
+fn val_every_release_has_a_summary() {
+    let terrains = || {
+        let mut data = made_up::full(2, 24);
+        data.missions.clear();
+        data.replicates.clear();
+        data.formations.clear();
+        data.fits.clear();
+        data.rover_effects.clear();
+        data.terrains.retain(|t| t.stage == "terrain" && t.variant.is_none());
+        data
+    };
+    let routes = || {
+        let mut data = terrains();
+        data.rovers.clear();
+        data
+    };
+    let summary = |data: &Data, words: &[&str], picture: &str| {
+        let (files, summary) = report(data);
+        assert_sound(&files);
+        let page = &files["index.html"];
+        let section = page.split("<section id=\"summary\">").nth(1).unwrap().split("</section>").next().unwrap();
+        assert!(words.iter().all(|words| section.contains(words)), "{words:?} {section}");
+        let pictures: Vec<&String> = summary.figures.iter().filter(|f| f.starts_with("summary-")).collect();
+        assert!(!pictures.is_empty() && pictures.iter().all(|f| f.starts_with(picture)), "{pictures:?}");
+    };
+    let has = "The release has 6 terrains in 3 groups (RMS slope ";
+    summary(&routes(), &[has, " searches by 3 methods found a route; the median length is "], "summary-routes-2.30");
+    let mut rovers = terrains();
+    rovers.routes.clear();
+    summary(&rovers, &[has, "of the rovers reach their goal"], "summary-rover-tracks-");
+    let mut alone = routes();
+    alone.routes.clear();
+    summary(&alone, &[has, ", relief "], "summary-relief-d2.30-");
+}
+
 /// Each optional part is removed in turn; the page adapts.
 #[test]
 fn prop_any_part_may_be_absent() {

@@ -127,6 +127,7 @@ fn val_the_verdict_names_wavelengths() {
         "the RMS height is 97 % of the truth&#39;s, the RMS slope 82 %",
         "The RMS height error is 4.00 m, for a true RMS height of 1.00 m; most of it is a tilt: 0.0500 m remain after subtracting the plane.",
         "recovered: height errors exceed three times the uncertainty",
+        "1 surface was recovered from images. recovered: RMS height and slope within",
     ] {
         let plain = words.replace("&#39;", "'");
         assert!(page.contains(words) || page.contains(&plain), "{words}");
@@ -143,6 +144,8 @@ fn val_the_verdict_names_wavelengths() {
         "photoclinometry-albedo-recovered",
         "photoclinometry-uncertainty-recovered",
         "photoclinometry-lit-recovered",
+        "summary-photoclinometry-truth-recovered",
+        "summary-photoclinometry-heights-recovered",
     ] {
         assert!(summary.figures.iter().any(|f| f == figure), "{figure} of {:?}", summary.figures);
     }

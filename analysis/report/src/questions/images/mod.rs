@@ -49,6 +49,12 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
+/// The first image; empty if the release has none.
+pub(super) fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
+    let first = data.images.first().map(|image| figure(data, image)).transpose()?;
+    Ok(first.flatten().into_iter().collect())
+}
+
 fn figure(data: &Data, image: &ImageRow) -> Result<Option<Figure>, ReportError> {
     let Some(grid) = data.files.grid(&image.path)? else { return Ok(None) };
     let picture = picture::brightness(&grid, display::white(&grid), PIXELS)?;

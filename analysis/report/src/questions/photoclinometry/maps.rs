@@ -18,12 +18,7 @@ const PIXELS: usize = 400;
 /// The maps for which the release has files.
 pub fn figures(data: &Data, surface: &Surface) -> Result<Vec<Figure>, ReportError> {
     let Some(recovered) = data.files.grid(&surface.row.path)? else { return Ok(Vec::new()) };
-    let truth = match data.terrain(&surface.row.surface_id) {
-        Some(terrain) => {
-            data.files.grid(&terrain.path)?.map(|grid| (terrain.path.as_str(), on_cells(&grid, &recovered)))
-        }
-        None => None,
-    };
+    let truth = truth(data, surface, &recovered)?;
     let mut figures = reliefs(surface, truth.as_ref().map(|t| (t.0, &t.1)), &recovered)?;
     if let Some((_, truth)) = &truth {
         figures.extend(errors(surface, truth, &recovered)?);
@@ -32,6 +27,20 @@ pub fn figures(data: &Data, surface: &Surface) -> Result<Vec<Figure>, ReportErro
     figures.extend(uncertainty(data, surface)?);
     figures.extend(lit(data, surface)?);
     Ok(figures)
+}
+
+/// The true and the recovered surface.
+pub fn both(data: &Data, surface: &Surface) -> Result<Vec<Figure>, ReportError> {
+    let Some(recovered) = data.files.grid(&surface.row.path)? else { return Ok(Vec::new()) };
+    let truth = truth(data, surface, &recovered)?;
+    reliefs(surface, truth.as_ref().map(|t| (t.0, &t.1)), &recovered)
+}
+
+/// Path and heights of the true surface, averaged over the cells of the recovered one, if the release has it.
+fn truth<'a>(data: &'a Data, surface: &Surface, recovered: &Grid) -> Result<Option<(&'a str, Grid)>, ReportError> {
+    let Some(terrain) = data.terrain(&surface.row.surface_id) else { return Ok(None) };
+    let heights = data.files.grid(&terrain.path)?;
+    Ok(heights.map(|grid| (terrain.path.as_str(), on_cells(&grid, recovered))))
 }
 
 /// A raster averaged over the cells of another.

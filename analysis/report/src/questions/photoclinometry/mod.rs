@@ -11,7 +11,7 @@ mod verdict;
 
 use super::Question;
 use crate::ReportError;
-use crate::content::Block;
+use crate::content::{Block, Figure};
 use crate::data::Data;
 use crate::render::number as set;
 use surfaces::{Surface, all, chosen};
@@ -65,6 +65,30 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     blocks.push(Block::FoldedTable(tables::inversions(&surfaces)));
     blocks.push(Block::FoldedTable(tables::bands(data)));
     Ok(blocks)
+}
+
+/// The surface with the smallest slope error, or the first where none is compared with a true one.
+fn best<'a, 'b>(surfaces: &'b [Surface<'a>]) -> Option<&'b Surface<'a>> {
+    let compared = surfaces.iter().filter(|s| s.compared());
+    compared.min_by(|a, b| a.row.slope_error_rms.total_cmp(&b.row.slope_error_rms)).or(surfaces.first())
+}
+
+/// How many surfaces were recovered, and how well the best; `None` without any.
+pub(super) fn in_words(data: &Data) -> Option<String> {
+    let surfaces = all(data);
+    let best = best(&surfaces)?;
+    let sentence = verdict::paragraphs(&[best], &covariances::pairs(data, &surfaces)).join(" ");
+    let recovered = format!("{} surfaces were recovered from images", set::count(surfaces.len()));
+    Some(match (surfaces.len(), best.compared()) {
+        (1, _) => format!("1 surface was recovered from images. {sentence}"),
+        (_, true) => format!("{recovered}. The smallest slope error has {sentence}"),
+        (_, false) => format!("{recovered}, without a true surface to compare with."),
+    })
+}
+
+/// That surface beside the true one; empty if the release has neither.
+pub(super) fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
+    best(&all(data)).map_or(Ok(Vec::new()), |surface| maps::both(data, surface))
 }
 
 /// How the drawn surfaces were chosen; `None` when all are drawn.

@@ -50,10 +50,21 @@ pub fn figures(data: &Data, methods: &[Method]) -> Result<Vec<Figure>, ReportErr
     let points = data.files.route_points()?;
     let mut figures = Vec::new();
     for (group, routes) in groups(data).into_iter().take(GROUPS_MAX) {
-        let drawn = middle(&routes);
-        figures.extend(figure(data, methods, &points, &group, &drawn)?);
+        let clip = format!("{}-clip", slug(&format!("routes-{group}")));
+        figures.extend(figure(data, methods, &points, (group.as_str(), &middle(&routes)[..]), &clip)?);
     }
     Ok(figures)
+}
+
+/// The first of these maps; `clip` is a name that is unique on the page.
+pub fn first(data: &Data, methods: &[Method], clip: &str) -> Result<Option<Figure>, ReportError> {
+    let points = data.files.route_points()?;
+    for (group, routes) in groups(data).into_iter().take(GROUPS_MAX) {
+        if let Some(map) = figure(data, methods, &points, (group.as_str(), &middle(&routes)[..]), clip)? {
+            return Ok(Some(map));
+        }
+    }
+    Ok(None)
 }
 
 /// Routes of the pair with the median cost among those that most methods connect.
@@ -73,8 +84,8 @@ fn figure(
     data: &Data,
     methods: &[Method],
     points: &[RoutePointRow],
-    group: &str,
-    routes: &[&RouteRow],
+    (group, routes): (&str, &[&RouteRow]),
+    clip: &str,
 ) -> Result<Option<Figure>, ReportError> {
     let Some(first) = routes.first() else { return Ok(None) };
     let Some(terrain) = data.terrain(&first.terrain_id) else { return Ok(None) };
@@ -92,7 +103,7 @@ fn figure(
         [(Symbol::Ring, "start"), (Symbol::Disc, "goal")].map(|(s, w)| (Mark::Symbol(s, Paint::Ink), w.to_owned()));
     let entries: Vec<Entry> = routes.iter().map(entry).chain(ends).chain(closed(&grid)).collect();
     let mut map = Map::new(&picture, MAP_WIDTH, &Key::Entries(&entries));
-    map.clip(&format!("{id}-clip"));
+    map.clip(clip);
     for route in routes {
         draw(&mut map, &line_of(points, route), track(number_of(route)));
     }

@@ -8,7 +8,7 @@ mod ratios;
 use super::Question;
 use super::clusters::LEVEL;
 use crate::ReportError;
-use crate::content::{Block, Numbers, TableBlock, count, number, text};
+use crate::content::{Block, Figure, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
 use crate::render::number as set;
 use crate::sample::{ROWS_MAX, sample};
@@ -47,6 +47,31 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
+}
+
+/// How many searches found a route, how long the routes are, and how the methods compare; `None` without routes.
+pub(super) fn in_words(data: &Data) -> Option<String> {
+    let methods = methods(&data.routes);
+    let reached: Vec<&RouteRow> = data.routes.iter().filter(|r| found(r)).collect();
+    let searches =
+        if data.routes.len() == 1 { "1 search".into() } else { format!("{} searches", set::count(data.routes.len())) };
+    let by = if methods.len() > 1 { format!(" by {} methods", set::count(methods.len())) } else { String::new() };
+    let detour = sums::median(&sums::finite(&reached.iter().map(|r| r.length_m / r.straight_m).collect::<Vec<_>>()));
+    let length = match detour.is_finite() {
+        true => format!("; the median length is {} times the straight distance", set::significant(detour, 3)),
+        false => String::new(),
+    };
+    let counts = format!("{} of {searches}{by} found a route{length}.", set::count(reached.len()));
+    let compared = verdict(&methods, &ratios::ratios(data, &methods));
+    (!data.routes.is_empty()).then(|| [Some(counts), compared].into_iter().flatten().collect::<Vec<_>>().join(" "))
+}
+
+/// The first map of routes; empty if the release has none.
+pub(super) fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
+    if data.routes.is_empty() {
+        return Ok(Vec::new());
+    }
+    Ok(maps::first(data, &methods(&data.routes), "summary-routes-clip")?.into_iter().collect())
 }
 
 /// One sentence for each method, which compares it with its reference.

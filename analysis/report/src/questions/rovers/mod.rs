@@ -13,7 +13,7 @@ mod worlds;
 
 use super::Question;
 use crate::ReportError;
-use crate::content::Block;
+use crate::content::{Block, Figure};
 use crate::data::Data;
 use crate::render::number as set_number;
 use sets::Set;
@@ -79,6 +79,11 @@ those that were stopped.";
 pub(super) fn in_words(data: &Data) -> Option<String> {
     let sets = sets::plain(data);
     (!sets.is_empty()).then(|| verdict(&sets))
+}
+
+/// The first map of tracks; empty if the release has none.
+pub(super) fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
+    Ok(tracks::first(data, &sets::plain(data), "summary-rovers-clip")?.into_iter().collect())
 }
 
 /// Arrival and efficiency of the sets, in a sentence each.

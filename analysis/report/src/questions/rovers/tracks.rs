@@ -39,10 +39,22 @@ pub fn figures(data: &Data, sets: &[Set]) -> Result<Vec<Figure>, ReportError> {
     let mut figures = Vec::new();
     for set in sets.iter().take(SETS_MAX) {
         if let Some(world) = middle(set) {
-            figures.extend(figure(data, set, world)?);
+            let clip = format!("{}-clip", slug(&format!("rover-tracks-{}", set.name)));
+            figures.extend(figure(data, set, world, &clip)?);
         }
     }
     Ok(figures)
+}
+
+/// The first of these maps; `clip` is a name that is unique on the page.
+pub fn first(data: &Data, sets: &[Set], clip: &str) -> Result<Option<Figure>, ReportError> {
+    for set in sets.iter().take(SETS_MAX) {
+        let Some(world) = middle(set) else { continue };
+        if let Some(map) = figure(data, set, world, clip)? {
+            return Ok(Some(map));
+        }
+    }
+    Ok(None)
 }
 
 fn middle<'a, 'b>(set: &'b Set<'a>) -> Option<&'b World<'a>> {
@@ -51,7 +63,7 @@ fn middle<'a, 'b>(set: &'b Set<'a>) -> Option<&'b World<'a>> {
     ranked.get(ranked.len().saturating_sub(1) / 2).map(|r| r.0)
 }
 
-fn figure(data: &Data, set: &Set, world: &World) -> Result<Option<Figure>, ReportError> {
+fn figure(data: &Data, set: &Set, world: &World, clip: &str) -> Result<Option<Figure>, ReportError> {
     let Some(terrain) = data.terrain(world.terrain_id) else { return Ok(None) };
     let Some(heights) = data.files.grid(&terrain.path)? else { return Ok(None) };
     let samples = data.files.rover_samples(world.terrain_id)?;
@@ -81,7 +93,7 @@ fn figure(data: &Data, set: &Set, world: &World) -> Result<Option<Figure>, Repor
         .chain(rock)
         .collect();
     let mut map = Map::new(&picture, WIDTH, &Key::Entries(&entries));
-    map.clip(&format!("{id}-clip"));
+    map.clip(clip);
     draw(&mut map, &rovers, &paths);
     map.svg.close();
     Ok(Some(Figure {

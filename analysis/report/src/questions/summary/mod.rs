@@ -1,7 +1,11 @@
 //! The results in a few sentences and a picture; the rest of the page is the evidence.
 
+mod made;
+
 use super::missions::outcomes;
-use super::{Question, comparison, failures, formations, outcome, rovers, texture};
+use super::{
+    Question, comparison, failures, formations, images, outcome, photoclinometry, routes, rovers, terrain, texture,
+};
 use crate::ReportError;
 use crate::content::{Block, Figure};
 use crate::data::Data;
@@ -12,9 +16,10 @@ use std::collections::BTreeSet;
 pub const QUESTION: Question = Question { id: "summary", name: "Summary", title: "What are the results?", answer };
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
+    let made = [made::in_words(data), photoclinometry::in_words(data), routes::in_words(data)];
     let driven = [missions(data), formations::in_words(data), rovers::in_words(data)];
     let judged = [comparison::claims(data), texture::in_words(data), failures::in_words(data)];
-    let mut blocks: Vec<Block> = driven.into_iter().chain(judged).flatten().map(Block::Text).collect();
+    let mut blocks: Vec<Block> = made.into_iter().chain(driven).chain(judged).flatten().map(Block::Text).collect();
     if !blocks.is_empty() {
         blocks.push(Block::Figures(picture(data)?));
     }
@@ -45,13 +50,34 @@ fn missions(data: &Data) -> Option<String> {
     })
 }
 
-/// One picture: the outcomes of the missions, or else a texture next to the surface that it was fitted to.
-fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
+/// Pictures of one part of a release, as its section has them; none where the release lacks that part.
+type Pictures = fn(&Data) -> Result<Vec<Figure>, ReportError>;
+
+/// The first of these that a release has is its picture: results before surfaces.
+const PICTURES: [Pictures; 7] = [
+    of_missions,
+    routes::picture,
+    rovers::picture,
+    texture::side_by_side,
+    photoclinometry::picture,
+    images::picture,
+    terrain::picture,
+];
+
+/// The outcomes of the missions; none without missions.
+fn of_missions(data: &Data) -> Result<Vec<Figure>, ReportError> {
     let groups = data.mission_groups();
-    let mut figures = match groups.is_empty() {
-        false => vec![outcomes::stacked(data, &groups)],
-        true => texture::side_by_side(data)?,
-    };
-    figures.iter_mut().for_each(|figure| figure.id = format!("summary-{}", figure.id));
-    Ok(figures)
+    Ok(if groups.is_empty() { Vec::new() } else { vec![outcomes::stacked(data, &groups)] })
+}
+
+/// The picture of a release; none if it has no rasters and no missions.
+fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
+    for pictures in PICTURES {
+        let mut figures = pictures(data)?;
+        if !figures.is_empty() {
+            figures.iter_mut().for_each(|figure| figure.id = format!("summary-{}", figure.id));
+            return Ok(figures);
+        }
+    }
+    Ok(Vec::new())
 }

@@ -55,6 +55,14 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
+/// Reliefs of the first group; empty if the release has none.
+pub(super) fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
+    match data.terrain_groups().first() {
+        Some(group) => reliefs::figures(data, &[vec![group.clone()]]),
+        None => Ok(Vec::new()),
+    }
+}
+
 /// Groups gathered into families: each joins the first family that it matches.
 fn families<'a>(
     groups: &[Group<'a, TerrainRow>],
