@@ -284,3 +284,34 @@ fn val_a_good_release_is_not_replaced_by_a_worse_one() {
     assert_eq!(call.code, 2, "{}", call.stderr);
     assert_eq!(fs::read_to_string(path.join("mine/shard.json")).unwrap(), "{}");
 }
+
+/// A pipe or a folder in place of a release's list of files is unusable input, and nothing waits for the pipe.
+#[cfg(unix)]
+#[test]
+fn val_lists_of_a_release_are_files() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    assert_eq!(run(path, &[]).code, 0);
+    let refused = |name: &str, words: &str| {
+        for arguments in [&["verify", "release"][..], &["pack", "release", "-o", "a.tar"]] {
+            let call = sastrugi_in(path, arguments);
+            let is_told = call.stderr.contains(&format!("release/{name}")) && call.stderr.contains(words);
+            assert!(call.code == 65 && is_told, "{name} {arguments:?}: {} {}", call.code, call.stderr);
+        }
+        assert!(!path.join("a.tar").exists());
+    };
+    for name in ["manifest.json", "SHA256SUMS"] {
+        let list = path.join("release").join(name);
+        let text = fs::read(&list).unwrap();
+        fs::remove_file(&list).unwrap();
+        assert!(Command::new("mkfifo").arg(&list).status().unwrap().success());
+        refused(name, "is a pipe");
+        fs::remove_file(&list).unwrap();
+        fs::create_dir(&list).unwrap();
+        refused(name, "is a folder, not a file");
+        fs::remove_dir(&list).unwrap();
+        fs::write(&list, text).unwrap();
+    }
+    assert_eq!(sastrugi_in(path, &["verify", "release"]).code, 0);
+}

@@ -111,6 +111,7 @@ impl From<ReleaseError> for Error {
     fn from(error: ReleaseError) -> Self {
         match error {
             ReleaseError::Occupied { .. } => Self::Usage(error.to_string()),
+            ReleaseError::Io { ref path, ref source } if error.unusable_input() => Self::unreadable(path, source),
             _ if error.unusable_input() => Self::Input(error.to_string()),
             _ => Self::io(error),
         }
@@ -193,5 +194,23 @@ mod tests {
         }
         let folder = Error::at(path, IoError::from(ErrorKind::IsADirectory));
         assert_eq!(folder.to_string(), "a/b.tif is a folder; name a file");
+    }
+
+    /// Of a release, a file that is missing, or a folder or a pipe in its place, is unusable input; a refusal by the system is not.
+    #[test]
+    fn val_missing_and_irregular_files_of_a_release_are_unusable_input() {
+        let of = |kind: ErrorKind, why: &str| {
+            let path = Path::new("release/manifest.json").to_owned();
+            Error::from(ReleaseError::Io { path, source: IoError::new(kind, why) })
+        };
+        for (kind, words) in [
+            (ErrorKind::NotFound, "release/manifest.json: no such file"),
+            (ErrorKind::IsADirectory, "release/manifest.json is a folder, not a file"),
+            (ErrorKind::InvalidInput, "release/manifest.json: is a pipe"),
+        ] {
+            let found = of(kind, "is a pipe");
+            assert!(matches!(&found, Error::Input(why) if why == words), "{kind}: {found:?}");
+        }
+        assert!(matches!(of(ErrorKind::PermissionDenied, "no"), Error::Failed(_)));
     }
 }

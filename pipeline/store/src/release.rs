@@ -89,7 +89,11 @@ impl ReleaseError {
         match self {
             Self::NotARelease { .. } | Self::Changed { .. } => true,
             Self::Table(error) => error.unusable_input(),
-            Self::Io { source, .. } => source.kind() == io::ErrorKind::NotFound,
+            // A file that is missing, or a folder, pipe or device in its place.
+            Self::Io { source, .. } => matches!(
+                source.kind(),
+                io::ErrorKind::NotFound | io::ErrorKind::IsADirectory | io::ErrorKind::InvalidInput
+            ),
             Self::Occupied { .. } | Self::Path { .. } | Self::Json(_) => false,
         }
     }
