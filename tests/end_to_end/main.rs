@@ -177,13 +177,13 @@ fn val_verify_recomputes_and_compares() {
     // A forged release whose heights do not follow from its study, with consistent checksums.
     let release = folder.path().join("release");
     let study = fs::read_to_string(release.join("study.toml")).unwrap();
-    forge(&release, "study.toml", &study.replace("seed = 7", "seed = 8"));
+    forge_study(&release, &study.replace("seed = 7", "seed = 8"));
     assert_eq!(sastrugi_in(folder.path(), &["verify", "release", "--quiet"]).code, 0, "the forgery agrees with itself");
     let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
     assert_eq!(call.code, 4, "{}{}", call.stdout, call.stderr);
     assert!(call.stdout.contains("terrain/smooth.tif"), "{}", call.stdout);
     // A study that gives the same heights but other metrics: the tables differ.
-    forge(&release, "study.toml", &study.replace("[[dem]]", "[roughness]\nborder_m = 1.0\n\n[[dem]]"));
+    forge_study(&release, &study.replace("[[dem]]", "[roughness]\nborder_m = 1.0\n\n[[dem]]"));
     let call = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "18", "--quiet"]);
     assert_eq!(call.code, 4, "{}{}", call.stdout, call.stderr);
     assert!(call.stdout.contains("tables/terrains"), "{}", call.stdout);
@@ -208,7 +208,6 @@ fn val_verify_names_what_a_changed_manifest_states() {
         ("name", "other".into()),
         ("seed", 8.into()),
         ("license", "CC0-1.0".into()),
-        ("study_sha256", "00".into()),
         ("sources", serde_json::json!([])),
         ("failed", serde_json::json!([{ "stage": "dem", "item": "site", "error": "bad", "parameters": null }])),
         ("notes", serde_json::json!([{ "stage": "dem", "item": "site", "note": "good" }])),
@@ -286,14 +285,82 @@ fn val_a_plan_only_reads() {
     assert!(none.code == 0 && none.stdout.contains("new") && !folder.path().join("nothing.work").exists());
 }
 
-/// Replaces a document and updates manifest and checksums.
-fn forge(release: &Path, path: &str, text: &str) {
-    fs::write(release.join(path), text).unwrap();
+/// A study that was changed together with the checksums: the manifest and every table state the one that was run.
+#[test]
+fn val_verify_notices_another_study() {
+    let folder = area();
+    release_in(folder.path());
+    let release = folder.path().join("release");
+    let ours = fs::read_to_string(release.join("study.toml")).unwrap();
+    let theirs = ours.replace("seed = 7", "seed = 8");
+    let [run, other] = [&ours, &theirs].map(|text| sha256(text.as_bytes()));
+    forge(&release, "study.toml", theirs.as_bytes());
+    let line = format!("study.toml: inconsistent: has SHA-256 {other}, but `study_sha256` in manifest.json is {run}");
+    for arguments in [&["verify", "release", "--quiet"][..], &["pack", "release", "-o", "a.tar", "--quiet"]] {
+        let call = sastrugi_in(folder.path(), arguments);
+        assert!(call.code == 4 && call.stdout.contains(&line), "{}{}", call.stdout, call.stderr);
+    }
+    assert!(!folder.path().join("a.tar").exists());
+
+    forge_manifest(&release, |manifest| manifest["study_sha256"] = other.as_str().into());
+    let call = sastrugi_in(folder.path(), &["verify", "release", "--quiet"]);
+    let line = format!("was made from the study with SHA-256 {run}, but `study_sha256` in manifest.json is {other}");
+    let tables = sums(&release).into_keys().filter(|path| path.starts_with("tables/")).count();
+    assert_eq!((call.code, call.stdout.matches(&line).count()), (4, tables), "{}", call.stdout);
+}
+
+/// A release whose study names a file elsewhere, consistent in itself: nothing is computed from that file.
+#[test]
+fn val_a_release_is_recomputed_from_its_own_files() {
+    let folder = area();
+    let dem = "ncols 3\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2 3\n4 5 6\n";
+    let secret = write(folder.path(), "secret.asc", dem);
+    let study =
+        "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[dem]]\nid = \"d\"\nfile = \"secret.asc\"\n";
+    write(folder.path(), "study.toml", study);
+    let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let release = folder.path().join("release");
+    let released = fs::read_to_string(release.join("study.toml")).unwrap();
+    assert!(released.contains("\"dem/d.asc\""), "{released}");
+    let verify = |more: &[&str]| sastrugi_in(folder.path(), &[&["verify", "release", "--quiet"][..], more].concat());
+    let absolute = secret.display().to_string();
+    for file in ["../secret.asc", "dem/../../secret.asc", absolute.as_str()] {
+        forge_study(&release, &released.replace("dem/d.asc", file));
+        assert_eq!(verify(&[]).code, 0, "{file}: the forgery agrees with itself");
+        for count in ["all", "1"] {
+            let call = verify(&["--recompute", count]);
+            let is_told = call.stderr.contains("secret.asc, which is outside the release");
+            assert!(call.code == 65 && is_told, "{file} {count}: {} {}{}", call.code, call.stdout, call.stderr);
+        }
+    }
+    forge_study(&release, &released);
+    let call = verify(&["--recompute", "all"]);
+    assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
+}
+
+/// Replaces a file and updates manifest and checksums.
+fn forge(release: &Path, path: &str, bytes: &[u8]) {
+    fs::write(release.join(path), bytes).unwrap();
     forge_manifest(release, |manifest| {
         let artifact = artifact_of(manifest, path);
-        artifact["bytes"] = text.len().into();
-        artifact["sha256"] = sha256(text.as_bytes()).into();
+        artifact["bytes"] = bytes.len().into();
+        artifact["sha256"] = sha256(bytes).into();
     });
+}
+
+/// Replaces the study, and its hash in the manifest and in every table.
+fn forge_study(release: &Path, text: &str) {
+    let manifest: Value = serde_json::from_slice(&fs::read(release.join("manifest.json")).unwrap()).unwrap();
+    let (before, after) = (manifest["study_sha256"].as_str().unwrap(), sha256(text.as_bytes()));
+    for path in sums(release).into_keys().filter(|path| path.starts_with("tables/")) {
+        let mut bytes = fs::read(release.join(&path)).unwrap();
+        let at = bytes.windows(before.len()).position(|part| part == before.as_bytes()).unwrap();
+        bytes[at..at + after.len()].copy_from_slice(after.as_bytes());
+        forge(release, &path, &bytes);
+    }
+    forge(release, "study.toml", text.as_bytes());
+    forge_manifest(release, |manifest| manifest["study_sha256"] = after.into());
 }
 
 fn artifact_of<'a>(manifest: &'a mut Value, path: &str) -> &'a mut Value {
