@@ -315,3 +315,31 @@ fn val_lists_of_a_release_are_files() {
     }
     assert_eq!(sastrugi_in(path, &["verify", "release"]).code, 0);
 }
+
+/// The covariance of such a texture is transformed on its complete torus before anything is drawn: without the memory for that, it is refused
+/// in one sentence.
+#[cfg(unix)]
+#[test]
+fn val_textures_of_measured_covariances_are_refused_before_they_need_memory() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "world.toml", "kind = \"multifractal\"\nseed = 1\nsize_px = [300, 300]\ncell_m = 0.1\n");
+    for arguments in [
+        &["terrain", "world.toml", "-o", "ground.tif"][..],
+        &["fit", "ground.tif", "--outer-scale", "2", "--bootstrap", "0", "--model", "empirical", "-o", "measured.json"],
+        &["fit", "ground.tif", "--outer-scale", "2", "--bootstrap", "0", "-o", "model.json"],
+    ] {
+        let call = sastrugi_in(path, arguments);
+        assert_eq!(call.code, 0, "{arguments:?}: {}", call.stderr);
+    }
+    for texture in ["measured.json", "model.json --covariance residual"] {
+        for kib in [100_000, 150_000] {
+            let arguments = format!("texture {texture} --size 150x150 --cell 0.1 -o new.tif --threads 2");
+            let limited = format!("ulimit -v {kib}; exec {} {arguments}", program().display());
+            let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
+            let is_told = call.stderr.starts_with("sastrugi: the texture needs about");
+            assert!(call.code == 75 && is_told, "{texture}, {kib} KiB: {} {}", call.code, call.stderr);
+            assert!(call.stderr.trim_end().lines().count() == 1 && !path.join("new.tif").exists(), "{}", call.stderr);
+        }
+    }
+}

@@ -34,7 +34,7 @@ use crate::jobs::{fit as fits, texture as textures};
 use crate::memory;
 use crate::operations::coregistration::{IN_DEGREES, check_systems, verdict};
 use crate::operations::inputs::Loaded;
-use crate::operations::textures::on_site_cells;
+use crate::operations::textures::{check_memory, on_site_cells};
 use crate::verbs::fit::settings;
 use crate::verbs::parameters;
 use crate::verbs::roughness::{Described, RideRequest, Wanted};
@@ -174,6 +174,7 @@ pub fn texture(
     };
     let mut parameters = parameters.clone();
     on_site_cells(method, &mut parameters, fit.cell_m);
+    check_memory(method, &parameters, fit)?;
     let synthesis = sastrugi_texture::prepare_from(method, &parameters, fit, measured.as_ref())?;
     memory::check("the texture", synthesis.cost().memory_bytes)?;
     let streams = Streams::for_seed(seed, textures::STAGE);

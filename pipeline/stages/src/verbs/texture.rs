@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds};
 use crate::memory;
 use crate::operations::fits::of_json;
-use crate::operations::textures::{fill_note, has_its_texture, lay_onto, on_site_cells, scaled};
+use crate::operations::textures::{check_memory, fill_note, has_its_texture, lay_onto, on_site_cells, scaled};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::ParameterError;
@@ -175,6 +175,7 @@ fn prepared(
     parameters: &Value,
     fit: &FitFile,
 ) -> Result<(Box<dyn Synthesis>, Vec<String>), Error> {
+    check_memory(request.method, parameters, fit)?;
     let (measured, notes) = match &request.exemplar {
         None => (None, Vec::new()),
         Some(exemplar) => measured(exemplar, fit)?,
