@@ -152,10 +152,14 @@ fn val_pipes_and_devices_are_refused_as_input() {
         vec!["run", "pipe", "-o", "release"],
         vec!["analyze", "pipe"],
         vec!["convert", "zero.tif", "out.asc"],
+        vec!["traverse", "pipe", "-o", "release"],
+        vec!["traverse", "zero.tif", "-o", "release"],
+        vec!["navigate", "pipe", "--start", "0,0", "--goal", "1,1", "-o", "release"],
+        vec!["navigate", "d.asc", "--start", "0,0", "--goal", "1,1", "--obstacles", "pipe", "-o", "release"],
     ];
     for arguments in calls {
         let call = sastrugi_in(path, &arguments);
-        let word = if arguments[1] == "pipe" { "is a pipe" } else { "is a device" };
+        let word = if arguments.contains(&"pipe") { "is a pipe" } else { "is a device" };
         assert!(call.code == 65 && call.stderr.contains(word), "{arguments:?}: {} {}", call.code, call.stderr);
     }
     for name in ["pipe", "zero.tif"] {
@@ -163,6 +167,23 @@ fn val_pipes_and_devices_are_refused_as_input() {
         let call = run(path, &[]);
         assert!(call.code == 65 && call.stderr.contains(name), "{name}: {} {}", call.code, call.stderr);
     }
+}
+
+/// A folder in place of a DEM is called a folder, on the command line and in a study.
+#[test]
+fn val_folders_are_refused_as_input() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    fs::create_dir(path.join("folder")).unwrap();
+    let refused = |arguments: &[&str], words: &str| {
+        let call = sastrugi_in(path, arguments);
+        assert!(call.code == 65 && call.stderr.contains(words), "{arguments:?}: {} {}", call.code, call.stderr);
+    };
+    refused(&["traverse", "folder", "-o", "new"], "folder is a folder, not a file");
+    refused(&["navigate", "folder", "--start", "0,0", "--goal", "1,1", "-o", "new"], "folder is a folder, not a file");
+    write(path, "study.toml", &STUDY.replace("d.asc", "folder"));
+    refused(&["plan", "study.toml"], "folder is a folder, not a file");
 }
 
 /// A pipe in place of a file of a work area holds nothing up: a result without its record is computed again, a mark is refused.

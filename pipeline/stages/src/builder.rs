@@ -422,6 +422,9 @@ pub fn input_file(path: PathBuf) -> Result<(u64, InputFile), BuildError> {
         Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
             Err(BuildError::Input(format!("{}: no such file", path.display())))
         }
+        Err(e) if e.kind() == std::io::ErrorKind::IsADirectory => {
+            Err(BuildError::Input(format!("{} is a folder, not a file", path.display())))
+        }
         Err(e) => Err(BuildError::Input(format!("{}: {e}", path.display()))),
     }
 }

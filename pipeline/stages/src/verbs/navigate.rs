@@ -1,7 +1,7 @@
 //! `navigate`: plans a route over one DEM and writes it as a file, a picture, or a release that may include a team following it.
 
 use super::reading::{Reading, read_as_it_is};
-use super::traverse::{Place as ReleasePlace, document, with};
+use super::traverse::{Place as ReleasePlace, document, given_file, with};
 use crate::error::Error;
 use crate::jobs::navigate;
 use crate::jobs::route::STAGE;
@@ -180,8 +180,8 @@ pub fn release(
     place: &ReleasePlace<'_>,
     progress: &dyn Progress,
 ) -> Result<RunSummary, Error> {
-    let dem = absolute(request.dem)?;
-    let obstacles = request.obstacles.iter().map(|path| absolute(path)).collect::<Result<Vec<_>, _>>()?;
+    let dem = given_file(request.dem)?;
+    let obstacles = request.obstacles.iter().map(|path| given_file(path)).collect::<Result<Vec<_>, _>>()?;
     let mut search = json!({ "id": "route", "terrains": ["dem"], "start": request.start, "goal": request.goal });
     if !obstacles.is_empty() {
         search["obstacles"] = json!(obstacles);
@@ -201,12 +201,4 @@ pub fn release(
     let purpose = if request.team.is_some() { navigate::STAGE } else { STAGE };
     let run = RunRequest { output, work, part: None, purpose: Some(purpose), replace, limits };
     run_text(&text, Path::new(""), &run, progress)
-}
-
-fn absolute(path: &Path) -> Result<String, Error> {
-    let absolute = std::path::absolute(path).map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
-    match absolute.is_file() {
-        true => Ok(absolute.to_string_lossy().into_owned()),
-        false => Err(Error::Input(format!("{}: no such file", path.display()))),
-    }
 }

@@ -43,18 +43,26 @@ pub struct Place<'a> {
 /// # Errors
 /// As [`crate::studies::run`]; also a DEM on which no mission can be driven.
 pub fn traverse(request: &Request<'_>, place: &Place<'_>, progress: &dyn Progress) -> Result<RunSummary, Error> {
-    let path = std::path::absolute(request.dem).map_err(|e| Error::Input(format!("{}: {e}", request.dem.display())))?;
-    if !path.is_file() {
-        return Err(Error::Input(format!("{}: no such file", request.dem.display())));
-    }
+    let path = given_file(request.dem)?;
     let study = json!({ "name": "traverse", "seed": request.seed, "date": request.date });
-    let dem = json!({ "id": "dem", "file": path.to_string_lossy() });
+    let dem = json!({ "id": "dem", "file": path });
     let missions = with(json!({ "id": "missions", "terrains": ["dem"], "seed": request.seed }), &request.missions)?;
     let drive = with(json!({ "id": "mission", "missions": "missions" }), &request.parameters)?;
     let text = document(&study, &request.roughness, [("dem", dem), ("missions", missions), ("traverse", drive)])?;
     let Place { output, work, replace, limits } = *place;
     let run = RunRequest { output, work, part: None, purpose: Some(STAGE), replace, limits };
     run_text(&text, Path::new(""), &run, progress)
+}
+
+/// The absolute path of a file that the study is to name, which must be readable here.
+///
+/// # Errors
+/// A path at which there is no regular file, or one that cannot be read.
+pub(super) fn given_file(path: &Path) -> Result<String, Error> {
+    let absolute = std::path::absolute(path).map_err(|e| Error::unreadable(path, &e))?;
+    // A folder can be opened, but not read.
+    sastrugi_store::file::head(&absolute, 1).map_err(|e| Error::unreadable(path, &e))?;
+    Ok(absolute.to_string_lossy().into_owned())
 }
 
 /// The text of a study: its head, its `[roughness]`, and one item of each section given.

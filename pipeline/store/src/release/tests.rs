@@ -275,3 +275,31 @@ fn val_paths_stay_inside() {
     builder.seal(&dest).unwrap();
     assert_eq!(Release::open(&dest).unwrap().manifest().failed.len(), 1);
 }
+
+/// A pipe or a folder in place of a list of the release is unusable input.
+#[cfg(unix)]
+#[test]
+fn val_lists_that_are_not_files_are_unusable_input() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    sealed(&dest);
+    let refused = |name: &str, opened: bool| {
+        let errors = [Some(verify(&dest).unwrap_err()), opened.then(|| Release::open(&dest).unwrap_err())];
+        for error in errors.into_iter().flatten() {
+            assert!(error.unusable_input() && error.to_string().contains(name), "{error}");
+        }
+    };
+    for (name, opened) in [(MANIFEST, true), (SUMS, false)] {
+        let list = dest.join(name);
+        let bytes = fs::read(&list).unwrap();
+        fs::remove_file(&list).unwrap();
+        assert!(std::process::Command::new("mkfifo").arg(&list).status().unwrap().success());
+        refused(name, opened);
+        fs::remove_file(&list).unwrap();
+        fs::create_dir(&list).unwrap();
+        refused(name, opened);
+        fs::remove_dir(&list).unwrap();
+        fs::write(&list, bytes).unwrap();
+    }
+    assert_eq!(verify(&dest).unwrap().problems, vec![]);
+}
