@@ -182,3 +182,26 @@ fn val_a_panic_of_a_decoder_is_not_printed() {
     ends_with(&call, 65, "cloud.laz is damaged: its points cannot be decoded");
     assert_eq!(call.stderr.trim_end().lines().count(), 1, "{}", call.stderr);
 }
+
+/// One flipped bit of a point, 16 km outside the box of the header: the grid would take gigabytes for which nothing was planned.
+#[test]
+fn val_a_point_outside_the_box_of_its_cloud_is_refused() {
+    let folder = area();
+    let path = folder.path();
+    let seed = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/seeds/points/b.las");
+    let mut cloud = fs::read(seed).unwrap();
+    fs::write(path.join("cloud.las"), &cloud).unwrap();
+    write(
+        path,
+        "study.toml",
+        "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"a\"\nfile = \"cloud.las\"\ncell_m = [0.2, 0.2]\n",
+    );
+    let run = || sastrugi_in(path, &["run", "study.toml", "-o", "release", "--memory", "0.3", "--quiet"]);
+    ends_with(&run(), 0, "");
+    fs::remove_dir_all(path.join("release")).unwrap();
+    let point = u32::from_le_bytes(cloud[96..100].try_into().unwrap()) as usize;
+    cloud[point + 3] ^= 1;
+    fs::write(path.join("cloud.las"), cloud).unwrap();
+    ends_with(&run(), 65, "header states x");
+    assert!(!path.join("release").exists());
+}

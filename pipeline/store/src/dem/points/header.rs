@@ -51,8 +51,9 @@ pub(super) struct DeclaredSize {
     pub scale: [f64; 3],
     /// Coordinates of a stored zero, by axis.
     pub offset: [f64; 3],
-    /// Extent east-west and north-south according to the header, unchecked.
-    pub extent: [f64; 2],
+    /// Lowest and highest x and y of the points according to the header; see `survey` for the check.
+    pub stated_low: [f64; 2],
+    pub stated_high: [f64; 2],
     /// True if the reference system is given as well-known text.
     pub well_known_text: bool,
     /// Offset of the points.
@@ -180,7 +181,8 @@ impl DeclaredSize {
             compressed,
             scale: [header.f64(131), header.f64(139), header.f64(147)],
             offset: [header.f64(155), header.f64(163), header.f64(171)],
-            extent: [header.f64(179) - header.f64(187), header.f64(195) - header.f64(203)],
+            stated_low: [header.f64(187), header.f64(203)],
+            stated_high: [header.f64(179), header.f64(195)],
             well_known_text: minor == 4 && header.u16(6) & 16 != 0,
             data_start,
             records: (u64::from(header_size), records),
@@ -225,6 +227,11 @@ impl DeclaredSize {
         Err(Refusal::new(format!(
             "scale {scale:?} and offset {offset:?} of its coordinates must be finite, and the scale above 0"
         )))
+    }
+
+    /// Extent east-west and north-south according to the header.
+    pub fn stated_extent(&self) -> [f64; 2] {
+        [0, 1].map(|axis| self.stated_high[axis] - self.stated_low[axis])
     }
 
     /// The records needed to interpret coordinates and points.

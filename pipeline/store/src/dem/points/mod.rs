@@ -14,6 +14,10 @@
 //! while gaps are filled; for medians and percentiles also 8 bytes per point; while searching for a cell size, up to 64 MiB. The
 //! file is decoded twice, and once or twice more if no cell size is given (3.5 s per pass for 10^7 points of LAZ).
 //!
+//! Points outside the box that the header states, by more than a cell, are refused before any cell is held: the box is what memory
+//! is planned for ([`super::claimed`]), and a flipped bit of a single point could make the grid any size. Boxes that other programs
+//! rounded, or that are too large, are accepted.
+//!
 //! Heights and coordinates in feet are treated as metres, with a note. The reference system is taken from the GeoTIFF keys or the
 //! well-known text in the records before or after the points.
 
@@ -44,7 +48,7 @@ use lattice::Lattice;
 use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::path::Path;
-use survey::{Chosen, survey};
+use survey::{Chosen, check_stated, survey};
 
 /// A gridded cloud.
 #[derive(Clone, Debug, PartialEq)]
@@ -123,7 +127,8 @@ fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded
 
 /// Size of the grid according to the header of a cloud, for a given cell size.
 pub(super) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
-    let DeclaredSize { points, extent, .. } = DeclaredSize::read(&mut file).ok()?;
+    let declared = DeclaredSize::read(&mut file).ok()?;
+    let (points, extent) = (declared.points, declared.stated_extent());
     let cells = match cell_m {
         Some(cell) => (extent[0] / cell + 1.0) * (extent[1] / cell + 1.0),
         // Without a given size, about three quarters of the cells hold a point.
@@ -150,6 +155,8 @@ fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
         }
     };
     let lattice = Lattice::new(&survey, cell_m)?;
+    // Memory was planned for the extent that the header states.
+    check_stated(&survey, &cloud.declared, cell_m)?;
     let Cells { mut heights, counts } = grid::cells(&chosen, &lattice, settings.statistic, survey.points)?;
     let (held, cells) = (counts.iter().filter(|n| **n > 0).count(), counts.len());
     let statistic = settings.statistic.name();

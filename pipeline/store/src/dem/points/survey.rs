@@ -1,8 +1,10 @@
 //! Selection of the points of a cloud to be gridded, and their extent.
 
 use super::cloud::{Cloud, Point};
+use super::header::DeclaredSize;
 use crate::dem::crs::Crs;
 use crate::dem::raster::Refusal;
+use sastrugi_schemas::shown;
 
 /// The selected points of a cloud.
 pub(super) struct Chosen<'a> {
@@ -69,4 +71,21 @@ pub(super) fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refus
         notes.push(format!("{other} points of classes other than ground (2) are left out"));
     }
     Ok((survey, notes))
+}
+
+/// Refuses points outside the box that the header states. A box may be rounded by a cell, or by the step of the stored coordinates.
+pub(super) fn check_stated(survey: &Survey, declared: &DeclaredSize, cell_m: f64) -> Result<(), Refusal> {
+    let DeclaredSize { stated_low, stated_high, scale, .. } = declared;
+    let is_outside = |&axis: &usize| {
+        let rounding = scale[axis].max(cell_m);
+        survey.low[axis] < stated_low[axis] - rounding || survey.high[axis] > stated_high[axis] + rounding
+    };
+    let Some(axis) = (0..2).find(is_outside) else { return Ok(()) };
+    let [low, high] = [stated_low[axis], stated_high[axis]].map(shown);
+    let [from, to] = [survey.low[axis], survey.high[axis]].map(shown);
+    Err(Refusal::new(format!(
+        "its header states {} from {low} to {high} m, but its points reach from {from} to {to} m; correct the box in the header, or \
+         remove the points outside it",
+        ["x", "y"][axis]
+    )))
 }

@@ -539,6 +539,33 @@ fn val_endless_switches_are_refused() {
     }
 }
 
+/// A point outside the box of the header, as after a flipped bit, would make the grid larger than what memory is planned for. Boxes that are
+/// rounded by up to a cell, or too large, are accepted.
+#[test]
+fn val_points_outside_the_stated_box_are_refused() {
+    let las = plain(&ground(&[[0, 0, 0], [5000, 4000, 0]]));
+    let point = u32::from_le_bytes(las[96..100].try_into().unwrap()) as usize + 28;
+    let far = refusal(&patched(&las, point + 3, &[1]));
+    assert!(far.contains("its header states x from 0 to 5 m, but its points reach from 0 to 16782.2"), "{far}");
+    let low = refusal(&patched(&las, point + 7, &[0xff]));
+    assert!(low.contains("its header states y from 0 to 4 m, but its points reach from -16773.2"), "{low}");
+    // Highest x, lowest x, highest y, lowest y.
+    for (at, accepted, refused, axis) in
+        [(179, 4.1, 3.9, "x"), (187, 0.9, 1.1, "x"), (195, 3.1, 2.9, "y"), (203, 0.9, 1.1, "y")]
+    {
+        let stated = |value: f64| patched(&las, at, &value.to_le_bytes());
+        assert!(grid_bytes(&stated(accepted), &of(1.0, Statistic::Mean)).is_ok(), "{at}");
+        assert!(refusal(&stated(refused)).contains(&format!("its header states {axis} from")), "{at}");
+    }
+    let large = patched(&patched(&las, 179, &1e6f64.to_le_bytes()), 187, &(-1e6f64).to_le_bytes());
+    assert!(grid_bytes(&large, &of(1.0, Statistic::Mean)).is_ok());
+    // Without a given cell size as well.
+    let scattered = plain(&many());
+    let point = u32::from_le_bytes(scattered[96..100].try_into().unwrap()) as usize;
+    let far = grid_bytes(&patched(&scattered, point + 3, &[1]), &GridSettings::default()).unwrap_err();
+    assert!(far.unusable_input() && far.to_string().contains("its header states x from"), "{far}");
+}
+
 /// A small file of each kind, to be damaged.
 fn samples() -> &'static [Vec<u8>] {
     static SAMPLES: std::sync::OnceLock<Vec<Vec<u8>>> = std::sync::OnceLock::new();
