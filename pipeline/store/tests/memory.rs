@@ -3,7 +3,7 @@
 use peak_alloc::PeakAlloc;
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_store::dem::{self, Compression, Crs, WriteOptions};
-use sastrugi_store::mcap::read_log;
+use sastrugi_store::mcap::{describe_file, read_log};
 use std::path::Path;
 use std::sync::Mutex;
 
@@ -73,5 +73,27 @@ fn val_logs_allocate_no_memory_for_claimed_lengths() {
         println!("claim {k}: peak {:.1} MB", 1e-6 * peak as f64);
         assert!(peak < SMALL, "claim {k}: {peak} bytes");
         assert!(log.map_or(true, |log| log.broken.is_some()), "claim {k}");
+    }
+}
+
+/// Nor for texts that are longer than the record that holds them, in the data of a recording or in its summary.
+#[test]
+fn val_logs_allocate_no_memory_for_claimed_texts() {
+    let _alone = ALONE.lock().unwrap();
+    const MAGIC: &[u8] = b"\x89MCAP0\r\n";
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.mcap");
+    // Opcode, and bytes before the first text: header, schema, channel, attachment, metadata, and their indexes.
+    for (opcode, before) in [(1_u8, 0), (3, 2), (4, 4), (9, 16), (10, 40), (12, 0), (13, 16)] {
+        let body = [&vec![0; before][..], &1_919_251_503_u32.to_le_bytes(), b"text"].concat();
+        let record = [&[opcode], &(body.len() as u64).to_le_bytes()[..], &body].concat();
+        let footer = [&[2][..], &20_u64.to_le_bytes(), &8_u64.to_le_bytes(), &[0; 12]].concat();
+        std::fs::write(&path, [MAGIC, &record, &footer, MAGIC].concat()).unwrap();
+        let (peak, (log, summary)) = peak_of(|| (read_log(&path), describe_file(&path)));
+        assert!(peak < SMALL, "opcode {opcode}: {peak} bytes");
+        for refused in [log.unwrap_err(), summary.unwrap_err()].map(|error| error.to_string()) {
+            let words = "a record claims a text of 1919251503 bytes, but only 4 are left in it";
+            assert!(refused.ends_with(words), "opcode {opcode}: {refused}");
+        }
     }
 }

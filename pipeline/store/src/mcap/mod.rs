@@ -5,6 +5,7 @@
 //! recording alone. The map frame is the terrain's own coordinates.
 
 mod frames;
+mod lengths;
 mod log;
 mod mesh;
 mod protobuf;
@@ -27,13 +28,15 @@ use crate::digest::ContentHash;
 use crate::guard::unless_panicking;
 use foxglove::messages as fox;
 use mcap::records::{MessageHeader, Metadata};
+use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
 use mcap::sans_io::summary_reader::{SummaryReadEvent, SummaryReader, SummaryReaderOptions};
 use mcap::{Compression, WriteOptions, Writer};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::study::McapFlavour;
 use sastrugi_schemas::topics::{self, Recording, Topic};
 use std::collections::BTreeMap;
-use std::io::{self, Cursor, Read, Seek};
+use std::fs::File;
+use std::io::{self, Cursor, Read, Seek, SeekFrom};
 use std::path::{Path, PathBuf};
 use std::sync::OnceLock;
 
@@ -311,11 +314,9 @@ pub fn describe_bag(folder: &Path) -> Result<serde_json::Value, McapError> {
 /// [`McapError::Unusable`] for a file without a readable summary, [`McapError::Io`] for one that cannot be read.
 pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
     let unusable = |reason: String| McapError::Unusable { path: path.to_owned(), reason };
-    let summary = unless_panicking(|| read_summary(path)).unwrap_or(Err(mcap::McapError::BadFooter));
-    let summary = summary.map_err(|error| match error {
-        mcap::McapError::Io(source) => McapError::Io { path: path.to_owned(), source },
-        error => unusable(format!("not a complete MCAP file: {error}")),
-    })?;
+    let incomplete = |reason: String| unusable(format!("not a complete MCAP file: {reason}"));
+    let summary = unless_panicking(|| read_summary(path)).unwrap_or_else(|| Ok(Err("malformed record".to_owned())));
+    let summary = summary.map_err(|source| McapError::Io { path: path.to_owned(), source })?.map_err(incomplete)?;
     let summary = summary.ok_or_else(|| unusable("the file has no summary: it is incomplete".to_owned()))?;
     let stats = summary.stats.ok_or_else(|| unusable("the summary has no statistics".to_owned()))?;
     let count = |id: &u16| stats.channel_message_counts.get(id).copied().unwrap_or(0);
@@ -330,24 +331,52 @@ pub fn describe_file(path: &Path) -> Result<serde_json::Value, McapError> {
     }))
 }
 
-/// The summary at the end of an MCAP file, if it has one; of the rest, nothing is read.
-fn read_summary(path: &Path) -> mcap::McapResult<Option<mcap::Summary>> {
+/// The summary at the end of an MCAP file, if it has one, or what is wrong with it; of the rest, nothing is read.
+fn read_summary(path: &Path) -> io::Result<Result<Option<mcap::Summary>, String>> {
     let mut file = crate::file::open(path)?;
-    let options = SummaryReaderOptions::default().with_file_size(file.metadata()?.len());
+    let file_bytes = file.metadata()?.len();
+    let options = SummaryReaderOptions::default().with_file_size(file_bytes);
     let mut reader = SummaryReader::new_with_options(options);
     while let Some(event) = reader.next_event() {
-        match event? {
-            SummaryReadEvent::ReadRequest(wanted) => {
+        match event {
+            Ok(SummaryReadEvent::ReadRequest(wanted)) => {
                 let read = file.read(reader.insert(wanted))?;
                 reader.notify_read(read);
             }
-            SummaryReadEvent::SeekRequest(to) => {
+            Ok(SummaryReadEvent::SeekRequest(to)) => {
                 let place = file.seek(to)?;
+                // The reader parses the records from here on itself.
+                if let Err(reason) = check_records(&mut file, file_bytes.saturating_sub(place))? {
+                    return Ok(Err(reason));
+                }
+                file.seek(SeekFrom::Start(place))?;
                 reader.notify_seeked(place);
+            }
+            Err(error) => return Ok(Err(error.to_string())),
+        }
+    }
+    Ok(Ok(reader.finish()))
+}
+
+/// Checks the lengths within the records of the `left` bytes to the end of a file, up to the first damage, at which their reader stops too.
+fn check_records(file: &mut File, left: u64) -> io::Result<Result<(), String>> {
+    let limit = usize::try_from(left).unwrap_or(usize::MAX);
+    let options = LinearReaderOptions::default().with_skip_start_magic(true).with_record_length_limit(limit);
+    let mut reader = LinearReader::new_with_options(options);
+    while let Some(Ok(event)) = reader.next_event() {
+        match event {
+            LinearReadEvent::ReadRequest(wanted) => {
+                let read = file.read(reader.insert(wanted.min(limit)))?;
+                reader.notify_read(read);
+            }
+            LinearReadEvent::Record { opcode, data } => {
+                if let Err(reason) = lengths::check(opcode, data) {
+                    return Ok(Err(reason));
+                }
             }
         }
     }
-    Ok(reader.finish())
+    Ok(Ok(()))
 }
 
 /// The text of `metadata.yaml`, which makes the folder of a ROS 2 recording a bag.

@@ -6,7 +6,7 @@
 mod foxglove;
 mod ros2;
 
-use super::{McapError, bag_files};
+use super::{McapError, bag_files, lengths};
 use crate::guard::unless_panicking;
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
@@ -125,6 +125,7 @@ fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
 
 /// One record.
 fn parse(opcode: u8, data: &[u8]) -> Result<Record<'_>, String> {
+    lengths::check(opcode, data)?;
     // The parser panics on an attachment that ends within its own header.
     let parsed = unless_panicking(|| mcap::parse_record(opcode, data));
     parsed.ok_or_else(|| "malformed record".to_owned())?.map_err(|e| e.to_string())
