@@ -364,3 +364,32 @@ fn val_textures_of_measured_covariances_are_refused_before_they_need_memory() {
         }
     }
 }
+
+/// An export that cannot be written leaves the earlier one in its folder as it was, and no folder where there was none.
+#[cfg(unix)]
+#[test]
+fn val_a_failed_export_leaves_the_earlier_one() {
+    let folder = area();
+    let path = folder.path();
+    write(path, "d.asc", DEM);
+    let convert = |blocks: &str, out: &str| {
+        let call = format!("ulimit -f {blocks}; exec {} convert d.asc {out} --for gazebo", program().display());
+        called(Command::new("bash").args(["-c", &call]).current_dir(path))
+    };
+    let files = || {
+        let read = |name: std::ffi::OsString| fs::read(path.join("gz").join(&name)).map(|bytes| (name, bytes)).unwrap();
+        names(&path.join("gz")).into_iter().map(read).collect::<Vec<_>>()
+    };
+    let call = convert("unlimited", "gz");
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let earlier = files();
+    write(path, "d.asc", &DEM.replace("4 5 6", "4 5 9"));
+    // The image fits into 100 kB, the mesh does not.
+    for out in ["gz", "new"] {
+        let call = convert("100", out);
+        assert!(call.code == 1 && call.stderr.contains("collision.obj"), "{out}: {} {}", call.code, call.stderr);
+    }
+    assert!(files() == earlier && !path.join("new").exists());
+    assert_eq!(convert("unlimited", "gz").code, 0);
+    assert!(files() != earlier && names(&path.join("gz")).len() == earlier.len());
+}

@@ -127,14 +127,19 @@ impl AtomicFile {
     ///
     /// # Errors
     /// The file system failed.
-    pub fn commit(mut self) -> io::Result<()> {
+    pub fn commit(self) -> io::Result<()> {
+        self.finish()?.put_in_place()
+    }
+
+    /// Syncs the file to disk without giving it its name yet, so that several files can be completed before any of them appears.
+    ///
+    /// # Errors
+    /// The file system failed.
+    pub fn finish(mut self) -> io::Result<FinishedFile> {
         let writer = self.writer.take().ok_or_else(closed)?;
-        let file = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
-        file.sync_all()?;
-        fs::rename(&self.temporary, &self.path)?;
-        // The lock protected the file from being cleared until it was renamed.
-        drop(file);
-        if self.in_draft { Ok(()) } else { sync_folder(folder_of(&self.path)) }
+        let locked = writer.into_inner().map_err(io::IntoInnerError::into_error)?;
+        locked.sync_all()?;
+        Ok(FinishedFile { file: self, locked })
     }
 
     /// Handle to the file system's own error, for use after an encoder has failed.
@@ -168,6 +173,32 @@ impl Drop for AtomicFile {
     fn drop(&mut self) {
         // After a commit the temporary name no longer exists and this does nothing; a leftover is harmless.
         let _ = fs::remove_file(&self.temporary);
+    }
+}
+
+/// A complete file on disk that has no name yet. Dropped without [`FinishedFile::put_in_place`], it leaves nothing behind.
+#[derive(Debug)]
+pub struct FinishedFile {
+    file: AtomicFile,
+    /// The lock protects the file from being cleared until it is renamed.
+    locked: File,
+}
+
+impl FinishedFile {
+    /// Path at which the file will appear.
+    pub fn path(&self) -> &Path {
+        &self.file.path
+    }
+
+    /// Gives the file its name.
+    ///
+    /// # Errors
+    /// The file system failed.
+    pub fn put_in_place(self) -> io::Result<()> {
+        let Self { file, locked } = self;
+        fs::rename(&file.temporary, &file.path)?;
+        drop(locked);
+        if file.in_draft { Ok(()) } else { sync_folder(folder_of(&file.path)) }
     }
 }
 
@@ -313,6 +344,28 @@ mod tests {
         write(&path, b"again").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"again");
         assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1);
+    }
+
+    /// A file that is finished but not put in place leaves the one of that name alone, and nothing behind.
+    #[test]
+    fn val_a_finished_file_appears_when_it_is_put_in_place() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.txt");
+        write(&path, b"first").unwrap();
+        let finished = || {
+            let mut file = AtomicFile::create(&path).unwrap();
+            file.write_all(b"again").unwrap();
+            file.finish().unwrap()
+        };
+        let dropped = finished();
+        clear_leftovers(&path);
+        assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 2, "it is locked");
+        drop(dropped);
+        assert_eq!((fs::read_dir(folder.path()).unwrap().count(), fs::read(&path).unwrap()), (1, b"first".to_vec()));
+        let file = finished();
+        assert_eq!(file.path(), path);
+        file.put_in_place().unwrap();
+        assert_eq!((fs::read_dir(folder.path()).unwrap().count(), fs::read(&path).unwrap()), (1, b"again".to_vec()));
     }
 
     /// On one file system a hard link is made; a copy has the same bytes, and neither overwrites a file.

@@ -22,14 +22,15 @@ mod unreal;
 mod tests;
 
 use super::mesh::{self, Decimation, MeshLimits};
-use super::raster::{DemError, Refusal, save};
-use crate::atomic;
+use super::raster::{DemError, Refusal};
+use crate::atomic::{self, AtomicFile, Draft, FinishedFile};
 use parts::Parts;
 use posts::Posts;
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::study::Simulator;
 use serde_json::{Value, json};
-use std::fmt::Write;
+use std::fmt::Write as _;
+use std::io::Write as _;
 use std::path::Path;
 use std::{fs, io};
 
@@ -208,27 +209,60 @@ fn holds(folder: &Path, simulator: Simulator) -> bool {
     program == name(crate::PROGRAM) && found["target"] == simulator.name()
 }
 
-/// Writes the files of an export to a folder, which is created if missing. See [`check_folder`] for an existing one.
+/// Writes the files of an export to a folder, which is created if missing. See [`check_folder`] for an existing one. All files are complete
+/// on disk before the first appears, so an export that fails leaves an earlier one as it was.
 ///
 /// # Errors
-/// [`DemError::Io`] if a file cannot be written.
+/// [`DemError::Io`] if a file cannot be written, or a folder has its name.
 pub fn write(folder: &Path, export: &Export) -> Result<(), DemError> {
     atomic::clear_leftovers(&folder.join(IMPORT));
-    let at = |name: &str| folder.join(name);
-    let (first, others): (Vec<_>, Vec<_>) = export.files.iter().partition(|(name, _)| name == IMPORT);
-    let put = |(name, bytes): &(String, Vec<u8>)| save((&at(name)).into(), bytes);
-    // `import.json` first, so that a later run can complete the folder of a killed one. Then files of an earlier export are removed: after
-    // a kill the folder may be incomplete, but does not mix terrains.
-    first.into_iter().try_for_each(put)?;
-    for (name, _) in &others {
-        match fs::remove_file(at(name)) {
-            Err(source) if source.kind() != io::ErrorKind::NotFound => {
-                return Err(DemError::Io { path: at(name), source });
-            }
-            _ => {}
-        }
+    let is_new = !folder.exists();
+    let finished = export.files.iter().map(|(name, bytes)| finish(folder, name, bytes));
+    let finished: Result<Vec<FinishedFile>, DemError> = finished.collect();
+    if finished.is_err() && is_new {
+        // If this fails, an empty folder is left, which any export may use.
+        let _ = fs::remove_dir(folder);
     }
-    others.into_iter().try_for_each(put)
+    let (first, others): (Vec<_>, Vec<_>) = finished?.into_iter().partition(|file| file.path().ends_with(IMPORT));
+    // `import.json` first, so that a later run can complete the folder of a killed one. Then files of an earlier export are removed: after
+    // a kill between these renames the folder may be incomplete, but does not mix terrains.
+    first.into_iter().try_for_each(put_in_place)?;
+    others.iter().try_for_each(|file| remove(file.path()))?;
+    others.into_iter().try_for_each(put_in_place)?;
+    atomic::sync_folder(folder).map_err(failed(folder))
+}
+
+/// A file of the export, complete on disk but not in place.
+fn finish(folder: &Path, name: &str, bytes: &[u8]) -> Result<FinishedFile, DemError> {
+    let path = folder.join(name);
+    if path.is_dir() {
+        let reason =
+            "is a folder, but the export has a file of that name; move the folder, or choose a new one for the export";
+        return Err(failed(&path)(io::Error::new(io::ErrorKind::IsADirectory, reason)));
+    }
+    // The folder is synced once, after all files.
+    let file = AtomicFile::create(&Draft(folder).file(name)).and_then(|mut file| {
+        file.write_all(bytes)?;
+        file.finish()
+    });
+    file.map_err(failed(&path))
+}
+
+fn put_in_place(file: FinishedFile) -> Result<(), DemError> {
+    let path = file.path().to_owned();
+    file.put_in_place().map_err(failed(&path))
+}
+
+fn remove(path: &Path) -> Result<(), DemError> {
+    match fs::remove_file(path) {
+        Err(e) if e.kind() != io::ErrorKind::NotFound => Err(failed(path)(e)),
+        _ => Ok(()),
+    }
+}
+
+fn failed(path: &Path) -> impl FnOnce(io::Error) -> DemError {
+    let path = path.to_owned();
+    move |source| DemError::Io { path, source }
 }
 
 fn posts(grid: &Grid, simulator: Simulator, fit: Fit) -> Result<Posts, Refusal> {

@@ -243,24 +243,32 @@ fn val_small_relief_high_up_is_kept() {
     assert!(poses.iter().all(|pose| text("model.sdf").contains(pose)), "{}", text("model.sdf"));
 }
 
-/// An interrupted export over an older one leaves no old files, and a folder that can be completed.
+/// An export that fails leaves the earlier one as it was; one that succeeds replaces its files, and no others.
 #[test]
-fn val_interrupted_exports_leave_no_old_files() {
+fn val_failed_exports_leave_the_earlier_one() {
     let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
     let [old, new] = [4, 5].map(|side| resampled(&slanted(side, side), Simulator::Mujoco).unwrap());
-    write(folder.path(), &old).unwrap();
+    let holds = |export: &Export, but: &str| {
+        let mut files = export.files.iter().filter(|(name, _)| name != but);
+        files.all(|(name, bytes)| fs::read(out.join(name)).is_ok_and(|found| found == *bytes))
+    };
+    write(&out, &old).unwrap();
+    assert!(holds(&old, ""));
     // The last file cannot be written.
     let (last, _) = new.files.iter().rfind(|(name, _)| name != IMPORT).unwrap();
-    fs::remove_file(folder.path().join(last)).unwrap();
-    fs::create_dir_all(folder.path().join(last).join("in the way")).unwrap();
-    write(folder.path(), &new).unwrap_err();
-    for (name, bytes) in new.files.iter().filter(|(name, _)| name != last) {
-        let found = fs::read(folder.path().join(name));
-        assert!(found.is_err() || found.unwrap() == *bytes, "{name}");
-    }
-    assert!(check_folder(folder.path(), Simulator::Mujoco).is_ok());
-    fs::remove_dir_all(folder.path().join(last)).unwrap();
-    write(folder.path(), &new).unwrap();
+    fs::remove_file(out.join(last)).unwrap();
+    fs::create_dir_all(out.join(last).join("in the way")).unwrap();
+    let refused = write(&out, &new).unwrap_err().to_string();
+    assert!(refused.contains("is a folder, but the export has a file of that name"), "{refused}");
+    assert!(holds(&old, last) && out.join(last).join("in the way").is_dir());
+    assert_eq!(fs::read_dir(&out).unwrap().count(), old.files.len(), "nothing else is left");
+    assert!(check_folder(&out, Simulator::Mujoco).is_ok());
+    fs::remove_dir_all(out.join(last)).unwrap();
+    fs::write(out.join("notes.txt"), "mine").unwrap();
+    write(&out, &new).unwrap();
+    assert!(holds(&new, "") && out.join("notes.txt").is_file());
+    assert_eq!(fs::read_dir(&out).unwrap().count(), new.files.len() + 1);
 }
 
 /// A folder is reused only for the same simulator, and never if it has unrelated files.
