@@ -133,6 +133,29 @@ fn val_doubts_are_told_before_the_run() {
     assert!(parts.iter().all(|part| *part < whole) && parts.iter().sum::<u64>() >= whole, "{parts:?} of {whole}");
 }
 
+/// Equivalence is tested with the scatter between terrains: with one terrain per group there is none, and no data can support the claim.
+#[test]
+fn val_an_equivalence_claim_needs_two_terrains_per_group() {
+    let folder = area();
+    let path = folder.path();
+    assert_eq!(sastrugi_in(path, &["init", "traverse"]).code, 0);
+    let text = std::fs::read_to_string(path.join("study.toml")).unwrap();
+    let claim = text.replace("test = \"difference\"\ndirection = \"rises\"", "test = \"equivalence\"\nmargin = 2.0");
+    assert_ne!(claim, text);
+    let paired = claim.replace("license =", "pairing = \"common\"\nlicense =");
+    for (text, with, name) in
+        [(&claim, "1 and 1 terrains", "terrains"), (&paired, "1 paired terrain", "paired terrains")]
+    {
+        for (count, doubts) in [(1, 1), (2, 0)] {
+            write(path, "claim.toml", &text.replace("count = 5", &format!("count = {count}")));
+            let (plan, warnings) = planned(path, "claim.toml");
+            assert_eq!(plan["doubts"].as_array().map(Vec::len), Some(doubts), "{count}: {warnings}");
+            let words = format!("with {with} the smallest possible p is 1.00; use at least 2 {name} per group");
+            assert_eq!(warnings.contains(&words), doubts == 1, "{count}: {warnings}");
+        }
+    }
+}
+
 /// A vehicle as `kinds` prints it is a vehicle file; a file with a base has what it does not change from there.
 #[test]
 fn val_vehicle_files_inherit() {

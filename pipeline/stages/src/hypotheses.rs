@@ -123,7 +123,7 @@ pub fn doubts(builder: &Builder<'_>) -> Vec<String> {
         }
         let enough = (2..UNITS_ENOUGH).find(|&n| {
             let mut more = least.clone();
-            more[k] = units.with(n).least_p();
+            more[k] = units.with(n).least_p(claim.test);
             adjusted(&more, k) <= claim.alpha
         });
         let over_family = if p > least[k] { " over its family" } else { "" };
@@ -176,11 +176,21 @@ impl Units {
         }
     }
 
-    /// The smallest possible p of their test.
-    fn least_p(&self) -> f64 {
+    /// The smallest possible p of a test of them. The t tests of equivalence can have any p, but need two values to estimate the scatter.
+    fn least_p(&self, test: HypothesisTest) -> f64 {
+        match (test, self) {
+            (HypothesisTest::Equivalence, units) if units.fewest() < 2 => 1.0,
+            (HypothesisTest::Equivalence, _) => 0.0,
+            (_, Self::Apart(sizes)) => least_p_apart(sizes),
+            (_, Self::Blocks(groups, blocks)) => least_p_in_blocks(*groups, *blocks),
+        }
+    }
+
+    /// Number of units in the smallest group.
+    fn fewest(&self) -> usize {
         match self {
-            Self::Apart(sizes) => least_p_apart(sizes),
-            Self::Blocks(groups, blocks) => least_p_in_blocks(*groups, *blocks),
+            Self::Apart(sizes) => sizes.iter().copied().min().unwrap_or(0),
+            Self::Blocks(_, blocks) => *blocks,
         }
     }
 
@@ -208,17 +218,15 @@ impl std::fmt::Display for Units {
                 let (last, first) = sizes.split_last().map_or(("", &[][..]), |(last, first)| (last.as_str(), first));
                 write!(f, "{} and {last} terrains", first.join(", "))
             }
+            Self::Blocks(_, 1) => write!(f, "1 paired terrain"),
             Self::Blocks(_, blocks) => write!(f, "{blocks} paired terrains"),
         }
     }
 }
 
-/// The smallest possible p of a claim; 0 for equivalence and for groups without missions.
+/// The smallest possible p of a claim; 0 for groups without missions.
 fn least_p(claim: &HypothesisItem, units: Option<&Units>) -> f64 {
-    match (claim.test, units) {
-        (HypothesisTest::Equivalence, _) | (_, None) => 0.0,
-        (_, Some(units)) => units.least_p(),
-    }
+    units.map_or(0.0, |units| units.least_p(claim.test))
 }
 
 /// Refuses a level that differs from that of the family, which shares one level.
