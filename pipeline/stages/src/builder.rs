@@ -2,6 +2,7 @@
 
 use crate::job::ItemRef;
 use crate::jobs::fit::Site;
+use crate::jobs::{terrain, texture};
 use crate::operations::drawn::{Drawn, Routes};
 use crate::runner::graph::{Graph, InputFile, Node};
 use crate::study::entry::ITEMS_MAX;
@@ -31,6 +32,9 @@ const RESERVED: [&str; 12] = [
     "condition",
     "leaning",
 ];
+
+/// Sections of surfaces, whose `count` is a number of surfaces. Each of these is two items: it is generated, and its roughness measured.
+const GENERATED: [&str; 2] = [terrain::STAGE, texture::STAGE];
 
 /// Why a study has no graph.
 #[derive(Debug, thiserror::Error)]
@@ -176,6 +180,8 @@ pub struct Builder<'a> {
     items_max: usize,
     /// True if an item was refused because there are too many.
     is_full: bool,
+    /// True if the numbers that the tables state are too many, so that each is expanded to its first item only.
+    is_limited: bool,
 }
 
 /// The table of a study that an id comes from: its section, and its index in it.
@@ -216,7 +222,27 @@ impl<'a> Builder<'a> {
             },
             items_max: ITEMS_MAX,
             is_full: false,
+            is_limited: false,
         }
+    }
+
+    /// Refuses a study whose tables state too many items, before any is built. Its tables are then expanded to their first items, so that
+    /// their other errors are found as well.
+    pub fn limit(&mut self, sections: &[&'static str]) {
+        let study = self.study;
+        let entries: Vec<Entry<'_>> =
+            sections.iter().flat_map(|&section| study.entries(section).unwrap_or_default()).collect();
+        let most = self.items_max as u64;
+        let mut total = 0_u64;
+        let is_beyond = |entry: &&Entry<'_>| {
+            total = total.saturating_add(items_stated(entry));
+            total > most
+        };
+        let Some(beyond) = entries.iter().find(is_beyond) else { return };
+        self.is_limited = true;
+        self.refused.errors.push(beyond.error("count", too_many(self.items_max)));
+        // References to items that are not built are not reported as further errors.
+        entries.iter().for_each(|entry| self.refused.ids.extend(entry.id().map(str::to_owned)));
     }
 
     /// Adds the items of a section, table by table. Errors are collected for [`Self::check`]; reading continues with the next table
@@ -233,6 +259,7 @@ impl<'a> Builder<'a> {
             if self.is_full {
                 break;
             }
+            let entry = if self.is_limited { entry.limited() } else { entry };
             let Err(error) = add(self, &entry) else { continue };
             self.refused.table(entry.id());
             let error = if self.is_full { entry.error("count", too_many(self.items_max)).into() } else { error };
@@ -387,6 +414,15 @@ impl<'a> Builder<'a> {
     }
 }
 
+/// Number of items that a table states, at least.
+fn items_stated(entry: &Entry<'_>) -> u64 {
+    let variants = entry.variants_stated();
+    if GENERATED.contains(&entry.section()) {
+        return variants.saturating_mul(entry.replicates_stated()).saturating_mul(2);
+    }
+    variants
+}
+
 /// Message for a study with too many items.
 fn too_many(most: usize) -> String {
     format!(
@@ -435,11 +471,41 @@ mod tests {
     use crate::jobs;
     use std::path::Path;
 
+    fn table(id: &str, count: u32) -> String {
+        format!("[[terrain]]\nid = \"{id}\"\nkind = \"gap\"\nsize_px = [64, 64]\ncount = {count}\n")
+    }
+
+    /// Counts tell that there are too many items before any is built, and other errors are found nevertheless.
+    #[test]
+    fn val_counts_are_added_up_before_items_are_built() {
+        let head = "[study]\nname = \"many\"\nseed = 1\ndate = \"2026-01-01\"\n";
+        let read = |tables: &str| {
+            let text = format!("{head}{tables}");
+            let sections = crate::registry::section_names();
+            let (study, errors) = Study::read(&text, Path::new(""), &sections).unwrap();
+            let mut builder = Builder::new(&study, errors);
+            builder.limit(&sections);
+            let limited = builder.is_limited;
+            if limited {
+                jobs::terrain::add(&mut builder).unwrap();
+            }
+            let said = builder.check().map_or_else(|error| error.to_string(), |()| String::new());
+            (limited, said, builder.graph.len())
+        };
+        let wrong = "[[terrain]]\nid = \"c\"\nkind = \"gap\"\ncell_m = -1.0\n";
+        let on_a =
+            "[[terrain]]\nid = \"d\"\nkind = \"compose\"\nsize_px = [64, 64]\nprocesses = [{ of = \"a-0007\" }]\n";
+        let (limited, said, items) = read(&format!("{}{}{wrong}{on_a}", table("a", 400_000), table("b", 100_001)));
+        assert!(limited && said.starts_with("terrain \"b\": the study expands to more than 1000000 items"), "{said}");
+        assert!(said.contains("terrain \"c\": `cell_m`") && items <= 2 && !said.contains("a-0007"), "{said}");
+        let (limited, said, _) = read(&format!("{}{}", table("a", 400_000), table("b", 99_999)));
+        assert!(!limited && said.is_empty(), "{said}");
+        let (limited, said, items) = read(&table("a", u32::MAX));
+        assert!(limited && said.starts_with("terrain \"a\"") && items == 1, "{said}");
+    }
+
     /// A study with tables of three, two and one terrains, with a limit on items: the error, and the number of items.
     fn refused(items_max: usize) -> (String, usize) {
-        let table = |id: &str, count: u32| {
-            format!("[[terrain]]\nid = \"{id}\"\nkind = \"gap\"\nsize_px = [64, 64]\ncount = {count}\n")
-        };
         let text = format!(
             "[study]\nname = \"many\"\nseed = 1\ndate = \"2026-01-01\"\n{}{}{}",
             table("a", 3),

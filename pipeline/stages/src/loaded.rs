@@ -139,6 +139,7 @@ struct Plan {
 /// All errors in the study, including `errors`, or input files that cannot be read.
 fn build(study: &Study, errors: Vec<StudyError>) -> Result<Plan, BuildError> {
     let mut builder = Builder::new(study, errors);
+    builder.limit(&registry::section_names());
     for section in &SECTIONS {
         if builder.is_full() {
             break;

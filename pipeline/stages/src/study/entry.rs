@@ -21,6 +21,7 @@ pub struct Entry<'a> {
     index: usize,
     table: &'a Map<String, Value>,
     text: &'a StudyText,
+    is_limited: bool,
 }
 
 /// One item that a table expands to.
@@ -41,12 +42,34 @@ pub struct Expanded {
 impl<'a> Entry<'a> {
     /// The `index`-th table of `[[section]]`.
     pub fn new(section: &'static str, index: usize, table: &'a Map<String, Value>, text: &'a StudyText) -> Self {
-        Self { section, index, table, text }
+        Self { section, index, table, text, is_limited: false }
+    }
+
+    /// The same table, which expands to its first item only.
+    pub fn limited(self) -> Self {
+        Self { is_limited: true, ..self }
+    }
+
+    /// Its section.
+    pub fn section(&self) -> &'static str {
+        self.section
     }
 
     /// Its index among the tables of its section, from 0.
     pub fn index(&self) -> usize {
         self.index
+    }
+
+    /// Number of replicates that the table states; 1 if it states none.
+    pub fn replicates_stated(&self) -> u64 {
+        self.table.get("count").and_then(Value::as_u64).unwrap_or(1)
+    }
+
+    /// Number of combinations of values that its sweeps state; 1 without a sweep.
+    pub fn variants_stated(&self) -> u64 {
+        let sweeps = self.table.get("sweep").and_then(Value::as_object).into_iter().flat_map(Map::values);
+        let lengths = sweeps.filter_map(Value::as_array).map(|values| values.len() as u64);
+        lengths.fold(1, u64::saturating_mul)
     }
 
     /// Separates the envelope from the kernel's parameters.
@@ -105,8 +128,11 @@ impl<'a> Entry<'a> {
         if count == Some(0) {
             return Err(self.error("count", "`count` is 0; it must be 1 or more"));
         }
+        let (count, values_max) = if self.is_limited { (count.map(|_| 1), 1) } else { (count, usize::MAX) };
+        let sweep: Vec<(&String, &[Value])> =
+            sweep.iter().map(|(key, values)| (key, &values[..values.len().min(values_max)])).collect();
         let total =
-            sweep.values().fold(count.unwrap_or(1) as usize, |total, values| total.saturating_mul(values.len()));
+            sweep.iter().fold(count.unwrap_or(1) as usize, |total, (_, values)| total.saturating_mul(values.len()));
         if total > ITEMS_MAX {
             return Err(
                 self.error("count", format!("`count` and sweeps expand to {total} items; the limit is {ITEMS_MAX}"))
@@ -262,6 +288,26 @@ mod tests {
         assert_eq!(*items[2].params, serde_json::json!({"low": {"s": 1}, "high": {"d": 2.6}}));
         assert_eq!(items[3].sweep.as_deref(), Some("high.d = 2.6"));
         assert_eq!((items[3].replicate, &*items[3].part), (1, "a-2.6"));
+    }
+
+    /// What a table states is known before it is expanded; a limited one expands to its first item.
+    #[test]
+    fn val_numbers_are_known_before_items() {
+        let toml = "[[terrain]]\nid = \"a\"\nkind = \"k\"\ncount = 4000000000\nsweep.d = [1, 2]\nsweep.h = [3, 4, 5]\n";
+        let (replicates, variants, first) = with(toml, |entry| {
+            let (item, params): (TerrainItem, _) = entry.read().unwrap();
+            let first = entry.limited().expand(&item.id, item.count, &item.sweep, &params).unwrap();
+            (entry.replicates_stated(), entry.variants_stated(), first)
+        });
+        assert_eq!((replicates, variants), (4_000_000_000, 6));
+        assert_eq!(first.iter().map(|one| one.id.as_str()).collect::<Vec<_>>(), ["a-1-3-0001"]);
+        let plain = |toml: &str| with(toml, |entry| (entry.replicates_stated(), entry.variants_stated()));
+        assert_eq!(plain("[[terrain]]\nid = \"a\"\n"), (1, 1));
+        // What cannot be read is reported by its type.
+        assert_eq!(plain("[[terrain]]\ncount = \"many\"\nsweep = 5\n"), (1, 1));
+        let long =
+            format!("[[terrain]]\nsweep = {{ {} }}\n", ["a", "b", "c"].map(|key| format!("{key} = [1, 2]")).join(", "));
+        assert_eq!(plain(&long), (1, 8));
     }
 
     #[test]
