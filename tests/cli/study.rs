@@ -76,6 +76,44 @@ fn val_all_errors_are_told_at_once() {
     }
 }
 
+/// A table is read on without what is refused in it, so that its keys and its values are told in one call; suggestions are those of the table.
+#[test]
+fn val_all_errors_of_a_table_are_told_at_once() {
+    let folder = area();
+    let path = folder.path();
+    assert_eq!(sastrugi_in(path, &["init", "traverse"]).code, 0);
+    let text = std::fs::read_to_string(path.join("study.toml")).unwrap();
+    let told = |from: &str, to: &str, words: &[&str]| {
+        assert!(text.contains(from), "{from}");
+        write(path, "wrong.toml", &text.replacen(from, to, 1));
+        let call = sastrugi_in(path, &["plan", "wrong.toml"]);
+        assert_eq!(call.code, 2, "{}", call.stderr);
+        // Long sentences are wrapped, with a mark before the rest.
+        let said: Vec<&str> = call.stderr.split_whitespace().filter(|word| *word != "│").collect();
+        let said = said.join(" ");
+        words.iter().for_each(|words| assert!(said.contains(words), "\"{words}\" is not in: {said}"));
+        said
+    };
+    let all = ["3 errors", "unknown key `high.fractal_dimesion`", "`low.fractal_dimension`", "`png16`"];
+    let wrong = "high.fractal_dimesion = 2.30\nlow.fractal_dimension = 9\npng16 = 1";
+    let said = told("high.fractal_dimension = 2.30", wrong, &all);
+    assert!(said.contains("did you mean `fractal_dimension`?") && !said.contains("missions \""), "{said}");
+    told("speed_m_s = 1.0", "speed_m_s = -1.0\ntimeout_s = -1.0", &["2 errors", "`speed_m_s`", "`timeout_s`"]);
+    told("\"multifractal\"", "\"multifractl\"", &["did you mean \"multifractal\"?"]);
+    let vehicle = "speed_m_s = 1.0\nvehicle_changes.chassis.mas_kg = 60.0";
+    told("speed_m_s = 1.0", vehicle, &["`mas_kg`", "did you mean `mass_kg`?"]);
+    told("\"husky_a200\"", "\"husky_a20\"", &["did you mean \"husky_a200\"?"]);
+    // `id` is given and so cannot be meant.
+    let fit = |key: &str| format!("[[fit]]\nid = \"f\"\ndem = \"d2.30-0001\"\n{key} = 2.0\n\n[[missions]]");
+    let said = told("[[missions]]", &fit("width_m"), &["unknown key `width_m` in fit"]);
+    assert!(!said.contains("did you mean"), "{said}");
+    told("[[missions]]", &fit("window"), &["unknown key `window` in fit", "did you mean `outer_scale_m`?"]);
+    // A fit with an error of its own is there.
+    let texture = "[[texture]]\nid = \"t\"\nfit = \"other\"\nsize_m = [5.0, 5.0]\ncell_m = 0.1\n\n[[missions]]";
+    let both = fit("width_m").replace("[[missions]]", texture);
+    told("[[missions]]", &both, &["`fit` names \"other\"", "in tables with errors: f"]);
+}
+
 /// A claim that so few terrains cannot support, and a vehicle that cannot be meant, are told before the run.
 #[test]
 fn val_doubts_are_told_before_the_run() {

@@ -4,8 +4,10 @@ use crate::job::ItemRef;
 use crate::jobs::fit::Site;
 use crate::jobs::{terrain, texture};
 use crate::operations::drawn::{Drawn, Routes};
+use crate::registry::SECTIONS;
 use crate::runner::graph::{Graph, InputFile, Node};
-use crate::study::entry::ITEMS_MAX;
+use crate::study::entry::{ITEMS_MAX, leave_out};
+use crate::study::keys::{nearest, nearest_in};
 use crate::study::{Entry, Refusals, Study, StudyError, UNKNOWN_SECTION};
 use sastrugi_imaging::Sun;
 use sastrugi_numeric::{Geometry, Streams};
@@ -182,6 +184,8 @@ pub struct Builder<'a> {
     is_full: bool,
     /// True if the numbers that the tables state are too many, so that each is expanded to its first item only.
     is_limited: bool,
+    /// True while a refused table is read again without what was refused.
+    is_reading_on: bool,
 }
 
 /// The table of a study that an id comes from: its section, and its index in it.
@@ -223,6 +227,7 @@ impl<'a> Builder<'a> {
             items_max: ITEMS_MAX,
             is_full: false,
             is_limited: false,
+            is_reading_on: false,
         }
     }
 
@@ -260,12 +265,110 @@ impl<'a> Builder<'a> {
                 break;
             }
             let entry = if self.is_limited { entry.limited() } else { entry };
+            let items = self.graph.len();
             let Err(error) = add(self, &entry) else { continue };
-            self.refused.table(entry.id());
             let error = if self.is_full { entry.error("count", too_many(self.items_max)).into() } else { error };
-            self.refused.add(error, |message| entry.error("", message));
+            let told = self.refuse_table(&entry, error);
+            if !self.is_full && self.graph.len() == items {
+                self.read_on(&entry, told, &mut add);
+            }
         }
         Ok(())
+    }
+
+    /// Records why a table is refused, and returns its errors in the study.
+    fn refuse_table(&mut self, entry: &Entry<'_>, error: BuildError) -> Vec<StudyError> {
+        let told = match error {
+            BuildError::Study(Refusals(errors)) => {
+                errors.into_iter().map(|error| self.explained(entry, error)).collect::<Vec<_>>()
+            }
+            input => {
+                self.refused.add(input, |message| entry.error("", message));
+                Vec::new()
+            }
+        };
+        self.refused.table(entry.id());
+        self.refused.errors.extend(told.iter().cloned());
+        told
+    }
+
+    /// Reads a refused table again without what was refused, until no further key of it is. Later tables cannot refer to what it adds;
+    /// that they miss it is not reported.
+    fn read_on(
+        &mut self,
+        entry: &Entry<'_>,
+        mut told: Vec<StudyError>,
+        add: &mut impl FnMut(&mut Self, &Entry<'_>) -> Result<(), BuildError>,
+    ) {
+        let items = self.graph.len();
+        let mut rest = Value::Object(entry.table().clone());
+        let mut is_changed = leave_out(&mut rest, &told);
+        self.is_reading_on = true;
+        while is_changed && self.graph.len() == items {
+            let Some(table) = rest.as_object() else { break };
+            let Err(BuildError::Study(Refusals(found))) = add(self, &entry.with(table).limited()) else { break };
+            let is_new = |error: &StudyError| {
+                entry.is_written(&error.key) && !told.iter().any(|other| concerns_same(other, error))
+            };
+            let found: Vec<StudyError> = found.into_iter().filter(is_new).collect();
+            is_changed = leave_out(&mut rest, &found);
+            let found: Vec<StudyError> = found.into_iter().map(|error| self.explained(entry, error)).collect();
+            self.refused.errors.extend(found.iter().cloned());
+            told.extend(found);
+        }
+        self.is_reading_on = false;
+        if self.is_full {
+            self.refused.errors.push(entry.error("count", too_many(self.items_max)));
+        }
+        if self.graph.len() > items {
+            self.hide(entry);
+        }
+    }
+
+    /// Removes what a refused table has added, so that no later table can refer to it.
+    fn hide(&mut self, entry: &Entry<'_>) {
+        let origin: Origin = (entry.section(), entry.index());
+        let own: BTreeSet<String> =
+            self.ids.iter().filter(|(_, other)| **other == origin).map(|(id, _)| id.clone()).collect();
+        for id in own.iter().map(String::as_str).chain(entry.id()) {
+            self.heightfields.remove(id);
+            self.missions.remove(id);
+            self.routes.remove(id);
+            self.images.remove(id);
+        }
+        self.fits.retain(|id| !own.contains(id));
+    }
+
+    /// An error of a table with a better suggestion, if there is one.
+    fn explained(&self, entry: &Entry<'_>, error: StudyError) -> StudyError {
+        let help = match &error.missing_id {
+            Some(id) => self.where_it_is(entry, &error, id),
+            None if error.help.is_some() => None,
+            None => nearest_in(&error.message)
+                .map(|word| format!("did you mean `{word}`?"))
+                .or_else(|| nearest_kind(entry, &error).map(|kind| format!("did you mean \"{kind}\"?"))),
+        };
+        match help {
+            Some(help) => error.with_help(Some(help)),
+            None => error,
+        }
+    }
+
+    /// Where a missing id is to be found: below its table, or in one that is refused.
+    fn where_it_is(&self, entry: &Entry<'_>, error: &StudyError, id: &str) -> Option<String> {
+        let section = entry.section();
+        let names_surface = GENERATED.contains(&section) && error.key.first().is_some_and(|key| key != "fit");
+        let tables = self.study.entries(section).unwrap_or_default();
+        if names_surface && tables.iter().any(|other| other.index() > entry.index() && other.id() == Some(id)) {
+            return Some(format!("[[{section}]] \"{id}\" comes after this table; move it above"));
+        }
+        let help = error.help.as_deref().filter(|help| !help.starts_with("did you mean"))?;
+        let refused = || self.refused.ids.iter().map(String::as_str);
+        if let Some(near) = nearest(id, refused()).filter(|near| *near != id) {
+            return Some(format!("did you mean \"{near}\"?"));
+        }
+        let list: Vec<&str> = refused().collect();
+        (!self.is_limited && !list.is_empty()).then(|| format!("{help}; in tables with errors: {}", list.join(", ")))
     }
 
     /// True if an item was refused because there are too many, so that the rest need not be read.
@@ -317,8 +420,11 @@ impl<'a> Builder<'a> {
                 format!("the id \"{id}\" ends in .{ending}, a suffix reserved for files of the release"),
             ));
         }
-        match self.ids.insert(id.to_owned(), (section, entry.index())) {
+        let origin: Origin = (section, entry.index());
+        match self.ids.insert(id.to_owned(), origin) {
             None => Ok(()),
+            // Its own claim, before it was refused.
+            Some(other) if self.is_reading_on && other == origin => Ok(()),
             Some((other, _)) => {
                 let message = format!("the id \"{id}\" is taken by an item of [[{other}]]; ids are unique in a study");
                 Err(entry.error("id", message))
@@ -357,6 +463,7 @@ impl<'a> Builder<'a> {
     pub fn name_family(&mut self, entry: &Entry<'_>, name: &str, ids: Vec<String>) -> Result<(), StudyError> {
         match self.families.insert(name.to_owned(), ids) {
             None => Ok(()),
+            Some(_) if self.is_reading_on => Ok(()),
             Some(_) => Err(entry.error("id", format!("the id \"{name}\" is taken; ids are unique in a study"))),
         }
     }
@@ -414,6 +521,30 @@ impl<'a> Builder<'a> {
     }
 }
 
+/// True if two errors refuse the same key, or one a key within that of the other.
+fn concerns_same(one: &StudyError, other: &StudyError) -> bool {
+    one.key.starts_with(&other.key) || other.key.starts_with(&one.key)
+}
+
+/// The kind or vehicle that an error on an unknown one probably means.
+fn nearest_kind(entry: &Entry<'_>, error: &StudyError) -> Option<&'static str> {
+    let [key] = &*error.key else { return None };
+    let kinds: Vec<&'static str> = match key.as_str() {
+        "kind" | "method" => {
+            let kinds = SECTIONS.iter().find(|section| section.name == entry.section()).map(|section| section.kinds)?;
+            kinds().iter().map(|kind| kind.kind).collect()
+        }
+        "vehicle" => sastrugi_mobility::registry::kinds()
+            .iter()
+            .filter(|kind| kind.family == "vehicle")
+            .map(|kind| kind.kind)
+            .collect(),
+        _ => return None,
+    };
+    let given = entry.table().get(key)?.as_str()?;
+    nearest(given, kinds.into_iter()).filter(|kind| *kind != given)
+}
+
 /// Number of items that a table states, at least.
 fn items_stated(entry: &Entry<'_>) -> u64 {
     let variants = entry.variants_stated();
@@ -433,14 +564,14 @@ fn too_many(most: usize) -> String {
 /// The error for an unknown id.
 pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterator<Item = &'s String>) -> StudyError {
     let known: Vec<&str> = known.map(String::as_str).collect();
-    let nearest = crate::study::keys::nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
+    let nearest = nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
     let list = if known.is_empty() {
-        format!("no table before this one defines an id that `{key}` can name; add one, or move it above")
+        format!("no table without errors defines an id that `{key}` can name")
     } else {
         format!("known: {}", known.join(", "))
     };
     let error = entry.error(key, format!("`{key}` names \"{id}\", which is not among the ids that it can refer to"));
-    StudyError { missing_id: Some(id.to_owned()), ..error.with_help(Some(nearest.unwrap_or(list))) }
+    StudyError { missing_id: Some(id.into()), ..error.with_help(Some(nearest.unwrap_or(list))) }
 }
 
 /// Label of the random streams that replicate `replicate` (from 0) shares with the same replicate of other items when paired.
@@ -497,7 +628,7 @@ mod tests {
             "[[terrain]]\nid = \"d\"\nkind = \"compose\"\nsize_px = [64, 64]\nprocesses = [{ of = \"a-0007\" }]\n";
         let (limited, said, items) = read(&format!("{}{}{wrong}{on_a}", table("a", 400_000), table("b", 100_001)));
         assert!(limited && said.starts_with("terrain \"b\": the study expands to more than 1000000 items"), "{said}");
-        assert!(said.contains("terrain \"c\": `cell_m`") && items <= 2 && !said.contains("a-0007"), "{said}");
+        assert!(said.contains("terrain \"c\": `cell_m`") && items <= 3 && !said.contains("a-0007"), "{said}");
         let (limited, said, _) = read(&format!("{}{}", table("a", 400_000), table("b", 99_999)));
         assert!(!limited && said.is_empty(), "{said}");
         let (limited, said, items) = read(&table("a", u32::MAX));

@@ -623,7 +623,11 @@ mod tests {
         let Err(Error::Study { refusals: Refusals(errors), .. }) = load_text(&text, "study", Path::new("")) else {
             panic!("the study is not refused")
         };
-        assert!(errors[0].help.as_ref().is_some_and(|help| help.ends_with("add one, or move it above")), "{errors:?}");
+        assert_eq!(
+            errors[0].help.as_deref(),
+            Some("[[terrain]] \"g\" comes after this table; move it above"),
+            "{errors:?}"
+        );
         // What follows from another error is not told.
         let wrong = fit("snow", "site") + "[[dem]]\nid = \"site\"\npath = \"site.tif\"\n";
         let refused = load_text(&format!("{STUDY}\n{wrong}"), "study", Path::new("")).err().unwrap().to_string();

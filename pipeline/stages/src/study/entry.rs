@@ -50,6 +50,25 @@ impl<'a> Entry<'a> {
         Self { is_limited: true, ..self }
     }
 
+    /// The table at the same place with other content.
+    pub fn with<'b>(&self, table: &'b Map<String, Value>) -> Entry<'b>
+    where
+        'a: 'b,
+    {
+        Entry { section: self.section, index: self.index, table, text: self.text, is_limited: self.is_limited }
+    }
+
+    /// Its content.
+    pub fn table(&self) -> &'a Map<String, Value> {
+        self.table
+    }
+
+    /// True if a key of this table is written in the study.
+    pub fn is_written(&self, key: &[String]) -> bool {
+        let path: Vec<String> = self.path().into_iter().chain(key.iter().cloned()).collect();
+        !key.is_empty() && self.text.exact_span(&path).is_some()
+    }
+
     /// Its section.
     pub fn section(&self) -> &'static str {
         self.section
@@ -94,11 +113,16 @@ impl<'a> Entry<'a> {
 
     /// The error of a table; if a required key is missing because it was given under another name, the error is that of the other name.
     fn refuse_missing(&self, error: ParameterError, names: &[String], params: &Map<String, Value>) -> StudyError {
-        let mut others = params.keys().map(|key| UnknownKey { path: vec![key.clone()], known: names.to_vec() });
+        let mut others = params.keys().map(|key| self.unknown(key, names.to_vec()));
         match others.find(|other| other.nearest().is_some_and(|key| error.is_missing(key))) {
             Some(other) => unknown_key(self.text, &self.path(), &other),
             None => self.refuse(error),
         }
+    }
+
+    /// An unknown key of this table.
+    fn unknown(&self, key: &str, known: Vec<String>) -> UnknownKey {
+        UnknownKey { path: vec![key.to_owned()], known, given: self.table.keys().cloned().collect() }
     }
 
     /// Refuses parameter keys that are not in the schema; `E` is the envelope, whose keys are suggested too.
@@ -107,11 +131,21 @@ impl<'a> Entry<'a> {
     /// The unknown keys.
     pub fn check_keys<E: JsonSchema>(&self, params: &Value, schema: &Value) -> Result<(), Refusals> {
         let mut unknown = keys::find_unknown(params, schema);
-        unknown.extend(any_keys(params, schema));
+        unknown.extend(self.any_keys(params, schema));
         for key in unknown.iter_mut().filter(|key| key.path.len() == 1) {
             key.known.extend(keys::properties(&schema_of::<E>()));
+            key.given = self.table.keys().cloned().collect();
         }
         Refusals::none(unknown.iter().map(|key| unknown_key(self.text, &self.path(), key)).collect())
+    }
+
+    /// All keys, as unknown: for a schema without properties.
+    fn any_keys(&self, params: &Value, schema: &Value) -> Vec<UnknownKey> {
+        if !keys::properties(schema).is_empty() {
+            return Vec::new();
+        }
+        let keys = params.as_object().into_iter().flat_map(Map::keys);
+        keys.map(|key| self.unknown(key, Vec::new())).collect()
     }
 
     /// Expands sweeps and replicates.
@@ -184,7 +218,8 @@ impl<'a> Entry<'a> {
     pub fn error(&self, key: &str, message: impl Into<String>) -> StudyError {
         let path = self.path_of_dotted(key);
         let id = self.id().map_or_else(|| format!("number {}", self.index + 1), |id| format!("\"{id}\""));
-        StudyError::at(self.text.span(&path, false), format!("{} {id}: {}", self.section, message.into()))
+        let error = StudyError::at(self.text.span(&path, false), format!("{} {id}: {}", self.section, message.into()));
+        StudyError { key: segments(key).map(str::to_owned).collect(), ..error }
     }
 
     /// A kernel's error, with its place.
@@ -212,19 +247,45 @@ impl<'a> Entry<'a> {
     }
 }
 
+/// Leaves out of a table what errors refuse, and puts unknown keys under the names that were probably meant; false if nothing changes.
+pub fn leave_out(table: &mut Value, errors: &[StudyError]) -> bool {
+    let mut is_changed = false;
+    for error in errors.iter().filter(|error| error.missing_id.is_none()) {
+        // One element of a list cannot be left out without moving the others, so the whole list is.
+        let list = error.key.iter().position(|word| word.parse::<usize>().is_ok()).unwrap_or(error.key.len());
+        let Some(value) = take(table, &error.key).or_else(|| take(table, &error.key[..list])) else { continue };
+        is_changed = true;
+        let parents = &error.key[..error.key.len() - 1];
+        if let (Some(meant), Some(map)) = (&error.meant, map_at(table, parents)) {
+            map.entry(&**meant).or_insert(value);
+        }
+    }
+    is_changed
+}
+
+/// Takes the value of a key out of a table.
+fn take(table: &mut Value, path: &[String]) -> Option<Value> {
+    let (key, parents) = path.split_last()?;
+    map_at(table, parents)?.remove(key)
+}
+
+/// The table at a path within a table.
+fn map_at<'v>(table: &'v mut Value, path: &[String]) -> Option<&'v mut Map<String, Value>> {
+    let mut at = table;
+    for word in path {
+        at = match at {
+            Value::Object(map) => map.get_mut(word)?,
+            Value::Array(list) => list.get_mut(word.parse::<usize>().ok()?)?,
+            _ => return None,
+        };
+    }
+    at.as_object_mut()
+}
+
 /// Joins the labels of two sweeps.
 pub fn joined(first: Option<&str>, second: Option<&str>) -> Option<String> {
     let labels: Vec<&str> = first.into_iter().chain(second).collect();
     (!labels.is_empty()).then(|| labels.join(", "))
-}
-
-/// All keys, as unknown: for a schema without properties.
-fn any_keys(params: &Value, schema: &Value) -> Vec<UnknownKey> {
-    if !keys::properties(schema).is_empty() {
-        return Vec::new();
-    }
-    let keys = params.as_object().into_iter().flat_map(Map::keys);
-    keys.map(|key| UnknownKey { path: vec![key.clone()], known: Vec::new() }).collect()
 }
 
 fn replicates(item: Expanded, count: Option<u32>) -> Vec<Expanded> {
@@ -308,6 +369,31 @@ mod tests {
         let long =
             format!("[[terrain]]\nsweep = {{ {} }}\n", ["a", "b", "c"].map(|key| format!("{key} = [1, 2]")).join(", "));
         assert_eq!(plain(&long), (1, 8));
+    }
+
+    /// Refused values are left out, lists as a whole, and unknown keys are renamed unless the right one is given.
+    #[test]
+    fn val_refused_keys_are_left_out() {
+        let error = |key: &[&str], meant: Option<&str>| StudyError {
+            key: key.iter().map(|word| (*word).to_owned()).collect(),
+            meant: meant.map(Into::into),
+            ..StudyError::at(None, "wrong")
+        };
+        let left = |errors: &[StudyError]| {
+            let mut table = serde_json::json!({"id": "a", "cel_m": 2, "low": {"d": 9, "s": 1}, "size": [1, "x"], "list": [{"x": 1, "y": 2}]});
+            let is_changed = leave_out(&mut table, errors);
+            (is_changed, table)
+        };
+        let (is_changed, table) = left(&[
+            error(&["cel_m"], Some("cell_m")),
+            error(&["low", "d"], None),
+            error(&["size", "1"], None),
+            error(&["list", "0", "x"], Some("y")),
+        ]);
+        assert!(is_changed);
+        assert_eq!(table, serde_json::json!({"id": "a", "cell_m": 2, "low": {"s": 1}, "list": [{"y": 2}]}));
+        assert!(!left(&[error(&[], None), error(&["none"], None), error(&["none", "x"], None)]).0);
+        assert!(!left(&[StudyError { missing_id: Some("b".into()), ..error(&["id"], None) }]).0);
     }
 
     #[test]

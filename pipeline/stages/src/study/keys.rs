@@ -13,6 +13,8 @@ pub struct UnknownKey {
     pub path: Vec<String>,
     /// Known keys at that place, in the schema's order.
     pub known: Vec<String>,
+    /// Keys that are given at that place, which cannot have been meant.
+    pub given: Vec<String>,
 }
 
 impl UnknownKey {
@@ -23,9 +25,9 @@ impl UnknownKey {
 
     /// The known key that was probably meant: a synonym, or the nearest in spelling.
     pub fn nearest(&self) -> Option<&str> {
-        let known = || self.known.iter().map(String::as_str);
-        let synonym = SYNONYMS.iter().find(|(words, key)| words.contains(&self.key()) && known().any(|k| k == *key));
-        synonym.map(|(_, key)| *key).or_else(|| nearest(self.key(), known()))
+        let open = || self.known.iter().filter(|key| !self.given.contains(key)).map(String::as_str);
+        let synonym = SYNONYMS.iter().find(|(words, key)| words.contains(&self.key()) && open().any(|k| k == *key));
+        synonym.map(|(_, key)| *key).or_else(|| nearest(self.key(), open()))
     }
 }
 
@@ -49,7 +51,7 @@ const SYNONYMS: [(&[&str], &str); 24] = [
     (&["roi", "bbox", "bounds", "crop"], "window"),
     (&["random_seed", "rng"], "seed"),
     (&["robot", "platform"], "vehicle"),
-    (&["outer_scale", "detrend", "detrending", "window_m"], "outer_scale_m"),
+    (&["outer_scale", "detrend", "detrending", "window", "window_m"], "outer_scale_m"),
     (&["summary", "abstract"], "description"),
     (&["terrain", "surface", "surfaces"], "terrains"),
     (&["base", "terrain", "surface"], "onto"),
@@ -57,7 +59,8 @@ const SYNONYMS: [(&[&str], &str); 24] = [
     (&["surface", "terrain", "dem", "operand"], "of"),
 ];
 
-/// The candidate nearest to `word` in spelling, if it is close enough (Jaro-Winkler similarity above 0.75).
+/// The candidate nearest to `word` in spelling, if it is close enough: Jaro-Winkler similarity above 0.75, and either one begins with the
+/// other or at most half of the letters differ, since the similarity alone overrates short candidates.
 ///
 /// ```
 /// use sastrugi_stages::study::keys::nearest;
@@ -69,9 +72,28 @@ const SYNONYMS: [(&[&str], &str); 24] = [
 pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Option<&'a str> {
     candidates
         .map(|c| (strsim::jaro_winkler(word, c), c))
-        .filter(|(similarity, _)| *similarity > 0.75)
+        .filter(|(similarity, c)| *similarity > 0.75 && (continues(word, c) || differ_little(word, c)))
         .max_by(|a, b| a.0.total_cmp(&b.0))
         .map(|(_, c)| c)
+}
+
+/// The word that was probably meant, of those that a message such as "has the unknown key `mas_kg`; known: `size_m`, `mass_kg`" lists.
+pub fn nearest_in(message: &str) -> Option<&str> {
+    let (_, rest) = message.split_once("the unknown ")?;
+    let (found, known) = rest.split_once("; known: ")?;
+    let word = found.split('`').nth(1)?;
+    nearest(word, known.split('`').skip(1).step_by(2))
+}
+
+/// True if one begins with the other, which has three letters or more.
+fn continues(word: &str, candidate: &str) -> bool {
+    let begins = |long: &str, short: &str| short.len() >= 3 && long.starts_with(short);
+    begins(word, candidate) || begins(candidate, word)
+}
+
+/// True if at most half of the letters of the longer one must be edited.
+fn differ_little(word: &str, candidate: &str) -> bool {
+    2 * strsim::levenshtein(word, candidate) <= word.chars().count().max(candidate.chars().count())
 }
 
 /// Names of the properties in a schema.
@@ -153,7 +175,7 @@ fn search_object(
             Some(inner) => search(value, inner, root, path, found),
             None => {
                 let known = objects.iter().flat_map(|o| o.keys().cloned()).collect();
-                found.push(UnknownKey { path: path.clone(), known });
+                found.push(UnknownKey { path: path.clone(), known, given: map.keys().cloned().collect() });
             }
         });
     }
@@ -218,12 +240,36 @@ mod tests {
         assert_eq!(unknown(json!({"x": 1, "low": {"y": 1}, "list": [{"z": 1}]})).len(), 3);
     }
 
+    /// What is given already was not meant, and a short key is not near to a longer word that contains its letters.
+    #[test]
+    fn val_suggestions_are_plausible() {
+        let owned = |words: &[&str]| words.iter().map(|word| (*word).to_owned()).collect::<Vec<_>>();
+        let meant = |key: &str, given: &[&str]| {
+            let known = owned(&["id", "dem", "minus", "outer_scale_m", "model"]);
+            let unknown = UnknownKey { path: owned(&[key]), known, given: owned(given) };
+            unknown.nearest().map(str::to_owned)
+        };
+        assert_eq!(meant("window", &["id", "dem"]).as_deref(), Some("outer_scale_m"));
+        assert_eq!(meant("modl", &[]).as_deref(), Some("model"));
+        assert_eq!(meant("modl", &["model"]), None);
+        for key in ["windw_m", "width_m"] {
+            assert_eq!(meant(key, &[]), None, "{key}");
+        }
+        let kinds = ["gap", "fractal_dimension", "off", "id"];
+        for (word, expected) in [("fractal", Some("fractal_dimension")), ("of", Some("off")), ("window", None)] {
+            assert_eq!(nearest(word, kinds.into_iter()), expected, "{word}");
+        }
+        let message = "`chassis.mas_kg` has the unknown key `mas_kg`; known: `size_m`, `mass_kg`, `bottom_z_m`";
+        assert_eq!(nearest_in(message), Some("mass_kg"));
+        assert_eq!(nearest_in("`cell_m` is -1; it must be a finite number above 0"), None);
+    }
+
     /// A surface has another key in every section; only keys of that section are suggested.
     #[test]
     fn val_synonyms_of_each_section() {
         let meant = |key: &str, known: &[&str]| {
             let known = known.iter().map(|key| (*key).to_owned()).collect();
-            UnknownKey { path: vec![key.to_owned()], known }.nearest().map(str::to_owned)
+            UnknownKey { path: vec![key.to_owned()], known, given: Vec::new() }.nearest().map(str::to_owned)
         };
         for known in [["terrains", "of"], ["fit", "onto"], ["cell_m", "dem"], ["kind", "of"]] {
             let expected = if known[0] == "terrains" { "terrains" } else { known[1] };

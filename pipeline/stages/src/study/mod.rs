@@ -189,7 +189,9 @@ fn unknown_key(text: &StudyText, parent: &[String], unknown: &keys::UnknownKey) 
         Some(nearest) => format!("did you mean `{nearest}`?"),
         None => format!("known keys: {}", unknown.known.join(", ")),
     };
-    StudyError::at(text.span(&path, true), message).with_help(Some(help))
+    let meant = unknown.nearest().map(Into::into);
+    let error = StudyError::at(text.span(&path, true), message).with_help(Some(help));
+    StudyError { key: unknown.path.clone().into(), meant, ..error }
 }
 
 /// Refuses settings of `[roughness]` that are out of range.

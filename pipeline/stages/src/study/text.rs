@@ -15,13 +15,17 @@ pub struct StudyError {
     /// A suggestion.
     pub help: Option<String>,
     /// The id reported as missing; the error is dropped if the item of that id was itself refused.
-    pub missing_id: Option<String>,
+    pub missing_id: Option<Box<str>>,
+    /// Path in its table of the key that it refuses; empty for the table as a whole.
+    pub key: Box<[String]>,
+    /// The known key that was probably meant, if it refuses an unknown one.
+    pub meant: Option<Box<str>>,
 }
 
 impl StudyError {
     /// An error at a place in the text.
     pub fn at(span: Option<Range<usize>>, message: impl Into<String>) -> Self {
-        Self { message: message.into(), span, help: None, missing_id: None }
+        Self { message: message.into(), span, help: None, missing_id: None, key: Box::default(), meant: None }
     }
 
     /// The error with a suggestion.

@@ -97,8 +97,11 @@ mod tests {
         [&(content.len() as u32).to_le_bytes(), content].concat()
     }
 
-    /// Every record with texts (MCAP format specification, "Records"), in pieces; and the pieces that are texts or maps of texts.
-    fn records() -> [(u8, Vec<Vec<u8>>, &'static [usize]); 9] {
+    /// A record in pieces, and the pieces that are texts or maps of texts.
+    type InPieces = (u8, Vec<Vec<u8>>, &'static [usize]);
+
+    /// Every record with texts (MCAP format specification, "Records").
+    fn records() -> [InPieces; 9] {
         let fixed = |bytes: usize| vec![0; bytes];
         let pairs = sized(&[text("key"), text("value")].concat());
         let offsets = sized(&[&[1_u8; 2][..], &[0; 8], &[2; 2], &[0; 8]].concat());
