@@ -32,6 +32,26 @@ fn val_studies_to_start_from_can_be_run() {
     assert!(std::fs::read_to_string(path.join("my-rover.toml")).unwrap().contains("sojourner_like"));
 }
 
+/// The terrains of the first study have a relief that a vehicle would notice and could drive on.
+#[test]
+fn val_the_first_study_gives_plausible_terrains() {
+    let folder = area();
+    let path = folder.path();
+    assert_eq!(sastrugi_in(path, &["init", "terrain"]).code, 0);
+    let call = sastrugi_in(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let mut terrains = 0;
+    for file in std::fs::read_dir(path.join("release/terrain")).unwrap().map(|file| file.unwrap().path()) {
+        let call = sastrugi_in(path, &["info", file.to_str().unwrap(), "--json"]);
+        let info: Value = serde_json::from_str(&call.stdout).unwrap();
+        let height = |key: &str| info[key].as_f64().unwrap_or_else(|| panic!("{key}: {info}"));
+        let relief_m = height("height_max_m") - height("height_min_m");
+        assert!((0.1..5.0).contains(&relief_m), "{}: {relief_m} m", file.display());
+        terrains += 1;
+    }
+    assert_eq!(terrains, 11);
+}
+
 /// All that is wrong is told in one call, in the order of the text, and what follows from another error is not.
 #[test]
 fn val_all_errors_are_told_at_once() {

@@ -12,6 +12,9 @@ use serde_json::{Map, Value, json};
 /// Key of a table that names several kinds at once and accepts the keys of all of them.
 const SEVERAL: &str = "methods";
 
+/// Title of the schema, by which a file that holds one is recognised.
+const TITLE: &str = "sastrugi study";
+
 /// JSON Schema of a study file.
 ///
 /// ```
@@ -34,7 +37,7 @@ pub fn study_schema() -> Value {
     }
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
-        "title": "sastrugi study",
+        "title": TITLE,
         "description": "A study: what is measured, generated, fitted, synthesised, driven and tested.",
         "type": "object",
         "required": ["study"],
@@ -42,6 +45,18 @@ pub fn study_schema() -> Value {
         "properties": properties,
         "$defs": definitions,
     })
+}
+
+/// True for the text of a schema that this or an earlier version wrote: only such a file may be replaced without asking.
+///
+/// ```
+/// use sastrugi_stages::schema::{is_own, study_schema};
+///
+/// assert!(is_own(study_schema().to_string().as_bytes()));
+/// assert!(!is_own(br#"{ "title": "another study" }"#) && !is_own(b"notes"));
+/// ```
+pub fn is_own(text: &[u8]) -> bool {
+    serde_json::from_slice::<Value>(text).is_ok_and(|schema| schema["title"] == TITLE)
 }
 
 /// Moves a schema and its definitions to the root; returns the reference that replaces it.
