@@ -27,6 +27,18 @@ fn val_studies_to_start_from_can_be_run() {
         let (plan, warnings) = planned(path, &file);
         assert!(plan["items"].as_u64() > Some(3) && warnings.is_empty(), "{kind}: {warnings}");
     }
+    // A schema of the program is replaced, another file of that name is not.
+    let schema = path.join("study.schema.json");
+    let own = std::fs::read(&schema).unwrap();
+    std::fs::write(&schema, "{ \"title\": \"mine\" }").unwrap();
+    let call = sastrugi_in(path, &["init", "-o", "other.toml"]);
+    assert!(
+        call.code == 2 && call.stderr.contains("study.schema.json is not a schema of this program"),
+        "{}",
+        call.stderr
+    );
+    assert!(!path.join("other.toml").exists());
+    std::fs::write(&schema, own).unwrap();
     let call = sastrugi_in(path, &["init", "-o", "my-rover.toml"]);
     assert!(call.code == 2 && call.stderr.contains("exists"), "{}", call.stderr);
     assert!(std::fs::read_to_string(path.join("my-rover.toml")).unwrap().contains("sojourner_like"));

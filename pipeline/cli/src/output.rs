@@ -13,7 +13,7 @@ use std::ops::Range;
 const COLUMNS_SHOWN: usize = 1000;
 
 /// Maximum number of errors that are drawn; a file that is not a study would give thousands.
-const REFUSALS_SHOWN: usize = 20;
+const REFUSALS_SHOWN: usize = 100;
 
 /// Prints the value as JSON on request, otherwise the text.
 ///

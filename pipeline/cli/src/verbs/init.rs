@@ -5,7 +5,7 @@ use crate::args::{Common, Init};
 use crate::failure::{Code, Failure};
 use crate::output::print;
 use sastrugi_stages::Error;
-use sastrugi_stages::schema::study_schema;
+use sastrugi_stages::schema::{is_own, study_schema};
 use sastrugi_stages::starting::{SCHEMA, STARTING};
 use sastrugi_store::atomic;
 use serde_json::json;
@@ -24,7 +24,11 @@ pub fn init(args: &Init, common: &Common) -> Verdict {
     if path.exists() {
         return Err(Failure::usage(format!("{} already exists; choose another name with -o", path.display())));
     }
-    // The schema belongs to the program and is overwritten: it may be from an earlier version.
+    // A schema of the program may be from an earlier version, and is replaced.
+    if std::fs::read(&schema).is_ok_and(|text| !is_own(&text)) {
+        let message = "is not a schema of this program; move it, or write the study to another folder with -o";
+        return Err(Failure::usage(format!("{} {message}", schema.display())));
+    }
     let published = serde_json::to_string_pretty(&study_schema()).map_err(Failure::failed)? + "\n";
     for (path, text) in [(&schema, published), (path, starting.text.replace("study.toml", &name))] {
         atomic::write(path, text.as_bytes()).map_err(|e| Error::at(path, e))?;
