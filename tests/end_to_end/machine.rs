@@ -242,7 +242,8 @@ fn val_a_lack_of_memory_is_no_fault_of_the_file() {
             let limited = format!("ulimit -v {kib}; exec {} {verb} --threads 2", program().display());
             let call = called(Command::new("bash").args(["-c", &limited]).current_dir(path));
             assert!([0, 75].contains(&call.code), "{verb}, {kib} KiB: {} {}", call.code, call.stderr);
-            let outputs = names(path).len() - 1;
+            // An aborted process may leave a temporary file, which the next call removes.
+            let outputs = ["new.tif", "new.png"].iter().filter(|name| path.join(name).exists()).count();
             assert_eq!(outputs, usize::from(call.code == 0), "{verb}, {kib} KiB: {:?}", names(path));
             *if outputs == 0 { &mut short } else { &mut whole } += 1;
             ["new.tif", "new.png"].iter().for_each(|name| fs::remove_file(path.join(name)).unwrap_or_default());
