@@ -11,7 +11,7 @@ use sastrugi_schemas::tables::{
     FormationSampleRow, HeightDistributionRow, LogRow, ProfilePsdRow, PsdRow, RoutePointRow, RoverSampleRow, SampleRow,
     StructureRow, TerrainRow, in_order,
 };
-use sastrugi_store::release::{MANIFEST, SHARD, TABLES};
+use sastrugi_store::release::{MANIFEST, SHARD, STUDY, TABLES};
 use sastrugi_store::{dem, digest, parquet};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt::Display;
@@ -24,7 +24,6 @@ const DATA_FOLDERS: [&str; 10] =
     ["classes", "dem", "fit", "image", "mcap", "photoclinometry", "route", TABLES, "terrain", "texture"];
 /// The one of these whose files are only counted.
 const RECORDINGS: &str = "mcap";
-const STUDY: &str = "study.toml";
 
 impl Data {
     /// Reads the tables of a release.

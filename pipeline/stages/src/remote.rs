@@ -203,14 +203,15 @@ mod tests {
     use super::*;
     use crate::runner::progress::Silent;
     use sastrugi_schemas::manifest::Origin;
-    use sastrugi_store::release::{Head, ReleaseBuilder, verify};
+    use sastrugi_store::release::{Head, ReleaseBuilder, STUDY, verify};
     use std::collections::BTreeMap;
 
     fn release(folder: &Path, text: &str) -> Release {
         let dest = folder.join("release");
+        let study = "[study]\n";
         let head = Head {
             name: "demo".to_owned(),
-            study_sha256: "ab".repeat(32),
+            study_sha256: sastrugi_store::digest::of_bytes(study.as_bytes()),
             seed: 7,
             version: "0.1.0".to_owned(),
             license: "CC-BY-4.0".to_owned(),
@@ -218,6 +219,7 @@ mod tests {
         let mut builder = ReleaseBuilder::beside(&dest, head).unwrap();
         builder.write_text("README.md", text, Origin::default()).unwrap();
         builder.write_text("dem/a.asc", "ncols 1", Origin::default()).unwrap();
+        builder.write_text(STUDY, study, Origin::default()).unwrap();
         builder.seal(&dest).unwrap();
         Release::open(&dest).unwrap()
     }
@@ -232,7 +234,7 @@ mod tests {
         let before = bucket.list("").unwrap();
         assert_eq!(
             before.iter().map(|o| o.name.as_str()).collect::<Vec<_>>(),
-            ["README.md", SUMS, "dem/a.asc", MANIFEST]
+            ["README.md", SUMS, "dem/a.asc", MANIFEST, STUDY]
         );
         upload(&first, &bucket, &Silent).unwrap();
         assert_eq!(bucket.list("").unwrap(), before);
@@ -242,7 +244,7 @@ mod tests {
         let back = tempfile::tempdir().unwrap();
         download(&bucket, back.path(), &Silent).unwrap();
         let report = verify(back.path()).unwrap();
-        assert_eq!((report.problems, report.files), (Vec::new(), 3));
+        assert_eq!((report.problems, report.files), (Vec::new(), 4));
     }
 
     /// An upload that was interrupted has no manifest. The same release resumes it; another release does not overwrite it.
@@ -261,7 +263,7 @@ mod tests {
         );
         assert!(!bucket.contains(MANIFEST).unwrap());
         upload(&first, &bucket, &Silent).unwrap();
-        assert_eq!(bucket.list("").unwrap().len(), 4);
+        assert_eq!(bucket.list("").unwrap().len(), 5);
     }
 
     /// An upload that has just begun has the address: nothing of another release is uploaded, not even large files, which have no condition.
@@ -275,7 +277,7 @@ mod tests {
         assert!(upload(&release(two.path(), "# Other"), &bucket, &Silent).is_err());
         assert_eq!(bucket.list("").unwrap(), before);
         upload(&first, &bucket, &Silent).unwrap();
-        assert_eq!(bucket.list("").unwrap().len(), 4);
+        assert_eq!(bucket.list("").unwrap().len(), 5);
     }
 
     /// The copy that an earlier run left in the work area does not stand in the way; the release at the address does.

@@ -257,7 +257,7 @@ fn check_destination(study: &Study, request: &RunRequest<'_>) -> Result<(), Erro
 /// # Errors
 /// A study that is missing or invalid.
 pub fn head_of(release: &Path) -> Result<StudyHead, Error> {
-    let path = release.join("study.toml");
+    let path = release.join(release::STUDY);
     let refuse = |why: &dyn std::fmt::Display| Error::Input(format!("{}: {why}", path.display()));
     let text = sastrugi_store::file::read_text(&path).map_err(|e| refuse(&e))?;
     let study = Study::parse(&text, release, &registry::section_names()).map_err(|e| refuse(&e))?;

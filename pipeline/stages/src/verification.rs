@@ -14,9 +14,7 @@ use crate::studies::{RunRequest, resolved, run};
 use sastrugi_schemas::Table;
 use sastrugi_schemas::manifest::{Artifact, ItemNote, Manifest};
 use sastrugi_store::parquet::TableReader;
-use sastrugi_store::release::{
-    self, Head, MANIFEST, Problem, ProblemKind, Release, ReleaseError, VerifyReport, for_each_artifact,
-};
+use sastrugi_store::release::{self, Head, MANIFEST, Problem, ProblemKind, Release, ReleaseError, STUDY, VerifyReport};
 use serde::Serialize;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
@@ -25,9 +23,6 @@ use std::path::{Path, PathBuf};
 
 /// Key of a manifest's list of files.
 const ARTIFACTS: &str = "artifacts";
-
-/// Path of the study in a release.
-const STUDY: &str = "study.toml";
 
 /// Which items to recompute.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -102,58 +97,14 @@ pub fn verify(
     Ok(verification)
 }
 
-/// Checks the files of a release, and that they are of the study that its manifest states. A folder that is not a release is refused before
-/// any progress is shown.
+/// Checks the files of a release. A folder that is not one is refused before any progress is shown.
 ///
 /// # Errors
 /// Such a folder; failures of the machine.
 pub(crate) fn checked(folder: &Path, progress: &dyn Progress) -> Result<VerifyReport, Error> {
     release::check_lists(folder)?;
     progress.phase("checking files");
-    let mut report = release::verify(folder)?;
-    let of_others = of_other_studies(folder, &report.problems)?;
-    report.problems.extend(of_others);
-    report.problems.sort();
-    Ok(report)
-}
-
-/// The study and the tables of a release if they are not of the study that its manifest states. Files with a problem `known` so far are left
-/// out, and so is a manifest that cannot be read, which is one.
-fn of_other_studies(folder: &Path, known: &[Problem]) -> Result<Vec<Problem>, Error> {
-    let mut stating = Vec::new();
-    let read = for_each_artifact(folder, |artifact| {
-        if artifact.path == STUDY || release::table_of(&artifact.path).is_some() {
-            stating.push((artifact.path, artifact.sha256));
-        }
-    });
-    let manifest = match read {
-        Err(ReleaseError::NotARelease { .. }) => return Ok(Vec::new()),
-        other => other?,
-    };
-    let is_listed = stating.iter().any(|(path, _)| path == STUDY);
-    let unlisted = (!is_listed).then(|| other_study(STUDY.to_owned(), None, &manifest.study_sha256)).flatten();
-    let mut problems: Vec<Problem> = unlisted.into_iter().collect();
-    for (path, sha256) in stating {
-        if known.iter().any(|problem| problem.path == path) {
-            continue;
-        }
-        let found = if path == STUDY { Some(sha256) } else { release::study_of_table(&folder.join(&path))? };
-        problems.extend(other_study(path, found.as_deref(), &manifest.study_sha256));
-    }
-    Ok(problems)
-}
-
-/// The problem with the study, or with a table made from it, if its SHA-256 is not the one that the manifest states.
-fn other_study(path: String, found: Option<&str>, stated: &str) -> Option<Problem> {
-    let by_manifest = format!("`study_sha256` in {MANIFEST} is {stated}");
-    let message = match found {
-        Some(found) if found == stated => return None,
-        Some(found) if path == STUDY => format!("has SHA-256 {found}, but {by_manifest}"),
-        Some(found) => format!("was made from the study with SHA-256 {found}, but {by_manifest}"),
-        None if path == STUDY => format!("is not listed, but {by_manifest}"),
-        None => format!("does not state its study, but {by_manifest}"),
-    };
-    Some(Problem { path, kind: ProblemKind::Inconsistent, message })
+    Ok(release::verify(folder)?)
 }
 
 /// Refuses to recompute a release whose study names files outside it: they are not part of what was released and checked.
@@ -402,22 +353,6 @@ mod tests {
                 { "path": "b.tif", "sha256": "2", "stage": "terrain" },
             ],
         })
-    }
-
-    /// The study and each table must be of the study that the manifest states; one line names both hashes.
-    #[test]
-    fn val_files_of_another_study_are_named() {
-        let said = |path: &str, found| other_study(path.to_owned(), found, "aa").map(|problem| problem.to_string());
-        assert_eq!(said(STUDY, Some("aa")), None);
-        assert_eq!(said("tables/psd/part-0000.parquet", Some("aa")), None);
-        let stated = "`study_sha256` in manifest.json is aa";
-        let study = format!("study.toml: has SHA-256 bb, but {stated}");
-        assert_eq!(said(STUDY, Some("bb")), Some(study));
-        let table = format!("tables/psd/a.parquet: was made from the study with SHA-256 bb, but {stated}");
-        assert_eq!(said("tables/psd/a.parquet", Some("bb")), Some(table));
-        let silent = format!("tables/psd/a.parquet: does not state its study, but {stated}");
-        assert_eq!(said("tables/psd/a.parquet", None), Some(silent));
-        assert_eq!(said(STUDY, None), Some(format!("study.toml: is not listed, but {stated}")));
     }
 
     /// A change of a manifest.

@@ -128,7 +128,7 @@ pub struct TableMetadata {
 
 impl TableMetadata {
     fn pairs(&self, table: &str) -> [(String, String); 5] {
-        let pair = |key: &str, value: &str| (format!("sastrugi.{key}"), value.to_owned());
+        let pair = |key: &str, value: &str| (key_of(key), value.to_owned());
         [
             pair("table", table),
             pair("study_sha256", &self.study_sha256),
@@ -137,6 +137,11 @@ impl TableMetadata {
             pair("license", &self.license),
         ]
     }
+}
+
+/// Key of a part of the provenance in the metadata of a file.
+fn key_of(part: &str) -> String {
+    format!("sastrugi.{part}")
 }
 
 /// Summary of a written table.
@@ -656,11 +661,23 @@ pub fn describe_file(path: &Path) -> Result<serde_json::Value, TableError> {
     Err(TableError::Unusable { path: path.to_owned(), reason: "is not a table of a release".to_owned() })
 }
 
-/// Checks that a file has a table's columns, types, units and descriptions; returns its number of rows.
+/// What a file of a table states about itself.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Stated {
+    /// Number of rows.
+    pub rows: u64,
+    /// SHA-256 of the study that it was made from, if it has a provenance.
+    pub study_sha256: Option<String>,
+}
+
+/// Checks that a file has a table's columns, types, units and descriptions; returns what it states.
 ///
 /// # Errors
 /// As [`TableReader::open`].
-pub fn check_table(path: &Path, table: &Table) -> Result<u64, TableError> {
+pub fn check_table(path: &Path, table: &Table) -> Result<Stated, TableError> {
     let builder = open(path, table)?;
-    Ok(builder.metadata().file_metadata().num_rows().unsigned_abs())
+    let stated = builder.metadata().file_metadata();
+    let mut pairs = stated.key_value_metadata().into_iter().flatten();
+    let study = pairs.find(|pair| pair.key == key_of("study_sha256"));
+    Ok(Stated { rows: stated.num_rows().unsigned_abs(), study_sha256: study.and_then(|pair| pair.value.clone()) })
 }

@@ -18,7 +18,6 @@ pub use verify::{Problem, ProblemKind, VerifyReport, check_lists, verify};
 
 use crate::digest;
 use crate::parquet::{self, TableError};
-use ::parquet::file::metadata::ParquetMetaDataReader;
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{Artifact, FORMAT, Manifest, PROGRAM};
 use sastrugi_schemas::tables::in_order;
@@ -34,8 +33,8 @@ pub const SHARD: &str = "shard.json";
 /// Folder of the tables in a release.
 pub const TABLES: &str = "tables";
 
-/// Key of the study's SHA-256 in the metadata of a table.
-const STUDY_KEY: &str = "sastrugi.study_sha256";
+/// File of the study in a release.
+pub const STUDY: &str = "study.toml";
 
 /// The only hidden file of a release: the metadata that an archive requires on deposit.
 pub const ZENODO: &str = ".zenodo.json";
@@ -246,39 +245,8 @@ fn check_head(manifest: &Manifest) -> Result<(), String> {
     check_path(name).map_err(|e| format!("{MANIFEST} has an invalid study name: {e}"))
 }
 
-/// SHA-256 of the study that a file of a table was made from, as its metadata states; `None` if that does not. For files that [`verify`] found
-/// intact.
-///
-/// ```
-/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
-/// use sastrugi_schemas::tables::PsdRow;
-/// use sastrugi_store::parquet::{TableMetadata, write_table};
-/// use sastrugi_store::release::study_of_table;
-///
-/// let folder = tempfile::tempdir()?;
-/// let path = folder.path().join("psd.parquet");
-/// let [study_sha256, version, license] = ["ab", "1.0.0", "CC0-1.0"].map(str::to_owned);
-/// write_table(&path, Vec::<PsdRow>::new(), Some(&TableMetadata { study_sha256, seed: 7, version, license }))?;
-/// assert_eq!(study_of_table(&path)?.as_deref(), Some("ab"));
-/// write_table(&path, Vec::<PsdRow>::new(), None)?;
-/// assert_eq!(study_of_table(&path)?, None);
-/// # Ok(())
-/// # }
-/// ```
-///
-/// # Errors
-/// The file cannot be read, or is not a Parquet file.
-pub fn study_of_table(path: &Path) -> Result<Option<String>, ReleaseError> {
-    let file = crate::file::open(path).map_err(ReleaseError::io(path))?;
-    let metadata = ParquetMetaDataReader::new()
-        .parse_and_finish(&file)
-        .map_err(|e| TableError::Unusable { path: path.to_owned(), reason: e.to_string() })?;
-    let mut pairs = metadata.file_metadata().key_value_metadata().into_iter().flatten();
-    Ok(pairs.find(|pair| pair.key == STUDY_KEY).and_then(|pair| pair.value.clone()))
-}
-
-/// Name of the table that a path of a release belongs to; `None` for files that are not one of a table.
-pub fn table_of(path: &str) -> Option<&str> {
+/// Name of the table that a path belongs to.
+fn table_of(path: &str) -> Option<&str> {
     let rest = path.strip_prefix(TABLES)?.strip_prefix('/')?;
     let (table, file) = rest.split_once('/')?;
     file.ends_with(".parquet").then_some(table)

@@ -9,14 +9,13 @@ use crate::job::ItemRef;
 use crate::jobs::original;
 use sastrugi_schemas::manifest::{PROGRAM as PROGRAM_NAME, Source};
 use sastrugi_schemas::tables;
-use sastrugi_store::release::Listed;
+use sastrugi_store::release::{Listed, STUDY};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 
 const CRATE: &str = "https://w3id.org/ro/crate/1.1";
 const PROFILE: &str = "https://w3id.org/ro/wfrun/process/0.5";
 const PROGRAM: &str = "#sastrugi";
-const STUDY: &str = "study.toml";
 /// Files of the release itself: path, media type, description.
 const OWN_FILES: [(&str, &str, &str); 8] = [
     (STUDY, "application/toml", "The study, from which everything else follows"),

@@ -16,7 +16,7 @@ use crate::job::ItemRef;
 use crate::splits::Splits;
 use crate::study::Study;
 use sastrugi_schemas::manifest::{Artifact, FailedItem, ItemNote, Origin};
-use sastrugi_store::release::{self, Head, Incoming, MANIFEST, ReleaseBuilder, ReleaseError, for_each_artifact};
+use sastrugi_store::release::{self, Head, Incoming, MANIFEST, ReleaseBuilder, ReleaseError, STUDY, for_each_artifact};
 use std::fs::File;
 use std::path::{Path, PathBuf};
 
@@ -240,7 +240,7 @@ fn add_documents(builder: &mut ReleaseBuilder, contents: &Contents<'_>, sources:
     let (head, failures) = (&contents.study.head, contents.failures);
     let (splits, files) = (contents.splits, builder.files());
     let described = Described { head, sources: &sources.list, files, splits, failures };
-    let study = ("study.toml", contents.text.to_owned());
+    let study = (STUDY, contents.text.to_owned());
     for (path, text) in [study].into_iter().chain(documents::all(&described)) {
         builder.write_text(path, &text, Origin::default())?;
     }

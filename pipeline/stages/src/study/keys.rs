@@ -77,7 +77,7 @@ pub fn nearest<'a>(word: &str, candidates: impl Iterator<Item = &'a str>) -> Opt
         .map(|(_, c)| c)
 }
 
-/// The word that was probably meant, of those that a message such as "has the unknown key `mas_kg`; known: `size_m`, `mass_kg`" lists.
+/// The word that was probably meant, of those that a message of `read_parameters` lists: "has the unknown key `mas_kg`; known: `size_m`, `mass_kg`".
 pub fn nearest_in(message: &str) -> Option<&str> {
     let (_, rest) = message.split_once("the unknown ")?;
     let (found, known) = rest.split_once("; known: ")?;

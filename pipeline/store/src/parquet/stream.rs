@@ -116,7 +116,7 @@ impl TableFiles {
         if !self.wanted.is_empty() {
             return Ok(self.column(self.table.columns[0].name)?.len() as u64);
         }
-        self.paths.iter().map(|path| super::check_table(path, self.table)).sum()
+        self.paths.iter().map(|path| Ok(super::check_table(path, self.table)?.rows)).sum()
     }
 
     /// The values of a column.

@@ -209,7 +209,7 @@ fn val_many_rows_stream_through() {
     })
     .unwrap();
     assert_eq!(expected, count);
-    assert_eq!(check_table(&path, &PsdRow::TABLE).unwrap(), count as u64);
+    assert_eq!(check_table(&path, &PsdRow::TABLE).unwrap().rows, count as u64);
 }
 
 /// Columns come in the order in which they are named, whatever their order in the table, from one file after the other until `f` breaks.

@@ -4,10 +4,12 @@ use sastrugi_schemas::tables::{CovarianceRow, PsdRow};
 use std::fs::{self, OpenOptions};
 use std::io::{Read, Seek, SeekFrom, Write};
 
+const STUDY_TEXT: &str = "[study]\n";
+
 fn head() -> Head {
     Head {
         name: "demo".to_owned(),
-        study_sha256: "ab".repeat(32),
+        study_sha256: digest::of_bytes(STUDY_TEXT.as_bytes()),
         seed: 7,
         version: "0.1.0".to_owned(),
         license: "CC-BY-4.0".to_owned(),
@@ -28,6 +30,7 @@ fn rows(n: i64) -> Vec<PsdRow> {
 fn sealed(dest: &Path) -> Release {
     let mut builder = ReleaseBuilder::beside(dest, head()).unwrap();
     builder.write_text("README.md", "# Demo\n", Origin::default()).unwrap();
+    builder.write_text(STUDY, STUDY_TEXT, Origin::default()).unwrap();
     builder.write_text("fit/a.json", "{}\n", Origin { stage: "fit".to_owned(), ..Origin::default() }).unwrap();
     let single = |table| TablePart { table, name: TablePart::WHOLE.to_owned(), origin: Origin::default() };
     let fill = |part: &TablePart, writer: &mut PartWriter<'_>| {
@@ -134,6 +137,41 @@ fn val_hostile_folders_are_refused() {
     assert_eq!((problems.len(), problems[0].path.as_str(), problems[0].kind), (1, "more/folders/", ProblemKind::Extra));
 }
 
+/// The study and each table must be of the study that the manifest states; one line names both hashes.
+#[test]
+fn val_files_of_another_study_are_named() {
+    let folder = tempfile::tempdir().unwrap();
+    let dest = folder.path().join("release");
+    sealed(&dest);
+    let text = fs::read_to_string(dest.join(MANIFEST)).unwrap();
+    let own = digest::of_bytes(STUDY_TEXT.as_bytes());
+    let forge = |text: &str| {
+        fs::write(dest.join(MANIFEST), text).unwrap();
+        let manifest: Manifest = serde_json::from_str(text).unwrap();
+        fs::write(dest.join(SUMS), sums_text(&manifest, &digest::of_bytes(text.as_bytes()))).unwrap();
+        let problems = verify(&dest).unwrap().problems;
+        assert!(problems.iter().all(|p| p.kind == ProblemKind::Inconsistent), "{problems:?}");
+        problems.iter().map(ToString::to_string).collect::<Vec<_>>()
+    };
+    let other = "cd".repeat(32);
+    let stated = format!("`study_sha256` in manifest.json is {other}");
+    let key = "\"study_sha256\": \"";
+    let table = |name: &str| {
+        format!("tables/{name}/part-0000.parquet: was made from the study with SHA-256 {own}, but {stated}")
+    };
+    assert_eq!(
+        forge(&text.replacen(&format!("{key}{own}"), &format!("{key}{other}"), 1)),
+        [format!("study.toml: has SHA-256 {own}, but {stated}"), table("psd")]
+    );
+    fs::rename(dest.join(STUDY), dest.join("other.toml")).unwrap();
+    let unlisted = forge(&text.replacen("\"study.toml\"", "\"other.toml\"", 1));
+    assert_eq!(unlisted, [format!("study.toml: is not listed, but `study_sha256` in manifest.json is {own}")]);
+}
+
+fn sums_text(manifest: &Manifest, manifest_sha256: &str) -> Vec<u8> {
+    verify::sums_of(manifest, manifest_sha256).unwrap()
+}
+
 fn rebuilt(dest: &Path, manifest: &str) -> PathBuf {
     fs::write(dest.join(MANIFEST), manifest).unwrap();
     dest.to_owned()
@@ -188,6 +226,7 @@ fn val_added_files_have_their_hashes() {
         assert_eq!(fs::metadata(&source).unwrap().nlink(), 3);
     }
     assert!(builder.add_files(vec![incoming("a/made.bin")]).is_err());
+    builder.write_text(STUDY, STUDY_TEXT, Origin::default()).unwrap();
     builder.seal(&folder.path().join("release")).unwrap();
     assert_eq!(verify(&folder.path().join("release")).unwrap().problems, vec![]);
     assert_eq!(fs::read(&source).unwrap(), b"made");
@@ -242,7 +281,7 @@ fn val_a_changed_table_description_is_found() {
     let path = dest.join("tables/psd/part-0000.parquet");
     let error = crate::parquet::check_table(&path, &CovarianceRow::TABLE).unwrap_err();
     assert!(error.to_string().contains("surface_id"), "{error}");
-    assert_eq!(crate::parquet::check_table(&path, &PsdRow::TABLE).unwrap(), 9000);
+    assert_eq!(crate::parquet::check_table(&path, &PsdRow::TABLE).unwrap().rows, 9000);
 }
 
 #[test]

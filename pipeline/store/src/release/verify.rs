@@ -1,7 +1,7 @@
 //! Verification of a release against its own checksums, manifest and table descriptions.
 
 use super::builder::write_sums;
-use super::{MANIFEST, ReleaseError, SUMS, check_path, parse_manifest, table_of};
+use super::{MANIFEST, ReleaseError, STUDY, SUMS, check_path, parse_manifest, table_of};
 use crate::digest;
 use crate::parquet::check_table;
 use rayon::prelude::*;
@@ -58,8 +58,8 @@ pub enum ProblemKind {
     Inconsistent,
 }
 
-/// Checks every file of a release: checksums, missing and extra files, sizes, columns and row counts of tables, and
-/// that manifest and checksums agree.
+/// Checks every file of a release: checksums, missing and extra files, sizes, columns and row counts of tables, that manifest and checksums
+/// agree, and that the study and the tables are of the study that the manifest states.
 ///
 /// # Errors
 /// [`ReleaseError::NotARelease`] if the folder has neither manifest nor checksums; the file system failed.
@@ -68,19 +68,22 @@ pub enum ProblemKind {
 /// ```
 /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
 /// use sastrugi_schemas::manifest::Origin;
+/// use sastrugi_store::digest;
 /// use sastrugi_store::release::{Head, ProblemKind, ReleaseBuilder, verify};
 ///
 /// let folder = tempfile::tempdir()?;
 /// let dest = folder.path().join("demo");
+/// let study = "[study]\n";
 /// let head = Head {
 ///     name: "demo".to_owned(),
-///     study_sha256: "ab".repeat(32),
+///     study_sha256: digest::of_bytes(study.as_bytes()),
 ///     seed: 7,
 ///     version: "0.1.0".to_owned(),
 ///     license: "CC-BY-4.0".to_owned(),
 /// };
 /// let mut builder = ReleaseBuilder::beside(&dest, head)?;
 /// builder.write_text("README.md", "# Demo\n", Origin::default())?;
+/// builder.write_text("study.toml", study, Origin::default())?;
 /// builder.seal(&dest)?;
 /// assert_eq!(verify(&dest)?.problems, []);
 ///
@@ -123,6 +126,9 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
     {
         problem(SUMS, ProblemKind::Inconsistent, format!("does not match {MANIFEST} line by line"));
     }
+    if let Some(message) = manifest.as_ref().and_then(other_study) {
+        problem(STUDY, ProblemKind::Inconsistent, message);
+    }
 
     let there = files_of(folder)?;
     let artifacts = expected(manifest.as_ref(), &listed);
@@ -138,6 +144,21 @@ pub fn verify(folder: &Path) -> Result<VerifyReport, ReleaseError> {
     report.problems.extend(checks.into_iter().filter_map(|(_, problem)| problem));
     report.problems.sort();
     Ok(report)
+}
+
+/// What is wrong with the study of a release if it is not the one that the manifest states.
+fn other_study(manifest: &Manifest) -> Option<String> {
+    let listed = manifest.artifacts.iter().find(|artifact| artifact.path == STUDY);
+    let stated = stated_study(&manifest.study_sha256);
+    match listed {
+        None => Some(format!("is not listed, but {stated}")),
+        Some(study) if study.sha256 == manifest.study_sha256 => None,
+        Some(study) => Some(format!("has SHA-256 {}, but {stated}", study.sha256)),
+    }
+}
+
+fn stated_study(sha256: &str) -> String {
+    format!("`study_sha256` in {MANIFEST} is {sha256}")
 }
 
 /// Refuses a folder with neither manifest nor checksums, where there is nothing to verify.
@@ -166,7 +187,7 @@ fn if_there<T>(path: &Path, read: impl FnOnce(&Path) -> io::Result<T>) -> Result
 }
 
 /// The bytes of `SHA256SUMS` for a manifest.
-fn sums_of(manifest: &Manifest, manifest_sha256: &str) -> io::Result<Vec<u8>> {
+pub(super) fn sums_of(manifest: &Manifest, manifest_sha256: &str) -> io::Result<Vec<u8>> {
     let files = manifest.artifacts.iter().map(|artifact| (artifact.path.as_str(), artifact.sha256.as_str()));
     let mut text = Vec::new();
     write_sums(&mut text, files, manifest_sha256)?;
@@ -186,6 +207,8 @@ struct Expected<'a> {
     sha256: &'a str,
     /// Number of rows, if it is a table.
     records: Option<u64>,
+    /// The study that the manifest states.
+    study_sha256: Option<&'a str>,
 }
 
 /// Expected files by path: those of the manifest, or of the checksums if the manifest is missing. The manifest's own line, which only the
@@ -195,10 +218,12 @@ fn expected<'a>(
     listed: &'a BTreeMap<String, String>,
 ) -> BTreeMap<&'a str, Expected<'a>> {
     let of_sums = |(path, sha256): (&'a String, &'a String)| {
-        (path.as_str(), Expected { bytes: None, sha256: sha256.as_str(), records: None })
+        (path.as_str(), Expected { bytes: None, sha256: sha256.as_str(), records: None, study_sha256: None })
     };
+    let study_sha256 = manifest.map(|manifest| manifest.study_sha256.as_str());
     let of_artifact = |a: &'a Artifact| {
-        (a.path.as_str(), Expected { bytes: Some(a.bytes), sha256: a.sha256.as_str(), records: a.origin.records })
+        let (bytes, sha256, records) = (Some(a.bytes), a.sha256.as_str(), a.origin.records);
+        (a.path.as_str(), Expected { bytes, sha256, records, study_sha256 })
     };
     match manifest {
         Some(manifest) => {
@@ -230,17 +255,27 @@ fn check(folder: &Path, name: &str, expected: &Expected<'_>) -> Result<(u64, Opt
         let message = format!("has SHA-256 {sha256}, expected {}", expected.sha256);
         return Ok((size, problem(ProblemKind::Checksum, message)));
     }
-    let table = check_rows(&path, name, expected.records).err();
-    Ok((size, table.and_then(|message| problem(ProblemKind::Table, message))))
+    let table = check_rows(&path, name, expected).err();
+    Ok((size, table.and_then(|(kind, message)| problem(kind, message))))
 }
 
-/// Checks a table's columns and number of rows.
-fn check_rows(path: &Path, name: &str, records: Option<u64>) -> Result<(), String> {
+/// Checks a table's columns, its number of rows, and the study that it was made from.
+fn check_rows(path: &Path, name: &str, expected: &Expected<'_>) -> Result<(), (ProblemKind, String)> {
     let Some(name) = table_of(name) else { return Ok(()) };
-    let table = tables::by_name(name).ok_or_else(|| format!("table {name} does not exist in this version"))?;
-    let rows = check_table(path, table).map_err(|e| e.to_string())?;
-    match records {
-        Some(expected) if expected != rows => Err(format!("has {rows} rows, expected {expected}")),
+    let wrong = |message: String| (ProblemKind::Table, message);
+    let table = tables::by_name(name).ok_or_else(|| wrong(format!("table {name} does not exist in this version")))?;
+    let found = check_table(path, table).map_err(|e| wrong(e.to_string()))?;
+    if let Some(rows) = expected.records.filter(|rows| *rows != found.rows) {
+        return Err(wrong(format!("has {} rows, expected {rows}", found.rows)));
+    }
+    match (expected.study_sha256, found.study_sha256) {
+        (Some(stated), Some(own)) if own != stated => {
+            let message = format!("was made from the study with SHA-256 {own}, but {}", stated_study(stated));
+            Err((ProblemKind::Inconsistent, message))
+        }
+        (Some(stated), None) => {
+            Err((ProblemKind::Inconsistent, format!("does not state its study, but {}", stated_study(stated))))
+        }
         _ => Ok(()),
     }
 }
