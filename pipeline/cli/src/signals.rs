@@ -35,7 +35,9 @@ fn abort_where_zlib_lacks_memory() {
         let place = info.location().map_or("", |place| place.file());
         let message = info.payload().downcast_ref::<String>().map_or("", String::as_str);
         if place.contains("zlib-rs") && message.contains("MemError") {
-            warn("sastrugi: not enough memory to compress; no incomplete output was put in place; free memory, rerun");
+            warn(
+                "sastrugi: not enough memory to compress the output; nothing incomplete was put in place; free some memory and rerun",
+            );
             std::process::abort();
         }
         report(info);

@@ -92,7 +92,7 @@ fn val_logs_allocate_no_memory_for_claimed_texts() {
         let (peak, (log, summary)) = peak_of(|| (read_log(&path), describe_file(&path)));
         assert!(peak < SMALL, "opcode {opcode}: {peak} bytes");
         for refused in [log.unwrap_err(), summary.unwrap_err()].map(|error| error.to_string()) {
-            let words = "a record claims a text of 1919251503 bytes, but only 4 are left in it";
+            let words = "a record claims a string of 1919251503 bytes, but has only 4 bytes left";
             assert!(refused.ends_with(words), "opcode {opcode}: {refused}");
         }
     }

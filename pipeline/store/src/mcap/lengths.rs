@@ -62,7 +62,7 @@ fn length(data: &[u8]) -> Option<(usize, &[u8])> {
 
 fn after_text(data: &[u8]) -> Result<&[u8], String> {
     let Some((bytes, rest)) = length(data) else { return Ok(&[]) };
-    rest.get(bytes..).ok_or_else(|| beyond("text", bytes, rest))
+    rest.get(bytes..).ok_or_else(|| beyond("string", bytes, rest))
 }
 
 fn after_texts(data: &[u8]) -> Result<&[u8], String> {
@@ -82,7 +82,7 @@ fn after_numbers(data: &[u8], entry: usize) -> &[u8] {
 }
 
 fn beyond(what: &str, bytes: usize, rest: &[u8]) -> String {
-    format!("a record claims a {what} of {bytes} bytes, but only {} are left in it", rest.len())
+    format!("a record claims a {what} of {bytes} bytes, but has only {} bytes left", rest.len())
 }
 
 #[cfg(test)]
@@ -133,14 +133,14 @@ mod tests {
                 longer[k][..4].copy_from_slice(&u32::MAX.to_le_bytes());
                 let refused = check(opcode, &longer.concat()).unwrap_err();
                 let left = pieces[k..].concat().len() - 4;
-                let words = format!("of 4294967295 bytes, but only {left} are left in it");
+                let words = format!("of 4294967295 bytes, but has only {left} bytes left");
                 assert!(refused.ends_with(&words), "{opcode}: {refused}");
             }
         }
         // A text within a map.
         let map = sized(&[text("key"), u32::MAX.to_le_bytes().to_vec(), b"value".to_vec()].concat());
         let refused = check(op::METADATA, &[text("name"), map].concat()).unwrap_err();
-        assert_eq!(refused, "a record claims a text of 4294967295 bytes, but only 5 are left in it");
+        assert_eq!(refused, "a record claims a string of 4294967295 bytes, but has only 5 bytes left");
     }
 
     /// A map of numbers that ends within an entry is read by the parser up to the end of that entry, where the next text begins.

@@ -81,7 +81,7 @@ pub(super) fn in_words(data: &Data) -> Option<String> {
     let recovered = format!("{} surfaces were recovered from images", set::count(surfaces.len()));
     Some(match (surfaces.len(), best.compared()) {
         (1, _) => format!("1 surface was recovered from images. {sentence}"),
-        (_, true) => format!("{recovered}. The smallest slope error has {sentence}"),
+        (_, true) => format!("{recovered}. The one with the smallest slope error is {sentence}"),
         (_, false) => format!("{recovered}, without a true surface to compare with."),
     })
 }
