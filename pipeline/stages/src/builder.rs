@@ -363,7 +363,7 @@ impl<'a> Builder<'a> {
             return Some(format!("[[{section}]] \"{id}\" comes after this table; move it above"));
         }
         let help = error.help.as_deref().filter(|help| !help.starts_with("did you mean"))?;
-        let refused = || self.refused.ids.iter().map(String::as_str);
+        let refused = || self.refused.ids.iter().map(String::as_str).filter(|other| Some(*other) != entry.id());
         if let Some(near) = nearest(id, refused()).filter(|near| *near != id) {
             return Some(format!("did you mean \"{near}\"?"));
         }
