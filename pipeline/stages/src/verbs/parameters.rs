@@ -50,7 +50,7 @@ const VEHICLE_KEYS: [&str; 8] = ["base", "parameters", "sources", "kind", "famil
 /// holds the values that differ from the vehicle named by `base` or `kind`, or all values if neither is given.
 ///
 /// # Errors
-/// A file that cannot be read, is neither TOML nor JSON, or is not a vehicle file.
+/// A file that cannot be read, is neither TOML nor JSON, or is not a vehicle file; one that names an unknown vehicle.
 pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
     let is = |ending: &str| vehicle.to_ascii_lowercase().ends_with(ending);
     if !is(".toml") && !is(".json") {
@@ -70,34 +70,41 @@ pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
         Some([one]) => one,
         Some(several) => return Err(refused(&format!("contains {} vehicles; keep one of them", several.len()))),
     };
-    let mut keys = file.as_object().into_iter().flat_map(Map::keys);
-    if let Some(unknown) = keys.find(|key| !VEHICLE_KEYS.contains(&key.as_str())) {
-        return Err(refused(&format!(
-            "unknown key `{unknown}`; values of the vehicle belong in the table `parameters`"
-        )));
-    }
-    let base = match file.get("base").or_else(|| file.get("kind")) {
-        None => CUSTOM,
-        Some(base) => base.as_str().ok_or_else(|| refused(&"`base` must be the name of a vehicle"))?,
-    };
-    match file.get("parameters") {
-        Some(Value::Object(changes)) => {
-            check_vehicle(base, changes).map_err(|e| refused(&e))?;
-            place(params, "vehicle", Value::from(base))?;
-            place(params, CHANGES, Value::Object(changes.clone()))
-        }
-        _ => Err(refused(&"missing table `parameters`")),
-    }
+    let (base, changes) = described(file).map_err(|e| refused(&e))?;
+    place(params, "vehicle", Value::from(base))?;
+    if changes.is_empty() { Ok(()) } else { place(params, CHANGES, Value::Object(changes)) }
 }
 
-/// Refuses the values of a vehicle file by the names that they have in it. An unknown base is left to the study.
-fn check_vehicle(base: &str, changes: &Map<String, Value>) -> Result<(), String> {
-    match vehicle(base, changes) {
-        Err(error) if error.key.starts_with(CHANGES) => {
-            Err(error.to_string().replacen(CHANGES, "parameters", 1).replacen("` missing field `", "` lacks `", 1))
-        }
-        _ => Ok(()),
+/// What a vehicle file describes: the name of a vehicle, and the values that differ from it.
+fn described(file: &Value) -> Result<(&str, Map<String, Value>), String> {
+    let mut keys = file.as_object().into_iter().flat_map(Map::keys);
+    if let Some(unknown) = keys.find(|key| !VEHICLE_KEYS.contains(&key.as_str())) {
+        return Err(format!("unknown key `{unknown}`; values of the vehicle belong in the table `parameters`"));
     }
+    let base = ["base", "kind"].into_iter().find_map(|key| Some((key, file.get(key)?)));
+    let changes = match file.get("parameters") {
+        Some(Value::Object(changes)) => changes.clone(),
+        Some(_) => return Err("`parameters` must be a table".to_owned()),
+        None if base.is_some() => Map::new(),
+        None => return Err("missing table `parameters`; without `base` it must hold all values".to_owned()),
+    };
+    let (key, name) = match base {
+        None => ("base", CUSTOM),
+        Some((key, name)) => (key, name.as_str().ok_or_else(|| format!("`{key}` must be the name of a vehicle"))?),
+    };
+    check_vehicle((key, name), &changes)?;
+    Ok((name, changes))
+}
+
+/// Refuses the base and the values of a vehicle file by the names that they have in it.
+fn check_vehicle((key, base): (&str, &str), changes: &Map<String, Value>) -> Result<(), String> {
+    let Err(error) = vehicle(base, changes) else { return Ok(()) };
+    let message = error.to_string();
+    Err(if error.key.starts_with(CHANGES) {
+        message.replacen(CHANGES, "parameters", 1).replacen("` missing field `", "` lacks `", 1)
+    } else {
+        message.replacen("`vehicle`", &format!("`{key}`"), 1)
+    })
 }
 
 /// Warnings about the vehicle of a run, one sentence each.
@@ -224,12 +231,16 @@ mod tests {
         };
         let based = file("a.toml", "base = \"ugv_4x4\"\n[parameters.drive]\nspeed_limit_m_s = 0.8\n").unwrap();
         assert_eq!(based, json!({ "vehicle": "ugv_4x4", "vehicle_changes": { "drive": { "speed_limit_m_s": 0.8 } } }));
-        // `kinds --json` prints a list of one.
-        let printed = file("b.JSON", "[{ \"kind\": \"mine\", \"parameters\": {} }]").unwrap();
-        assert_eq!(printed, json!({ "vehicle": "mine", "vehicle_changes": {} }));
+        // `kinds --json` prints a list of one; a base without changes is that vehicle.
+        let printed = file("b.JSON", "[{ \"kind\": \"ugv_4x4\", \"parameters\": {} }]").unwrap();
+        assert_eq!(printed, json!({ "vehicle": "ugv_4x4" }));
+        assert_eq!(file("base.toml", "base = \"ugv_4x4\"\n").unwrap(), json!({ "vehicle": "ugv_4x4" }));
         for (name, text, words) in [
             ("d.toml", "base = 5\n[parameters]\n", "`base` must be the name of a vehicle"),
-            ("e.toml", "base = \"ugv_4x4\"\n", "missing table `parameters`"),
+            ("e.toml", "summary = \"mine\"\n", "missing table `parameters`; without `base`"),
+            ("j.toml", "base = \"ugv_4x4\"\nparameters = 5\n", "`parameters` must be a table"),
+            ("k.toml", "base = \"ugv\"\n", "k.toml: `base` is `ugv`; it must be one of `husky_a200`, "),
+            ("l.json", "{ \"kind\": \"mine\", \"parameters\": {} }", "l.json: `kind` is `mine`; it must be one of "),
             ("f.toml", "mass_kg = 5\n", "unknown key `mass_kg`"),
             ("g.json", "[{}, {}]", "contains 2 vehicles"),
             // Without a base, all values are the file's own, and none may be missing.
