@@ -270,6 +270,11 @@ fn val_missing_files_are_input_errors() {
     refused(folder.path(), &["traverse", "nothing.tif"], INPUT, &["no such file"]);
     refused(folder.path(), &["report", "nothing"], INPUT, &["nothing"]);
     refused(folder.path(), &["report", "nothing", "--against", "none"], INPUT, &["nothing"]);
+    // A path that leads through a file.
+    write(folder.path(), "file", "");
+    for verb in ["roughness", "analyze", "plan", "traverse"] {
+        refused(folder.path(), &[verb, "file/x"], INPUT, &["file/x: no such file"]);
+    }
     let study = small_study().replace("jacksboro.tif", "gone.tif");
     write(folder.path(), "study.toml", &study);
     refused(folder.path(), &["run", "study.toml"], INPUT, &["gone.tif", "no such file"]);

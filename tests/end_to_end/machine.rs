@@ -175,6 +175,7 @@ fn val_folders_are_refused_as_input() {
     let folder = area();
     let path = folder.path();
     study(path);
+    assert_eq!(run(path, &[]).code, 0);
     fs::create_dir(path.join("folder")).unwrap();
     let refused = |arguments: &[&str], words: &str| {
         let call = sastrugi_in(path, arguments);
@@ -184,6 +185,11 @@ fn val_folders_are_refused_as_input() {
     refused(&["navigate", "folder", "--start", "0,0", "--goal", "1,1", "-o", "new"], "folder is a folder, not a file");
     write(path, "study.toml", &STUDY.replace("d.asc", "folder"));
     refused(&["plan", "study.toml"], "folder is a folder, not a file");
+    fs::remove_file(path.join("release/manifest.json")).unwrap();
+    fs::create_dir(path.join("release/manifest.json")).unwrap();
+    for arguments in [&["verify", "release"][..], &["pack", "release", "-o", "a.tar"], &["info", "release"]] {
+        refused(arguments, "is a folder, not a file");
+    }
 }
 
 /// A pipe in place of a file of a work area holds nothing up: a result without its record is computed again, a mark is refused.

@@ -9,6 +9,7 @@ use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
+use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
 /// Name of an item: its stage and its id.
@@ -239,10 +240,10 @@ impl JobError {
 
     /// The same for a file; one that is not a regular file is unusable input.
     pub fn at(path: &Path, error: std::io::Error) -> Self {
-        if error.kind() == std::io::ErrorKind::InvalidInput {
-            return Self::input(format!("{}: {error}", path.display()));
+        match error.kind() {
+            ErrorKind::InvalidInput | ErrorKind::IsADirectory => Self::input(format!("{}: {error}", path.display())),
+            _ => Self::io(error).reworded(|words| format!("{}: {words}", path.display())),
         }
-        Self::io(error).reworded(|words| format!("{}: {words}", path.display()))
     }
 
     /// The same with another message.

@@ -24,12 +24,16 @@ pub fn is_address(path: &Path) -> bool {
 /// Opens a regular file.
 ///
 /// # Errors
-/// Those of the file system, and `InvalidInput` for a pipe, a socket or a device.
+/// Those of the file system, with `NotFound` also for a path that leads through a file; `IsADirectory` for a folder; `InvalidInput` for
+/// a pipe, a socket or a device.
 pub fn open(path: &Path) -> io::Result<File> {
     // Checked before opening, because opening a pipe blocks until something writes to it.
-    let kind = fs::metadata(path)?.file_type();
-    if kind.is_file() || kind.is_dir() {
+    let kind = fs::metadata(path).map_err(missing)?.file_type();
+    if kind.is_file() {
         return File::open(path);
+    }
+    if kind.is_dir() {
+        return Err(io::Error::new(ErrorKind::IsADirectory, "is a folder, not a file"));
     }
     Err(io::Error::new(ErrorKind::InvalidInput, format!("is a {}; give a regular file", name_of(kind))))
 }
@@ -68,6 +72,14 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(read(path)?).map_err(|_| io::Error::new(ErrorKind::InvalidData, "is not UTF-8 text"))
 }
 
+/// A path such as `a.tif/x` leads to no file, as one whose folder does not exist.
+fn missing(error: io::Error) -> io::Error {
+    match error.kind() {
+        ErrorKind::NotADirectory => io::Error::new(ErrorKind::NotFound, "no such file"),
+        _ => error,
+    }
+}
+
 #[cfg(unix)]
 fn name_of(kind: FileType) -> &'static str {
     use std::os::unix::fs::FileTypeExt;
@@ -96,7 +108,18 @@ mod tests {
         fs::write(&path, b"all of it").unwrap();
         assert_eq!(read(&path).unwrap(), b"all of it");
         assert_eq!(read(&folder.path().join("b")).unwrap_err().kind(), ErrorKind::NotFound);
-        assert_eq!(read(folder.path()).unwrap_err().kind(), ErrorKind::IsADirectory);
+        let error = read(folder.path()).unwrap_err();
+        assert_eq!((error.kind(), &*error.to_string()), (ErrorKind::IsADirectory, "is a folder, not a file"));
+    }
+
+    /// A path through a file is missing, not a failure of the machine.
+    #[test]
+    fn val_paths_through_a_file_are_missing() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("a.tif");
+        fs::write(&path, b"heights").unwrap();
+        let error = read(&path.join("x")).unwrap_err();
+        assert_eq!((error.kind(), error.to_string()), (ErrorKind::NotFound, "no such file".to_owned()));
     }
 
     /// Refused without blocking on a writer and without exhausting memory.

@@ -19,6 +19,7 @@ use sastrugi_store::{digest, geojson};
 use sastrugi_terrain::{Generator, Line, planetary};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
+use std::io::ErrorKind;
 use std::sync::Arc;
 
 /// Name of the stage.
@@ -178,10 +179,10 @@ fn name_families(
 /// When the item is not a parent, or its file cannot be read.
 pub fn lines(work: &Work<'_>, item: &ItemRef) -> Result<Vec<Line>, JobError> {
     let path = work.parent(item, LINES)?;
-    if !path.is_file() {
-        return Ok(Vec::new());
-    }
-    let bytes = std::fs::read(&path).map_err(|e| JobError::at(&path, e))?;
+    let bytes = match sastrugi_store::file::read(&path) {
+        Err(e) if e.kind() == ErrorKind::NotFound => return Ok(Vec::new()),
+        read => read.map_err(|e| JobError::at(&path, e))?,
+    };
     let stored: Vec<(String, Vec<[f64; 3]>)> = serde_json::from_slice(&bytes).map_err(JobError::new)?;
     Ok(stored.into_iter().map(|(name, points_m)| Line { name, points_m }).collect())
 }
@@ -276,5 +277,24 @@ impl TerrainJob {
         dem::write(&work.output(file), values, crs, options).map_err(JobError::io)?;
         let content = digest::heights(values);
         Ok(Product::released(file, format!("terrain/{}{ending}.tif", self.id), Some(content)))
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_store::atomic::Draft;
+    use std::path::Path;
+
+    /// No file is no trail; a folder in its place is not.
+    #[test]
+    fn val_trails_that_cannot_be_read_are_not_absent() {
+        let (folder, item) = (tempfile::tempdir().unwrap(), ItemRef::new(STAGE, "a"));
+        let parents = BTreeMap::from([(item.clone(), folder.path().to_owned())]);
+        let work = Work { folder: Draft(Path::new("unused")), parents: &parents };
+        assert_eq!(lines(&work, &item).unwrap().len(), 0);
+        std::fs::create_dir(folder.path().join(LINES)).unwrap();
+        let error = lines(&work, &item).unwrap_err();
+        assert!(error.message.ends_with("lines.json: is a folder, not a file"), "{error}");
     }
 }
