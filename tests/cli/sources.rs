@@ -348,6 +348,27 @@ fn val_statistics_of_clouds() {
     assert_eq!(json_of(path, &["info", "cloud.las", "--cell", "0.05"])["rows"], 133);
 }
 
+/// In a study, memory is planned for four cells per point. A strip across its box takes ten, so it needs a cell size; a verb plans nothing.
+#[test]
+fn val_a_strip_across_its_box_needs_a_cell_size_in_a_study() {
+    let folder = area();
+    let path = folder.path();
+    let across = |i: i32| (i - 60).max(0)..=(i + 60).min(1199);
+    let points: Vec<([i32; 3], u8)> =
+        (0..1200).flat_map(|i| across(i).map(move |j| ([50 * i + 25, 50 * j + 25, i % 7], 2))).collect();
+    std::fs::write(path.join("strip.las"), las(&points)).unwrap();
+    assert_eq!(json_of(path, &["info", "strip.las"])["rows"], 1200);
+    let study = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"a\"\nfile = \"strip.las\"\n";
+    write(path, "study.toml", study);
+    let run = || sastrugi_in(path, &["run", "study.toml", "-o", "release", "--quiet"]);
+    let call = run();
+    let words = "1200 x 1200 cells of 0.05 m, more than the 566160 cells planned for them; set `cell_m`";
+    assert!(call.code == 65 && call.stderr.contains(words), "{} {}", call.code, call.stderr);
+    write(path, "study.toml", &format!("{study}cell_m = [0.2, 0.2]\n"));
+    let call = run();
+    assert!(call.code != 65, "{}", call.stderr);
+}
+
 /// The fit of a cloud is that of its cells, read from a raster; so is that of a study. Gaps are filled as `convert` does.
 #[test]
 fn val_clouds_are_fitted_from_the_file() {

@@ -88,8 +88,8 @@ fn options(writing: &Writing, output: &Path) -> Result<WriteOptions, Failure> {
 
 /// How a DEM is read.
 fn reading(args: &args::Reading) -> Result<Reading, Failure> {
-    let gridding =
-        GridSettings { cell_m: None, statistic: args.statistic, fill_cells: args.fill, ground_only: args.ground };
+    let (statistic, fill_cells, ground_only) = (args.statistic, args.fill, args.ground);
+    let gridding = GridSettings { statistic, fill_cells, ground_only, ..GridSettings::default() };
     Ok(Reading { cell_m: cell(args.cell.as_deref())?, gridding, ..Reading::default() })
 }
 

@@ -114,7 +114,7 @@ fn check(item: &DemItem) -> Result<(), (&'static str, String)> {
 fn gridding(item: &DemItem) -> Result<GridSettings, String> {
     let statistic = item.statistic.as_deref().map(str::parse).transpose()?.unwrap_or_default();
     let (fill_cells, ground_only) = (item.fill_cells.unwrap_or(0), item.ground_only.unwrap_or(false));
-    Ok(GridSettings { cell_m: None, statistic, fill_cells, ground_only })
+    Ok(GridSettings { statistic, fill_cells, ground_only, ..GridSettings::default() })
 }
 
 /// Everything that determines the result except the original, whose item is a parent. Licence, attribution and citation do not
@@ -158,7 +158,8 @@ impl Job for DemJob {
         // Messages are part of the release, so they use the file's path in the release instead of its present one.
         let with_release_path =
             |e: JobError| e.reworded(|words| words.replace(&copy.display().to_string(), &self.release_path));
-        let Imported { metric, place, notes } = import(&copy, &self.item).map_err(with_release_path)?;
+        let Imported { metric, place, notes } =
+            import(&copy, &self.item, self.claimed.cells).map_err(with_release_path)?;
         dem::write(&work.output(HEIGHTS), &metric.grid, &metric.info.crs, &raster_options(self.geotiff))
             .map_err(JobError::io)?;
         let content = digest::heights(&metric.grid);
@@ -177,9 +178,9 @@ struct Imported {
     notes: Vec<String>,
 }
 
-/// Reads the DEM of an item, crops it to the window and converts degrees to metres.
-fn import(path: &Path, item: &DemItem) -> Result<Imported, JobError> {
-    let gridding = gridding(item).map_err(JobError::new)?;
+/// Reads the DEM of an item, for which this number of cells was planned, crops it to the window and converts degrees to metres.
+fn import(path: &Path, item: &DemItem, planned: u64) -> Result<Imported, JobError> {
+    let gridding = GridSettings { planned_cells: Some(planned), ..gridding(item).map_err(JobError::new)? };
     let options = ReadOptions { cell_m: item.cell_m };
     let read = dem::read_gridded(path, &options, &gridding).map_err(input_error)?;
     let cut = match item.window {

@@ -93,7 +93,7 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
     if let Some(grid) = codec.and_then(|codec| codec.grid) {
         return grid(path, file, options, settings);
     }
-    if (GridSettings { cell_m: None, ..*settings }) != GridSettings::default() {
+    if (GridSettings { cell_m: None, planned_cells: None, ..*settings }) != GridSettings::default() {
         let reason = "not a point cloud; statistic, filling and ground-only apply to .las and .laz";
         return Err(Refusal::new(reason).unfit(path));
     }

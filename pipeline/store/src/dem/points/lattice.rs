@@ -44,6 +44,18 @@ impl Lattice {
         Ok(Self { cell_m, west, south, north, rows: rows as usize, cols: cols as usize })
     }
 
+    /// Refuses more cells than were planned for a cloud without a given cell size.
+    pub fn check_planned(&self, points: u64, planned: u64) -> Result<(), Refusal> {
+        let Self { rows, cols, cell_m, .. } = self;
+        if (rows * cols) as u64 <= planned {
+            return Ok(());
+        }
+        Err(Refusal::new(format!(
+            "its {points} points lie in a box of {rows} x {cols} cells of {cell_m} m, more than the {planned} cells planned for them; set \
+             `cell_m`"
+        )))
+    }
+
     /// Row and column of a point of the survey.
     pub fn cell(&self, [x, y]: [f64; 2]) -> (usize, usize) {
         let col = (x / self.cell_m).floor() - self.west;

@@ -14,6 +14,10 @@
 //! while gaps are filled; for medians and percentiles also 8 bytes per point; while searching for a cell size, up to 64 MiB. The
 //! file is decoded twice, and once or twice more if no cell size is given (3.5 s per pass for 10^7 points of LAZ).
 //!
+//! Without a given cell size, memory is planned for four cells per point ([`super::claimed`]): as many as a square at 45 degrees takes,
+//! which fills half of its box, if only half of its cells hold a point. A narrow strip across its box takes more, and is refused where the
+//! memory was planned ([`GridSettings::planned_cells`]).
+//!
 //! Points outside the box that the header states, by more than a cell, are refused before any cell is held: the box is what memory
 //! is planned for ([`super::claimed`]), and a flipped bit of a single point could make the grid any size. Boxes that other programs
 //! rounded, or that are too large, are accepted.
@@ -49,6 +53,11 @@ use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::path::Path;
 use survey::{Chosen, check_stated, survey};
+
+/// Cells per point for which memory is planned without a given cell size.
+const PLANNED_CELLS_PER_POINT: u64 = 4;
+/// Least number of cells for which memory is planned: a few points may lie in more cells than four each.
+const PLANNED_CELLS_MIN: u64 = 1 << 10;
 
 /// A gridded cloud.
 #[derive(Clone, Debug, PartialEq)]
@@ -125,17 +134,16 @@ fn read_open(path: &Path, file: File, settings: &GridSettings) -> Result<Gridded
     Cloud::open(path, file).and_then(|cloud| gridded(&cloud, settings)).map_err(|refusal| refusal.about(path))
 }
 
-/// Size of the grid according to the header of a cloud, for a given cell size.
+/// Size of the grid according to the header of a cloud, for a given cell size; without one, the number of cells that are planned for.
 pub(super) fn claimed(mut file: File, cell_m: Option<f64>) -> Option<Claimed> {
     let declared = DeclaredSize::read(&mut file).ok()?;
     let (points, extent) = (declared.points, declared.stated_extent());
     let cells = match cell_m {
-        Some(cell) => (extent[0] / cell + 1.0) * (extent[1] / cell + 1.0),
-        // Without a given size, about three quarters of the cells hold a point.
-        None => points as f64 / 0.75,
+        // A NaN extent is detected when the cloud is read.
+        Some(cell) => ((extent[0] / cell + 1.0) * (extent[1] / cell + 1.0)) as u64,
+        None => points.saturating_mul(PLANNED_CELLS_PER_POINT).max(PLANNED_CELLS_MIN),
     };
-    // A NaN extent is detected when the cloud is read.
-    Some(Claimed::size((cells as u64).min(MAX_CELLS), points, cell_m))
+    Some(Claimed::size(cells.min(MAX_CELLS), points, cell_m))
 }
 
 /// True for the first bytes of a point cloud.
@@ -155,8 +163,11 @@ fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
         }
     };
     let lattice = Lattice::new(&survey, cell_m)?;
-    // Memory was planned for the extent that the header states.
+    // Memory was planned for the extent that the header states, or for a number of cells.
     check_stated(&survey, &cloud.declared, cell_m)?;
+    if let (None, Some(planned)) = (settings.cell_m, settings.planned_cells) {
+        lattice.check_planned(survey.points, planned)?;
+    }
     let Cells { mut heights, counts } = grid::cells(&chosen, &lattice, settings.statistic, survey.points)?;
     let (held, cells) = (counts.iter().filter(|n| **n > 0).count(), counts.len());
     let statistic = settings.statistic.name();

@@ -322,7 +322,30 @@ fn val_cells_hold_the_points_that_numpy_finds() {
     }
 }
 
-/// The size claimed by a header, without decoding: (19.95 / 0.5 + 1) (14.95 / 0.5 + 1) cells of 0.5 m, or 4 cells for every 3 points.
+/// Points 50 mm apart in a strip across a box of 60 m, which fills a tenth of it: 1200 x 1200 cells for 141 540 points. Planned are four
+/// cells per point, or 1024; more are refused only if they were planned for and no cell size is given.
+#[test]
+fn val_a_strip_across_its_box_takes_no_more_cells_than_planned() {
+    let across = |i: i32| (i - 60).max(0)..=(i + 60).min(1199);
+    let places: Vec<[i32; 3]> = (0..1200).flat_map(|i| across(i).map(move |j| [50 * i + 25, 50 * j + 25, 0])).collect();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("strip.las");
+    std::fs::write(&path, plain(&ground(&places))).unwrap();
+    let planned = dem::claimed(&path, &ReadOptions::default()).unwrap().cells;
+    assert_eq!((places.len(), planned), (141_540, 4 * 141_540));
+    let limited = |planned: u64| GridSettings { planned_cells: Some(planned), ..GridSettings::default() };
+    let error = read(&path, &limited(planned)).unwrap_err();
+    let words = "strip.las: its 141540 points lie in a box of 1200 x 1200 cells of 0.05 m, more than the 566160 cells planned for them; \
+                 set `cell_m`";
+    assert!(error.unusable_input() && error.to_string().ends_with(words), "{error}");
+    for settings in [GridSettings::default(), limited(1_440_000), GridSettings { cell_m: Some(0.5), ..limited(1) }] {
+        assert!(read(&path, &settings).is_ok(), "{settings:?}");
+    }
+    std::fs::write(&path, plain(&ground(&places[..5]))).unwrap();
+    assert_eq!(dem::claimed(&path, &ReadOptions::default()).unwrap().cells, 1024);
+}
+
+/// The size claimed by a header, without decoding: (19.95 / 0.5 + 1) (14.95 / 0.5 + 1) cells of 0.5 m, or 4 cells for every point.
 #[test]
 fn val_claims_of_a_cloud() {
     let folder = tempfile::tempdir().unwrap();
@@ -331,7 +354,7 @@ fn val_claims_of_a_cloud() {
     let sized = dem::claimed(&path, &ReadOptions { cell_m: Some([0.5; 2]) }).unwrap();
     assert_eq!((sized.points, sized.cells, sized.cell_m, sized.geometry), (120_000, 1263, Some(0.5), None));
     let unsized_claim = dem::claimed(&path, &ReadOptions::default()).unwrap();
-    assert_eq!((unsized_claim.points, unsized_claim.cells, unsized_claim.cell_m), (120_000, 160_000, None));
+    assert_eq!((unsized_claim.points, unsized_claim.cells, unsized_claim.cell_m), (120_000, 480_000, None));
 }
 
 /// Cell sizes, shapes and cell means agree with an independent gridding of two measured clouds, which do not ship with the product. Its
