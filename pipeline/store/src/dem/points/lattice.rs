@@ -3,6 +3,7 @@
 use super::survey::Survey;
 use crate::dem::raster::{MAX_CELLS, Refusal};
 use sastrugi_numeric::Geometry;
+use sastrugi_schemas::shown;
 
 /// Integers up to this bound are exact.
 const MAX_INDEX: f64 = 9_007_199_254_740_992.0;
@@ -27,18 +28,19 @@ impl Lattice {
         let east = (survey.high[0] / cell_m).floor() + 1.0;
         let north = (survey.high[1] / cell_m).ceil().max(south + 1.0);
         if ![west, south, east, north].iter().all(|border| border.abs() < MAX_INDEX) {
-            let (low, high) = (survey.low, survey.high);
+            let ([x0, y0], [x1, y1]) = (survey.low.map(shown), survey.high.map(shown));
             return Err(Refusal::new(format!(
-                "its points from {low:?} to {high:?} are too far from the origin for cells of {cell_m} m"
+                "its points from [{x0}, {y0}] to [{x1}, {y1}] m are too far from the origin for cells of {} m",
+                shown(cell_m)
             )));
         }
         let (cols, rows) = (east - west, north - south);
         // Both are integers below 2^54. Their product may be rounded, but not where it matters.
         if cols * rows > MAX_CELLS as f64 {
-            let size = [0, 1].map(|axis| survey.high[axis] - survey.low[axis]);
+            let [width, height] = [0, 1].map(|axis| shown(survey.high[axis] - survey.low[axis]));
+            let [rows, cols, cell] = [rows, cols, cell_m].map(shown);
             return Err(Refusal::new(format!(
-                "covers {} x {} m, which is {rows} x {cols} cells of {cell_m} m; at most {MAX_CELLS} cells can be held",
-                size[0], size[1]
+                "covers {width} x {height} m, which is {rows} x {cols} cells of {cell} m; at most {MAX_CELLS} cells can be held"
             )));
         }
         Ok(Self { cell_m, west, south, north, rows: rows as usize, cols: cols as usize })
@@ -46,13 +48,14 @@ impl Lattice {
 
     /// Refuses more cells than were planned for a cloud without a given cell size.
     pub fn check_planned(&self, points: u64, planned: u64) -> Result<(), Refusal> {
-        let Self { rows, cols, cell_m, .. } = self;
+        let Self { rows, cols, .. } = self;
         if (rows * cols) as u64 <= planned {
             return Ok(());
         }
         Err(Refusal::new(format!(
-            "its {points} points lie in a box of {rows} x {cols} cells of {cell_m} m, more than the {planned} cells planned for them; set \
-             `cell_m`"
+            "its {points} points lie in a box of {rows} x {cols} cells of {} m, more than the {planned} cells planned for them; set \
+             `cell_m`",
+            shown(self.cell_m)
         )))
     }
 

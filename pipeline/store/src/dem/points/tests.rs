@@ -423,6 +423,13 @@ fn val_settings_out_of_range_are_refused() {
     }
     let fine = grid_bytes(&bytes, &of(1e-4, Statistic::Mean)).unwrap_err().to_string();
     assert!(fine.contains("at most 268435456 cells"), "{fine}");
+    for (cell_m, words) in [
+        (1e-12, "covers 9 x 9 m, which is 9000000000000 x 9000000000001 cells of 1e-12 m"),
+        (1e-300, "its points from [0, 0] to [9, 9] m are too far from the origin for cells of 1e-300 m"),
+    ] {
+        let error = grid_bytes(&bytes, &of(cell_m, Statistic::Mean)).unwrap_err().to_string();
+        assert!(error.contains(words), "{error}");
+    }
 }
 
 fn with_record(record_id: u16, data: Vec<u8>, well_known_text: bool) -> Result<Gridded, DemError> {
