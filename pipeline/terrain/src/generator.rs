@@ -10,7 +10,7 @@ pub(crate) fn rounded_coordinate(coordinate_m: f64) -> f64 {
 }
 
 /// Rough time per cell of most generators, s.
-const SECONDS_PER_CELL: f64 = 4e-7;
+const SECONDS_PER_CELL: f64 = 6e-8;
 
 /// A generator with checked parameters.
 pub trait Generator: Send + Sync {
@@ -393,7 +393,7 @@ mod tests {
 
     #[test]
     fn val_seconds_grow_with_the_cells() {
-        assert!((fixed(&[0.0; 5]).seconds() / 2e-6 - 1.0).abs() < 1e-12);
+        assert!((fixed(&[0.0; 5]).seconds() / 3e-7 - 1.0).abs() < 1e-12);
     }
 
     #[test]

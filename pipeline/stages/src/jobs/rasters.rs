@@ -5,7 +5,7 @@ use sastrugi_store::dem::WriteOptions;
 use serde_json::Value;
 
 /// Approximate time to write one raster cell, s.
-pub const SECONDS_PER_WRITTEN_CELL: f64 = 1e-7;
+pub const SECONDS_PER_WRITTEN_CELL: f64 = 6e-8;
 
 /// Options for writing the heights of a release.
 pub fn raster_options(geotiff: GeoTiff) -> WriteOptions {

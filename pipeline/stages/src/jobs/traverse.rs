@@ -452,8 +452,8 @@ impl Job for TraverseJob {
         let driven_s = self.drive.count as f64 * self.drive.seconds_each;
         let other_starts_s = driven_s * (self.drive.starts.count() - 1) as f64;
         // The ground and its bound are computed once.
-        let ground_s = 1e-7 * self.cells as f64;
-        Estimate { seconds: ground_s + 2.2e-3 * driven_s + 1.2e-3 * other_starts_s, bytes: 2e4 * driven_s }
+        let ground_s = 5e-8 * self.cells as f64;
+        Estimate { seconds: ground_s + 1.7e-3 * driven_s + 1.2e-3 * other_starts_s, bytes: 2e4 * driven_s }
     }
 
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {

@@ -43,6 +43,9 @@ use std::f64::consts::PI;
 /// Name in the registry.
 pub const KIND: &str = "cascade";
 
+/// Rough time per cell of the periodic surface, s.
+const SECONDS_PER_CELL: f64 = 1.4e-7;
+
 /// Name of the map of the flux.
 const FLUX: &str = "flux";
 
@@ -158,6 +161,10 @@ impl Generator for Cascade {
 
     fn memory_bytes(&self) -> u64 {
         32 * (self.shape[0] * self.shape[1]) as u64
+    }
+
+    fn seconds(&self) -> f64 {
+        SECONDS_PER_CELL * (self.shape[0] * self.shape[1]) as f64
     }
 
     fn notes(&self) -> Vec<String> {

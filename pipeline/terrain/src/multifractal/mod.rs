@@ -33,6 +33,8 @@ use serde_json::Value;
 
 /// Name in the registry.
 pub const KIND: &str = "multifractal";
+/// Rough time per cell, s.
+const SECONDS_PER_CELL: f64 = 2.5e-7;
 
 /// Level of height 0.
 const ZERO_LEVEL: u16 = 32768;
@@ -98,6 +100,10 @@ impl Generator for Multifractal {
         // The product so far, plus the layer being computed; a filter needs two more grids.
         let layer = self.layers.iter().map(|l| l.surface.memory_bytes()).max().unwrap_or(0);
         layer.max(3 * 8 * self.size.cells()) + 8 * self.size.cells()
+    }
+
+    fn seconds(&self) -> f64 {
+        SECONDS_PER_CELL * self.size.cells() as f64
     }
 
     fn notes(&self) -> Vec<String> {
