@@ -10,7 +10,7 @@ mod stream;
 #[cfg(test)]
 mod tests;
 
-pub use stream::{Batches, FFI_ArrowArrayStream, FFI_ArrowSchema, TableFiles};
+pub use stream::{Batches, FFI_ArrowArrayStream, FFI_ArrowSchema, Run, TableFiles};
 
 use crate::PROGRAM;
 use crate::atomic::{AtomicFile, Refused, Target};

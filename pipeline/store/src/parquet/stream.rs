@@ -3,13 +3,14 @@
 
 use super::{BATCH_ROWS, ColumnValues, TableError, decoding, open, schema};
 pub use arrow_array::ffi_stream::FFI_ArrowArrayStream;
-use arrow_array::{Array, BooleanArray, RecordBatch, RecordBatchReader, StringArray};
+use arrow_array::{Array, BooleanArray, Float64Array, Int64Array, RecordBatch, RecordBatchReader, StringArray};
 pub use arrow_schema::ffi::FFI_ArrowSchema;
 use arrow_schema::{ArrowError, SchemaRef};
 use parquet::arrow::ProjectionMask;
 use parquet::arrow::arrow_reader::{
     ArrowPredicate, ArrowPredicateFn, ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder, RowFilter,
 };
+use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 use sastrugi_schemas::{Cell, ColumnType, Table};
 use std::fs::File;
 use std::ops::ControlFlow;
@@ -38,8 +39,10 @@ use std::path::{Path, PathBuf};
 ///
 /// let all = TableFiles::new(&PsdRow::TABLE, paths.to_vec())?;
 /// assert_eq!(all.rows()?, 4);
-/// let of_a = all.selecting("surface_id", "a")?;
+/// let of_a = all.clone().selecting("surface_id", "a")?;
 /// assert_eq!(of_a.column("bin")?, [1, 2, 3].map(Cell::I64));
+/// assert_eq!(of_a.integers("bin")?, Some(vec![1, 2, 3]));
+/// assert_eq!(all.between("surface_id", "b", "c")?.floats("frequency_cycles_m")?, [0.25]);
 /// let mut seen = Vec::new();
 /// of_a.visit(["bin", "surface_id"], |[bin, _]| {
 ///     seen.push(bin);
@@ -54,9 +57,26 @@ use std::path::{Path, PathBuf};
 pub struct TableFiles {
     table: &'static Table,
     paths: Vec<PathBuf>,
-    /// Columns of text, by position, and the text that rows must have there.
-    wanted: Vec<(usize, String)>,
+    /// What rows must have in columns of text.
+    wanted: Vec<Wanted>,
     schema: SchemaRef,
+}
+
+/// A column of text, by position, and the first and the last text wanted in it, in the order of their bytes.
+#[derive(Clone, Debug)]
+struct Wanted {
+    column: usize,
+    first: String,
+    last: String,
+}
+
+/// Consecutive rows with the same text in one column, and the floats of other columns there.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Run {
+    /// The text.
+    pub text: String,
+    /// The floats of each column, NaN for null.
+    pub floats: Vec<Vec<f64>>,
 }
 
 impl TableFiles {
@@ -81,12 +101,18 @@ impl TableFiles {
     ///
     /// # Errors
     /// A column that the table does not have, or that does not hold text.
-    pub fn selecting(mut self, column: &str, text: &str) -> Result<Self, TableError> {
-        let position = self.position(column)?;
-        if self.table.columns[position].column_type != ColumnType::Text {
-            return Err(self.unusable(format!("column {column} of table {} does not hold text", self.table.name)));
-        }
-        self.wanted.push((position, text.to_owned()));
+    pub fn selecting(self, column: &str, text: &str) -> Result<Self, TableError> {
+        self.between(column, text, text)
+    }
+
+    /// The rows among these whose text in a column is neither before the first nor after the last of two, in the order of their bytes. Row
+    /// groups whose statistics exclude it are not decoded.
+    ///
+    /// # Errors
+    /// As [`Self::selecting`].
+    pub fn between(mut self, column: &str, first: &str, last: &str) -> Result<Self, TableError> {
+        let position = self.typed(column, ColumnType::Text, "text")?;
+        self.wanted.push(Wanted { column: position, first: first.to_owned(), last: last.to_owned() });
         Ok(self)
     }
 
@@ -114,7 +140,11 @@ impl TableFiles {
     /// A file that cannot be read.
     pub fn rows(&self) -> Result<u64, TableError> {
         if !self.wanted.is_empty() {
-            return Ok(self.column(self.table.columns[0].name)?.len() as u64);
+            let (mut rows, mut batches) = (0, self.batches_of(&[0]));
+            while let Some(batch) = batches.advance() {
+                rows += batch?.num_rows() as u64;
+            }
+            return Ok(rows);
         }
         self.paths.iter().map(|path| Ok(super::check_table(path, self.table)?.rows)).sum()
     }
@@ -132,6 +162,64 @@ impl TableFiles {
         Ok(values)
     }
 
+    /// The values of a column of floats, NaN for null.
+    ///
+    /// # Errors
+    /// As [`Self::column`]; a column of another type.
+    pub fn floats(&self, name: &str) -> Result<Vec<f64>, TableError> {
+        let place = self.typed(name, ColumnType::F64, "floats")?;
+        let mut values = Vec::new();
+        let mut batches = self.batches_of(&[place]);
+        while let Some(batch) = batches.advance() {
+            let batch = batch?;
+            let column = self.column_of::<Float64Array>(&batch, &[place], place)?;
+            values.extend((0..column.len()).map(|row| float(column, row)));
+        }
+        Ok(values)
+    }
+
+    /// The values of a column of integers; `None` if one is null.
+    ///
+    /// # Errors
+    /// As [`Self::floats`].
+    pub fn integers(&self, name: &str) -> Result<Option<Vec<i64>>, TableError> {
+        let place = self.typed(name, ColumnType::I64, "integers")?;
+        let mut values = Vec::new();
+        let mut batches = self.batches_of(&[place]);
+        while let Some(batch) = batches.advance() {
+            let batch = batch?;
+            let column = self.column_of::<Int64Array>(&batch, &[place], place)?;
+            if column.null_count() > 0 {
+                return Ok(None);
+            }
+            values.extend_from_slice(column.values());
+        }
+        Ok(Some(values))
+    }
+
+    /// The rows in runs of the same text in one column, with the floats of other columns; all of them are read in one pass. Null counts as an
+    /// empty text.
+    ///
+    /// # Errors
+    /// As [`Self::floats`].
+    pub fn runs(&self, text: &str, floats: &[&str]) -> Result<Vec<Run>, TableError> {
+        let own = self.typed(text, ColumnType::Text, "text")?;
+        let others = floats.iter().map(|name| self.typed(name, ColumnType::F64, "floats"));
+        let others = others.collect::<Result<Vec<usize>, TableError>>()?;
+        let places: Vec<usize> = [own].into_iter().chain(others.iter().copied()).collect();
+        let mut runs: Vec<Run> = Vec::new();
+        let mut batches = self.batches_of(&places);
+        while let Some(batch) = batches.advance() {
+            let batch = batch?;
+            let texts = self.column_of::<StringArray>(&batch, &places, own)?;
+            let columns = others.iter().map(|place| self.column_of::<Float64Array>(&batch, &places, *place));
+            let columns = columns.collect::<Result<Vec<&Float64Array>, TableError>>()?;
+            extend_runs(&mut runs, texts, &columns);
+        }
+        runs.iter_mut().flat_map(|run| &mut run.floats).for_each(Vec::shrink_to_fit);
+        Ok(runs)
+    }
+
     /// Calls `f` with the values of these columns, row by row, until it breaks. Other columns are not decoded.
     ///
     /// # Errors
@@ -145,12 +233,10 @@ impl TableFiles {
         for (place, column) in places.iter_mut().zip(columns) {
             *place = self.position(column)?;
         }
-        let mut batches = Batches { columns: Some(places.to_vec()), ..self.batches() };
+        let mut batches = self.batches_of(&places);
         while let Some(batch) = batches.advance() {
             let batch = batch?;
-            // A batch has its columns in the order of the table.
-            let rank = |place: &usize| places.iter().filter(|other| *other < place).count();
-            let values = places.iter().map(|place| ColumnValues::of(batch.columns().get(rank(place))?));
+            let values = places.iter().map(|place| ColumnValues::of(batch.columns().get(rank(&places, *place))?));
             let values: Option<Vec<ColumnValues>> = values.collect();
             let values = values.ok_or_else(|| self.unusable("has a column of unknown type"))?;
             for row in 0..batch.num_rows() {
@@ -160,6 +246,32 @@ impl TableFiles {
             }
         }
         Ok(())
+    }
+
+    /// The rows as record batches of these columns alone, in the order of the table.
+    fn batches_of(&self, places: &[usize]) -> Batches {
+        Batches { columns: Some(places.to_vec()), ..self.batches() }
+    }
+
+    /// A column in a batch of [`Self::batches_of`].
+    fn column_of<'a, A: Array + 'static>(
+        &self,
+        batch: &'a RecordBatch,
+        places: &[usize],
+        place: usize,
+    ) -> Result<&'a A, TableError> {
+        let column = batch.columns().get(rank(places, place));
+        let column = column.and_then(|column| column.as_any().downcast_ref::<A>());
+        column.ok_or_else(|| self.unusable("has a column of unknown type"))
+    }
+
+    /// Position of a column that must have this type; `what` says in the error what it was to hold.
+    fn typed(&self, column: &str, column_type: ColumnType, what: &str) -> Result<usize, TableError> {
+        let position = self.position(column)?;
+        if self.table.columns[position].column_type != column_type {
+            return Err(self.unusable(format!("column {column} of table {} does not hold {what}", self.table.name)));
+        }
+        Ok(position)
     }
 
     fn position(&self, column: &str) -> Result<usize, TableError> {
@@ -177,9 +289,10 @@ impl TableFiles {
     fn reader(&self, path: &Path, columns: Option<&[usize]>) -> Result<ParquetRecordBatchReader, TableError> {
         let mut builder = open(path, self.table)?.with_batch_size(BATCH_ROWS);
         if !self.wanted.is_empty() {
-            let predicates = self.wanted.iter().map(|(column, text)| predicate(&builder, *column, text.clone()));
+            let groups = self.groups(builder.metadata());
+            let predicates = self.wanted.iter().map(|wanted| predicate(&builder, wanted.clone()));
             let filter = RowFilter::new(predicates.collect());
-            builder = builder.with_row_filter(filter);
+            builder = builder.with_row_groups(groups).with_row_filter(filter);
         }
         if let Some(columns) = columns {
             let mask = ProjectionMask::roots(builder.parquet_schema(), columns.iter().copied());
@@ -187,15 +300,59 @@ impl TableFiles {
         }
         decoding(path, || builder.build())
     }
+
+    /// The row groups that may hold wanted rows, by what their statistics state.
+    pub(super) fn groups(&self, metadata: &ParquetMetaData) -> Vec<usize> {
+        let may_hold = |group: &RowGroupMetaData, wanted: &Wanted| {
+            let name = self.table.columns[wanted.column].name;
+            let column = group.columns().iter().find(|column| column.column_path().parts() == [name]);
+            // Long texts are shortened there, but the ends always enclose what the group holds.
+            let stated = column.and_then(|column| column.statistics()).filter(|stated| !stated.is_min_max_deprecated());
+            let ends = stated.and_then(|stated| Some((stated.min_bytes_opt()?, stated.max_bytes_opt()?)));
+            ends.is_none_or(|(low, high)| low <= wanted.last.as_bytes() && wanted.first.as_bytes() <= high)
+        };
+        let groups = metadata.row_groups().iter().enumerate();
+        let chosen = groups.filter(|(_, group)| self.wanted.iter().all(|wanted| may_hold(group, wanted)));
+        chosen.map(|(number, _)| number).collect()
+    }
 }
 
-/// Keeps rows with this text in a column.
-fn predicate(builder: &ParquetRecordBatchReaderBuilder<File>, column: usize, text: String) -> Box<dyn ArrowPredicate> {
-    let mask = ProjectionMask::roots(builder.parquet_schema(), [column]);
+/// Place of a column in a batch, which has the columns at `places` in the order of the table.
+fn rank(places: &[usize], place: usize) -> usize {
+    places.iter().filter(|other| **other < place).count()
+}
+
+fn float(column: &Float64Array, row: usize) -> f64 {
+    if column.is_valid(row) { column.value(row) } else { f64::NAN }
+}
+
+/// Appends the rows of a batch to the last run, as long as the text stays the same, and to new ones.
+fn extend_runs(runs: &mut Vec<Run>, texts: &StringArray, columns: &[&Float64Array]) {
+    let text = |row: usize| if texts.is_valid(row) { texts.value(row) } else { "" };
+    let mut start = 0;
+    while start < texts.len() {
+        let own = text(start);
+        let end = (start..texts.len()).find(|row| text(*row) != own).unwrap_or(texts.len());
+        if runs.last().is_none_or(|run| run.text != own) {
+            runs.push(Run { text: own.to_owned(), floats: vec![Vec::new(); columns.len()] });
+        }
+        if let Some(run) = runs.last_mut() {
+            for (values, column) in run.floats.iter_mut().zip(columns) {
+                values.extend((start..end).map(|row| float(column, row)));
+            }
+        }
+        start = end;
+    }
+}
+
+/// Keeps rows with wanted text in a column.
+fn predicate(builder: &ParquetRecordBatchReaderBuilder<File>, wanted: Wanted) -> Box<dyn ArrowPredicate> {
+    let mask = ProjectionMask::roots(builder.parquet_schema(), [wanted.column]);
     Box::new(ArrowPredicateFn::new(mask, move |batch: RecordBatch| {
         let texts = batch.column(0).as_any().downcast_ref::<StringArray>();
         let texts = texts.ok_or_else(|| ArrowError::CastError("the column does not hold text".to_owned()))?;
-        let has = |row: usize| texts.is_valid(row) && texts.value(row) == text;
+        let is_wanted = |text: &str| wanted.first.as_str() <= text && text <= wanted.last.as_str();
+        let has = |row: usize| texts.is_valid(row) && is_wanted(texts.value(row));
         Ok((0..texts.len()).map(|row| Some(has(row))).collect::<BooleanArray>())
     }))
 }

@@ -248,6 +248,71 @@ fn val_lists_that_are_not_there_are_not_skipped() {
     assert!(error.contains("fields that Parquet does not define"), "{error}");
 }
 
+/// Columns of numbers come without a detour through cells; nulls are NaN among floats, and make a column of integers no array.
+#[test]
+fn val_columns_of_numbers() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = ["a", "b"].map(|name| folder.path().join(format!("{name}.parquet")));
+    for (fit, path) in (0..).zip(&paths) {
+        write_table(path, (0..3).map(|bin| row(fit, bin, 0.5 * bin as f64)), None).unwrap();
+    }
+    let files = TableFiles::new(&CovarianceRow::TABLE, paths.to_vec()).unwrap();
+    assert_eq!(files.floats("lag_m").unwrap(), [0.0, 0.5, 1.0, 0.0, 0.5, 1.0]);
+    assert_eq!(files.integers("pairs").unwrap(), Some(vec![0, 3, 6, 0, 3, 6]));
+    let azimuth = files.clone().selecting("fit_id", "fit-001").unwrap().floats("azimuth_deg").unwrap();
+    assert!(azimuth[1].is_nan() && [azimuth[0], azimuth[2]] == [0.0, 1.0], "{azimuth:?}");
+    let refused = |column: &str| files.floats(column).unwrap_err().to_string();
+    assert!(refused("pairs").ends_with("column pairs of table covariance does not hold floats"));
+    assert!(refused("wheels").contains("has no column wheels"));
+    assert!(files.integers("lag_m").is_err() && files.clone().between("lag_m", "a", "b").is_err());
+    // As `column` gives them, cell by cell.
+    let cells = files.column("covariance_m2").unwrap();
+    assert_eq!(cells, files.floats("covariance_m2").unwrap().into_iter().map(Cell::F64).collect::<Vec<_>>());
+}
+
+/// A run goes on from one batch, and one file, to the next.
+#[test]
+fn val_rows_come_in_runs_of_the_same_text() {
+    let folder = tempfile::tempdir().unwrap();
+    let paths = ["a", "b"].map(|name| folder.path().join(format!("{name}.parquet")));
+    let bins = |fit: u32, bins: std::ops::Range<i64>| bins.map(move |bin| row(fit, bin, bin as f64));
+    let long = BATCH_ROWS as i64 + 3;
+    write_table(&paths[0], bins(0, 0..long).chain(bins(1, 0..2)), None).unwrap();
+    write_table(&paths[1], bins(1, 2..4), None).unwrap();
+    let files = TableFiles::new(&CovarianceRow::TABLE, paths.to_vec()).unwrap();
+    let runs = files.runs("fit_id", &["covariance_m2", "azimuth_deg", "lag_m"]).unwrap();
+    assert_eq!(runs.iter().map(|run| run.text.as_str()).collect::<Vec<_>>(), ["fit-000", "fit-001"]);
+    assert_eq!(runs[0].floats[2], (0..long).map(|bin| bin as f64).collect::<Vec<_>>());
+    let [covariance, azimuth, lag] = &runs[1].floats[..] else { panic!("{runs:?}") };
+    assert_eq!((&covariance[..], &lag[..]), (&[0.0, -1.0, -2.0, -3.0][..], &[0.0, 1.0, 2.0, 3.0][..]));
+    assert!([1, 3].iter().all(|k| azimuth[*k].is_nan()) && [azimuth[0], azimuth[2]] == [0.0, 2.0], "{azimuth:?}");
+    assert_eq!(files.clone().between("fit_id", "fit-0005", "fit-1").unwrap().runs("fit_id", &[]).unwrap().len(), 1);
+    assert!(files.runs("fit_id", &["pairs"]).is_err() && files.runs("bin", &[]).is_err());
+}
+
+/// Row groups that cannot hold the wanted text are not read, and others row by row.
+#[test]
+fn val_row_groups_without_wanted_text_are_skipped() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("t.parquet");
+    let psd = |k: usize| {
+        let surface = if k < ROW_GROUP_ROWS + 10 { "b" } else { "c" };
+        PsdRow { surface_id: surface.to_owned(), bin: k as i64, frequency_cycles_m: 1.0, psd_m4: 1.0, modes: 1 }
+    };
+    write_table(&path, (0..2 * ROW_GROUP_ROWS).map(psd), None).unwrap();
+    let files = TableFiles::new(&PsdRow::TABLE, vec![path.clone()]).unwrap();
+    let found = |first: &str, last: &str| {
+        let files = files.clone().between("surface_id", first, last).unwrap();
+        let groups = files.groups(open(&path, &PsdRow::TABLE).unwrap().metadata());
+        (groups, files.rows().unwrap() as usize)
+    };
+    assert_eq!(found("b", "b"), (vec![0, 1], ROW_GROUP_ROWS + 10));
+    assert_eq!(found("a", "bz"), (vec![0, 1], ROW_GROUP_ROWS + 10));
+    assert_eq!(found("c", "d"), (vec![1], ROW_GROUP_ROWS - 10));
+    assert_eq!(found("", "c"), (vec![0, 1], 2 * ROW_GROUP_ROWS));
+    assert_eq!([found("", "a"), found("d", "e")], [(vec![], 0), (vec![], 0)]);
+}
+
 #[test]
 fn val_unusable_tables_are_refused() {
     let folder = tempfile::tempdir().unwrap();
