@@ -18,7 +18,7 @@ from ._errors import SastrugiError
 from ._fit import Fit, fit
 from ._heightfield import Heightfield
 from ._native import __version__
-from ._release import Column, Mission, PoseStream, Recording, Release, Table, Track
+from ._release import Column, Mission, Missions, PoseStream, Recording, Release, Table, Track
 from ._runs import Route, analyze, navigate, run, traverse
 from ._surfaces import Coregistration, coregister, elaborate, roughness, terrain
 
@@ -28,6 +28,7 @@ __all__ = [
     "Fit",
     "Heightfield",
     "Mission",
+    "Missions",
     "PoseStream",
     "Recording",
     "Release",

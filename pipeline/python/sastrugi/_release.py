@@ -4,11 +4,12 @@ from __future__ import annotations
 
 import json
 import os
-from collections.abc import Iterator, Sequence
+from bisect import bisect_left
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property, lru_cache
+from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, overload
 
 import numpy as np
 import numpy.typing as npt
@@ -16,13 +17,21 @@ import numpy.typing as npt
 from . import _native
 from ._errors import SastrugiError
 from ._heightfield import Heightfield
+from ._kept import Kept
 from ._values import INPUT, USAGE, number, pair
 
 MANIFEST = "manifest.json"
-SPLITS = ("train", "validation", "test")
-# Terrains and tracks that stay in memory for patches.
-GROUNDS_KEPT = 16
-TRACKS_KEPT = 256
+# Missions on terrains in none of the other splits, whose column `split` is null, have the last name.
+OTHER = "other"
+SPLITS = ("train", "validation", "test", OTHER)
+# Heightfields and tracks that stay in memory for patches, bytes.
+GROUND_BYTES = 256 << 20
+TRACK_BYTES = 128 << 20
+# Tracks are read together: those of a terrain, or of as many of its missions in a row as have so many samples.
+BLOCK_SAMPLES = 1 << 18
+# Size of a track without its samples, and of a sample, bytes.
+TRACK_OVERHEAD_BYTES = 1000
+SAMPLE_BYTES = 40
 
 
 class Column(NamedTuple):
@@ -41,8 +50,8 @@ class Table:
         polars.DataFrame(table)
         duckdb.sql("select outcome, count(*) from table group by outcome")
 
-    `table[column]` is a NumPy array: float64 with NaN for null, int64, or objects (text, lists, columns with nulls). `len(table)` is the number of
-    rows; as in pandas, iteration gives the names of the columns, and `in` looks for one.
+    `table[column]` is a NumPy array: float64 with NaN for null, int64, bool, or objects (text, lists, integers and flags with nulls). `len(table)` is
+    the number of rows; as in pandas, iteration gives the names of the columns, and `in` looks for one.
     """
 
     __slots__ = ("_table",)
@@ -87,8 +96,8 @@ class Table:
         return {name: self[name] for name in self}
 
     def to_rows(self) -> list[dict[str, Any]]:
-        """The rows as dicts of Python values."""
-        columns = {name: values.tolist() for name, values in self.to_numpy().items()}
+        """The rows as dicts of Python values; lists are lists, and a float that is null is NaN."""
+        columns = {name: _python(values) for name, values in self.to_numpy().items()}
         return [dict(zip(columns, row)) for row in zip(*columns.values())]
 
     def selecting(self, column: str, text: str) -> Table:
@@ -107,14 +116,73 @@ def _objects(values: list[Any]) -> npt.NDArray[Any]:
     return array
 
 
+def _python(values: npt.NDArray[Any]) -> list[Any]:
+    """The values as Python's, also those of lists."""
+    return [value.tolist() if isinstance(value, np.ndarray) else value for value in values.tolist()]
+
+
+class _Columns:
+    """The table `missions`, sorted by terrain and mission. A column is read when it is first asked for."""
+
+    __slots__ = ("names", "_table", "_order", "_read")
+
+    def __init__(self, table: Table) -> None:
+        self.names = list(table)
+        self._table = table
+        terrains = table["terrain_id"]
+        # With splits there are several files. Each is sorted, and holds all missions of its terrains.
+        is_sorted = bool(np.all(terrains[:-1] <= terrains[1:]))
+        self._order = None if is_sorted else np.argsort(terrains, kind="stable")
+        self._read = {"terrain_id": self._sorted(terrains)}
+
+    def __len__(self) -> int:
+        return len(self["terrain_id"])
+
+    def __getitem__(self, column: str) -> npt.NDArray[Any]:
+        if column not in self._read:
+            self._read[column] = self._sorted(self._table[column])
+        return self._read[column]
+
+    def _sorted(self, values: npt.NDArray[Any]) -> npt.NDArray[Any]:
+        return values if self._order is None else values[self._order]
+
+
+class _Row(Mapping[str, Any]):
+    """A row of `_Columns`."""
+
+    __slots__ = ("_columns", "_place")
+
+    def __init__(self, columns: _Columns, place: int) -> None:
+        self._columns = columns
+        self._place = place
+
+    def __getitem__(self, column: str) -> Any:
+        if column not in self._columns.names:
+            raise KeyError(column)
+        return self._columns[column].item(self._place)
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._columns.names)
+
+    def __len__(self) -> int:
+        return len(self._columns.names)
+
+    def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
+        # A pickled mission has its own values, not the columns of all.
+        return dict, (dict(self),)
+
+    def __repr__(self) -> str:
+        return repr(dict(self))
+
+
 @dataclass(frozen=True)
 class Mission:
-    """A mission of a release: its key, and its row of the table `missions`."""
+    """A mission of a release: its key, and its row of the table `missions`, whose values are read when they are asked for."""
 
     terrain_id: str
     mission_id: str
     # Neither hashed nor compared: nulls are NaN, which equals nothing. Equal missions have equal keys.
-    row: dict[str, Any] = field(compare=False)
+    row: Mapping[str, Any] = field(compare=False)
 
     @property
     def id(self) -> str:
@@ -126,6 +194,42 @@ class Mission:
 
     def __repr__(self) -> str:
         return f"Mission({self.id}: {self.row['outcome']})"
+
+
+class Missions(Sequence[Mission]):
+    """Missions of a release in the order of their ids. Each is made when it is asked for; `list(missions)` makes all of them."""
+
+    __slots__ = ("_release", "_split", "_columns", "_places")
+
+    def __init__(self, release: Release, split: str | None, columns: _Columns, places: range | npt.NDArray[np.int64]) -> None:
+        self._release = release
+        self._split = split
+        self._columns = columns
+        self._places = places
+
+    def __len__(self) -> int:
+        return len(self._places)
+
+    @overload
+    def __getitem__(self, index: int) -> Mission: ...
+    @overload
+    def __getitem__(self, index: slice) -> list[Mission]: ...
+    def __getitem__(self, index: int | slice) -> Mission | list[Mission]:
+        if isinstance(index, slice):
+            return [_mission(self._columns, int(place)) for place in self._places[index]]
+        return _mission(self._columns, int(self._places[index]))
+
+    def __reduce__(self) -> tuple[Callable[..., Missions], tuple[Release, str | None]]:
+        # The worker processes of a data loader read them for themselves.
+        return Release.missions, (self._release, self._split)
+
+    def __repr__(self) -> str:
+        split = "" if self._split is None else f" of split {self._split}"
+        return f"Missions({self._release.path}: {len(self)}{split})"
+
+
+def _mission(columns: _Columns, place: int) -> Mission:
+    return Mission(columns["terrain_id"][place], columns["mission_id"][place], _Row(columns, place))
 
 
 @dataclass(frozen=True)
@@ -164,6 +268,14 @@ class Recording:
         return f"Recording({self.path})"
 
 
+class _Block(NamedTuple):
+    """Missions whose tracks are read together: all of a terrain from the first to the last."""
+
+    terrain_id: str
+    first: str
+    last: str
+
+
 class Track(NamedTuple):
     """The recorded poses of a mission: arrays (samples,), s, m and rad; the heading is continuous."""
 
@@ -188,8 +300,8 @@ class Release:
         self.summary = summary or {}
         if not (self.path / MANIFEST).is_file():
             raise SastrugiError(f"{self.path}: not a release: it has no {MANIFEST}", INPUT)
-        self._ground = lru_cache(GROUNDS_KEPT)(self._read_ground)
-        self._track = lru_cache(TRACKS_KEPT)(self._read_track)
+        self._grounds = Kept(self._read_ground, GROUND_BYTES)
+        self._tracks = Kept(self._read_tracks, TRACK_BYTES)
 
     def __repr__(self) -> str:
         return f"Release({self.path})"
@@ -229,35 +341,47 @@ class Release:
 
         Raises SastrugiError (2) for an id that it does not have.
         """
-        return Heightfield.read(self.path / self._terrains[self._known("terrain", id, self._terrains)])
+        if id not in self._terrains:
+            raise self._unknown("terrain", id, list(self._terrains))
+        return Heightfield.read(self.path / self._terrains[id])
 
-    def missions(self, split: str | None = None) -> list[Mission]:
-        """All missions, or those of a split: train, validation or test.
+    def missions(self, split: str | None = None) -> Missions:
+        """All missions, or those of a split: train, validation, test, or other (on terrains in none of these).
 
         Raises SastrugiError (2) for another name, and for a release of a study without `[study] split`.
         """
-        every = list(self._missions.values())
+        columns = self._columns
         if split is None:
-            return every
+            return Missions(self, None, columns, range(len(columns)))
         if split not in SPLITS:
             raise SastrugiError(f"there is no split {split!r}; known: {', '.join(SPLITS)}", USAGE)
-        if every and not any(mission.row["split"] for mission in every):
+        splits = columns["split"].tolist()
+        if splits and not any(splits):
             raise SastrugiError(f"{self.path}: its missions are not split; set `[study] split`, or leave out `split`", USAGE)
-        return [mission for mission in every if mission.row["split"] == split]
+        wanted = None if split == OTHER else split
+        places = [place for place, known in enumerate(splits) if known == wanted]
+        return Missions(self, split, columns, np.array(places, dtype=np.int64))
 
     def samples(self, mission: Mission | str) -> Table:
         """The recorded instants of a mission, in order: the rows of the table `samples`."""
         found = self._mission(mission)
-        part = self.path / "tables" / "samples" / f"part-{found.terrain_id}.parquet"
-        return Table(_native.Table("samples", [os.fspath(part)])).selecting("mission_id", found.mission_id)
+        return Table(_native.Table("samples", [self._samples_of(found.terrain_id)])).selecting("mission_id", found.mission_id)
 
     def recording(self, mission: Mission | str) -> Recording:
         """The MCAP recording of a mission."""
         return Recording(self.path / self._mission(mission).row["path"])
 
     def track(self, mission: Mission | str) -> Track:
-        """The recorded poses of a mission."""
-        return self._track(self._mission(mission).id)
+        """The recorded poses of a mission. Those of other missions on its terrain are read with them, and stay in memory for the next calls.
+
+        Raises SastrugiError (65) for a mission without samples.
+        """
+        place = self._place(mission)
+        block = self._block(place)
+        track = self._tracks(block).get(self._columns["mission_id"][place])
+        if track is None:
+            raise SastrugiError(f"{self._samples_of(block.terrain_id)}: has no samples of {_mission(self._columns, place).id}", INPUT)
+        return track
 
     def height_patch(
         self,
@@ -280,12 +404,12 @@ class Release:
         Raises SastrugiError (2) for a time before or after the mission, or a size that is not a whole number of cells.
         """
         found, time = self._mission(mission), number("time", time)
-        track = self._track(found.id)
+        track = self.track(found)
         if not track.time[0] <= time <= track.time[-1]:
             span = f"{track.time[0]:g} to {track.time[-1]:g} s"
             raise SastrugiError(f"`time` is {time!r}; mission {found.id} was recorded from {span}", USAGE)
         x, y, heading = (float(np.interp(time, track.time, values)) for values in (track.x, track.y, track.heading))
-        return self._ground(found.terrain_id).patch((x, y), heading, pair("size", size), cell, relative)
+        return self._grounds(found.terrain_id).patch((x, y), heading, pair("size", size), cell, relative)
 
     @cached_property
     def _terrains(self) -> dict[str, str]:
@@ -293,26 +417,57 @@ class Release:
         return dict(zip(table["terrain_id"].tolist(), table["path"].tolist()))
 
     @cached_property
-    def _missions(self) -> dict[str, Mission]:
-        rows = self.table("missions").to_rows()
-        missions = (Mission(row["terrain_id"], row["mission_id"], row) for row in rows)
-        return {mission.id: mission for mission in sorted(missions, key=lambda m: (m.terrain_id, m.mission_id))}
+    def _columns(self) -> _Columns:
+        return _Columns(self.table("missions"))
+
+    @cached_property
+    def _starts(self) -> npt.NDArray[np.int64]:
+        """Samples of all missions before each."""
+        samples = np.asarray(self._columns["samples"], dtype=np.int64)
+        starts: npt.NDArray[np.int64] = np.cumsum(samples) - samples
+        return starts
+
+    def _place(self, mission: Mission | str) -> int:
+        """Row of a mission in the table `missions`."""
+        id = mission.id if isinstance(mission, Mission) else str(mission)
+        terrain_id, _, mission_id = id.partition("/")
+        terrains, missions = self._columns["terrain_id"], self._columns["mission_id"]
+        wanted = (terrain_id, mission_id)
+        place = bisect_left(range(len(missions)), wanted, key=lambda row: (terrains[row], missions[row]))
+        if place == len(missions) or (terrains[place], missions[place]) != wanted:
+            raise self._unknown("mission", id, [known.id for known in self.missions()[:6]])
+        return place
 
     def _mission(self, mission: Mission | str) -> Mission:
         if isinstance(mission, Mission):
             return mission
-        return self._missions[self._known("mission", mission, self._missions)]
+        return _mission(self._columns, self._place(mission))
 
-    def _known(self, what: str, id: str, known: dict[str, Any]) -> str:
-        if id not in known:
-            some = ", ".join(list(known)[:5]) + (" ..." if len(known) > 5 else "")
-            raise SastrugiError(f"{self.path}: there is no {what} {id!r}; it has {some or 'none'}", USAGE)
-        return id
+    def _unknown(self, what: str, id: str, known: list[str]) -> SastrugiError:
+        some = ", ".join(known[:5]) + (" ..." if len(known) > 5 else "")
+        return SastrugiError(f"{self.path}: there is no {what} {id!r}; it has {some or 'none'}", USAGE)
 
-    def _read_ground(self, terrain_id: str) -> _native.Ground:
-        return _native.Ground(self.terrain(terrain_id))
+    def _samples_of(self, terrain_id: str) -> str:
+        """File of the samples of a terrain."""
+        return os.fspath(self.path / "tables" / "samples" / f"part-{terrain_id}.parquet")
 
-    def _read_track(self, mission_id: str) -> Track:
-        samples = self.samples(mission_id)
-        heading = np.unwrap(np.radians(samples["yaw_deg"]))
-        return Track(samples["time_s"], samples["x_m"], samples["y_m"], samples["z_m"], heading)
+    def _read_ground(self, terrain_id: str) -> tuple[_native.Ground, int]:
+        heightfield = self.terrain(terrain_id)
+        return _native.Ground(heightfield), heightfield.values.nbytes
+
+    def _block(self, place: int) -> _Block:
+        """The block of a mission, which starts at a multiple of `BLOCK_SAMPLES` within its terrain."""
+        terrains, missions = self._columns["terrain_id"], self._columns["mission_id"]
+        first = int(np.searchsorted(terrains, terrains[place], side="left"))
+        end = int(np.searchsorted(terrains, terrains[place], side="right"))
+        starts = self._starts[first:end]
+        low = starts[0] + (self._starts[place] - starts[0]) // BLOCK_SAMPLES * BLOCK_SAMPLES
+        begin, stop = (first + int(found) for found in np.searchsorted(starts, (low, low + BLOCK_SAMPLES)))
+        return _Block(terrains[place], missions[begin], missions[stop - 1])
+
+    def _read_tracks(self, block: _Block) -> tuple[dict[str, Track], int]:
+        samples = _native.Table("samples", [self._samples_of(block.terrain_id)]).between("mission_id", block.first, block.last)
+        tracks: dict[str, Track] = {}
+        for mission_id, (time, x, y, z, yaw) in samples.runs("mission_id", ["time_s", "x_m", "y_m", "z_m", "yaw_deg"]):
+            tracks[mission_id] = Track(time, x, y, z, np.unwrap(np.radians(yaw)))
+        return tracks, sum(TRACK_OVERHEAD_BYTES + SAMPLE_BYTES * track.time.size for track in tracks.values())

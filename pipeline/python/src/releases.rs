@@ -3,9 +3,9 @@
 use crate::errors::{refused, usage};
 use crate::rasters::raster;
 use crate::waiting::waited;
-use numpy::{IntoPyArray, PyArray2, PyArrayMethods};
+use numpy::{IntoPyArray, PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
-use pyo3::types::{PyCapsule, PyDict};
+use pyo3::types::{PyCapsule, PyDict, PyString};
 use sastrugi_numeric::{Grid, PatchShape, height_patch, relative_height_patch};
 use sastrugi_schemas::log::{Log, TimedPose};
 use sastrugi_schemas::tables::ALL;
@@ -13,7 +13,14 @@ use sastrugi_schemas::{Cell, ColumnType};
 use sastrugi_stages::Error;
 use sastrugi_store::mcap::{McapError, read_log};
 use sastrugi_store::parquet::{TableError, TableFiles};
+use std::collections::HashMap;
 use std::path::PathBuf;
+
+/// Different texts that a column may repeat without a further object: ids of terrains, splits, outcomes.
+const TEXTS_SHARED: usize = 1 << 10;
+
+/// Arrays of floats.
+type Floats<'py> = Vec<Bound<'py, PyArray1<f64>>>;
 
 /// A table of a release, or some of its rows.
 #[pyclass(frozen, name = "Table", module = "sastrugi._native")]
@@ -40,6 +47,11 @@ impl Table {
         self.0.clone().selecting(column, text).map(Self).map_err(|e| usage(e.to_string()))
     }
 
+    /// The rows whose text in a column is neither before the first nor after the last.
+    fn between(&self, column: &str, first: &str, last: &str) -> PyResult<Self> {
+        self.0.clone().between(column, first, last).map(Self).map_err(|e| usage(e.to_string()))
+    }
+
     /// Name of the table.
     #[getter]
     fn name(&self) -> &'static str {
@@ -57,15 +69,40 @@ impl Table {
         py.detach(|| self.0.rows()).map_err(unusable)
     }
 
-    /// The values of a column: an array of floats (NaN for null) or integers, otherwise a list.
+    /// The values of a column: an array of floats (NaN for null), or of integers or flags without nulls; otherwise a list.
     fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let table = self.0.table();
         let place = table.position(name).ok_or_else(|| {
             let known: Vec<&str> = table.columns.iter().map(|column| column.name).collect();
             usage(format!("table {} has no column {name}; known: {}", table.name, known.join(", ")))
         })?;
+        match table.columns[place].column_type {
+            ColumnType::F64 => {
+                let floats = py.detach(|| self.0.floats(name)).map_err(unusable)?;
+                return Ok(floats.into_pyarray(py).into_any());
+            }
+            ColumnType::I64 => {
+                if let Some(integers) = py.detach(|| self.0.integers(name)).map_err(unusable)? {
+                    return Ok(integers.into_pyarray(py).into_any());
+                }
+            }
+            ColumnType::Text | ColumnType::Bool | ColumnType::F32List | ColumnType::F64List => {}
+        }
         let cells = py.detach(|| self.0.column(name)).map_err(unusable)?;
-        values(py, table.columns[place].column_type, cells)
+        objects(py, table.columns[place].column_type, cells)
+    }
+
+    /// The rows in runs of the same text in a column, read in one pass: the text, and an array of each of the other columns, which hold floats.
+    fn runs<'py>(&self, py: Python<'py>, column: &str, floats: Vec<String>) -> PyResult<Vec<(String, Floats<'py>)>> {
+        let read = || {
+            let floats: Vec<&str> = floats.iter().map(String::as_str).collect();
+            self.0.runs(column, &floats)
+        };
+        let runs = py.detach(read).map_err(unusable)?;
+        let arrays = |floats: Vec<Vec<f64>>| -> Floats<'py> {
+            floats.into_iter().map(|values| values.into_pyarray(py)).collect()
+        };
+        Ok(runs.into_iter().map(|run| (run.text, arrays(run.floats))).collect())
     }
 
     /// The rows as an `ArrowArrayStream` (Arrow PyCapsule interface). The schema is that of the table, whatever is asked for.
@@ -97,32 +134,41 @@ fn type_name(column: ColumnType) -> &'static str {
     }
 }
 
-/// Values for NumPy.
-fn values<'py>(py: Python<'py>, column: ColumnType, cells: Vec<Cell>) -> PyResult<Bound<'py, PyAny>> {
-    let float = |cell: &Cell| if let Cell::F64(value) = cell { *value } else { f64::NAN };
-    let integer = |cell: &Cell| if let Cell::I64(value) = cell { Some(*value) } else { None };
-    if column == ColumnType::F64 {
-        let floats: Vec<f64> = cells.iter().map(float).collect();
-        return Ok(floats.into_pyarray(py).into_any());
-    }
-    if column == ColumnType::I64
-        && let Some(all) = cells.iter().map(integer).collect::<Option<Vec<i64>>>()
+/// Values for NumPy: an array of flags, or a list.
+fn objects<'py>(py: Python<'py>, column: ColumnType, cells: Vec<Cell>) -> PyResult<Bound<'py, PyAny>> {
+    let flag = |cell: &Cell| if let Cell::Bool(flag) = cell { Some(*flag) } else { None };
+    if column == ColumnType::Bool
+        && let Some(flags) = cells.iter().map(flag).collect::<Option<Vec<bool>>>()
     {
-        return Ok(all.into_pyarray(py).into_any());
+        return Ok(flags.into_pyarray(py).into_any());
     }
+    let mut texts = HashMap::new();
     let one = |cell: Cell| -> PyResult<Bound<'py, PyAny>> {
         Ok(match cell {
             Cell::Null => py.None().into_bound(py),
             Cell::Bool(flag) => flag.into_pyobject(py)?.to_owned().into_any(),
             Cell::I64(number) => number.into_pyobject(py)?.into_any(),
             Cell::F64(number) => number.into_pyobject(py)?.into_any(),
-            Cell::Text(text) => text.into_pyobject(py)?.into_any(),
+            Cell::Text(text) => shared_text(py, &mut texts, text),
             Cell::F32List(all) => all.into_iter().map(f64::from).collect::<Vec<f64>>().into_pyarray(py).into_any(),
             Cell::F64List(all) => all.into_pyarray(py).into_any(),
         })
     };
     let list = cells.into_iter().map(one).collect::<PyResult<Vec<_>>>()?;
     Ok(list.into_pyobject(py)?.into_any())
+}
+
+/// A text as an object; one that was seen lately is the same object.
+fn shared_text<'py>(py: Python<'py>, seen: &mut HashMap<String, Bound<'py, PyAny>>, text: String) -> Bound<'py, PyAny> {
+    if let Some(object) = seen.get(&text) {
+        return object.clone();
+    }
+    if seen.len() == TEXTS_SHARED {
+        seen.clear();
+    }
+    let object = PyString::new(py, &text).into_any();
+    seen.insert(text, object.clone());
+    object
 }
 
 /// Heights that stay in memory, to take many patches of them.

@@ -10,6 +10,7 @@ import pytest
 from conftest import ROOT
 
 import sastrugi
+from sastrugi import _native, _release
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[1] / "examples"))
 from height_patches import HeightPatches  # noqa: E402
@@ -45,6 +46,8 @@ def test_tables_in_numpy(release):
     assert samples["x_m"].dtype == np.float64 and samples["x_m"].tolist() == [row["x_m"] for row in wanted]
     assert samples["wheel_slip_ratio"][0].tolist() == wanted[0]["wheel_slip_ratio"]
     assert samples["outcome"].tolist() == [row["outcome"] for row in wanted]
+    first = samples.to_rows()[0]
+    assert first["wheel_slip_ratio"] == wanted[0]["wheel_slip_ratio"] and type(first["sample"]) is int
     contact = [[math.nan if v is None else v for v in row["wheel_contact_z_m"]] for row in wanted]
     assert np.array_equal(np.stack(samples["wheel_contact_z_m"]), contact, equal_nan=True)
     units = {column.name: column.unit for column in samples.columns}
@@ -60,14 +63,79 @@ def test_tables_in_numpy(release):
     assert len(release.table("rovers")) == 0 and release.table("rovers")["rover_id"].size == 0
 
 
+def test_columns_of_flags_and_text(release, tmp_path):
+    """Flags are an array that `~` negates, and `dict`s hold Python's own; a text that repeats is one object."""
+    sastrugi.analyze([release.recording(mission) for mission in release.missions()[:2]], output=tmp_path / "logs.parquet")
+    logs = sastrugi.Table(_native.Table("logs", [str(tmp_path / "logs.parquet")]))
+    assert logs["resampled"].dtype == np.bool_ and (~logs["resampled"]).tolist() == [not flag for flag in logs["resampled"]]
+    assert type(logs.to_rows()[0]["resampled"]) is bool
+    terrains = release.table("terrains")["group"]
+    assert terrains.tolist() == ["a"] * 3 and terrains[0] is terrains[2]
+
+
+def test_missions_are_made_on_demand(release):
+    """A column is read when it is asked for; slices, rows and pickles are as those of lists and dicts."""
+    every = sastrugi.Release(release.path).missions()
+    assert len(every) == 6 and set(every._columns._read) == {"terrain_id"}
+    # With splits, the table has several files; the missions are in the order of their ids all the same.
+    assert [mission.id for mission in every] == sorted(mission.id for mission in every)
+    rows = {f"{row['terrain_id']}/{row['mission_id']}": row for row in release.table("missions").to_rows()}
+    assert every[1]["outcome"] == rows[every[1].id]["outcome"]
+    assert set(every._columns._read) == {"terrain_id", "mission_id", "outcome"}
+    assert all(repr(mission.row) == repr(rows[mission.id]) for mission in every)
+    assert every[-2:] == [every[4], every[5]] and every[-1] in every and every.index(every[3]) == 3
+    with pytest.raises(IndexError):
+        every[6]
+    with pytest.raises(KeyError):
+        every[0]["wheels"]
+    assert "wheels" not in every[0].row and list(every[0].row) == list(release.table("missions"))
+    again = pickle.loads(pickle.dumps(every[2]))
+    assert again == every[2] and type(again.row) is dict and repr(again.row) == repr(every[2].row)
+    train = pickle.loads(pickle.dumps(release.missions(split="train")))
+    assert list(train) == list(release.missions(split="train")) and repr(train).endswith(": 2 of split train)")
+
+
+def test_tracks_of_a_terrain_are_read_together(release, monkeypatch):
+    every = release.missions()
+
+    def tracks():
+        opened = sastrugi.Release(release.path)
+        return {mission: opened.track(mission) for mission in every}, list(opened._tracks)
+
+    found, blocks = tracks()
+    assert [block.terrain_id for block in blocks] == ["rough-0001", "rough-0002", "rough-0003"]
+    for mission, track in found.items():
+        samples = release.samples(mission)
+        for values, column in zip(track[:4], ["time_s", "x_m", "y_m", "z_m"]):
+            assert values.tolist() == samples[column].tolist(), column
+        assert track.heading.tolist() == np.unwrap(np.radians(samples["yaw_deg"])).tolist()
+    # A terrain with more samples than a block has several; what is kept is limited by bytes, but for the last block.
+    monkeypatch.setattr(_release, "BLOCK_SAMPLES", 1)
+    apart, blocks = tracks()
+    assert [block.first for block in blocks] == [block.last for block in blocks] == [mission.mission_id for mission in every]
+    assert all(np.array_equal(apart[mission], found[mission]) for mission in every)
+    monkeypatch.setattr(_release, "TRACK_BYTES", 0)
+    assert [block.terrain_id for block in tracks()[1]] == ["rough-0003"]
+
+
+def test_heightfields_are_kept_up_to_a_size(release, monkeypatch):
+    """Two of 300 x 320 cells are, where a third does not fit; patches do not depend on it."""
+    monkeypatch.setattr(_release, "GROUND_BYTES", 2 * 8 * 300 * 320)
+    opened = sastrugi.Release(release.path)
+    for mission in release.missions():
+        expected = release.height_patch(mission, 0.0, 2.0, 0.5)
+        assert np.array_equal(opened.height_patch(mission, 0.0, 2.0, 0.5), expected, equal_nan=True)
+    assert list(opened._grounds) == ["rough-0002", "rough-0003"]
+
+
 def test_missions_by_split(release):
     every = release.missions()
     splits = {split: release.missions(split=split) for split in ("train", "validation", "test")}
     assert sorted(m.id for part in splits.values() for m in part) == [m.id for m in every]
     assert all(len(part) == 2 and len({m.terrain_id for m in part}) == 1 for part in splits.values())
     assert every[0]["outcome"] == every[0].row["outcome"]
-    assert len({*every, *release.missions()}) == len(every)
-    with pytest.raises(sastrugi.SastrugiError, match="there is no split 'trian'; known: train, validation, test") as refused:
+    assert len({*every, *release.missions()}) == len(every) and len(release.missions(split="other")) == 0
+    with pytest.raises(sastrugi.SastrugiError, match="there is no split 'trian'; known: train, validation, test, other") as refused:
         release.missions(split="trian")
     assert refused.value.code == 2
     with pytest.raises(sastrugi.SastrugiError, match="there is no mission 'rough-0001/none'; it has rough-0001/") as refused:
@@ -161,3 +229,14 @@ def test_a_release_without_splits_says_so(study, tmp_path):
     with pytest.raises(sastrugi.SastrugiError, match="its missions are not split; set `.study. split`, or leave out `split`") as refused:
         release.missions(split="train")
     assert refused.value.code == 2
+
+
+def test_missions_in_no_split_are_others(study, tmp_path):
+    """If some terrains have a group, terrains without one are in no split."""
+    more = '[[terrain]]\nid = "plain"\nkind = "multifractal"\nsize_px = [320, 300]\n\n[[missions]]'
+    mixed = study.read_text().replace("[[missions]]", more).replace('terrains = ["rough"]', 'terrains = ["rough", "plain"]')
+    (tmp_path / "study.toml").write_text(mixed)
+    release = sastrugi.run(tmp_path / "study.toml", tmp_path / "release")
+    others = release.missions(split="other")
+    assert len(others) == 2 and {mission.terrain_id for mission in others} == {"plain"} and others[0]["split"] is None
+    assert len(release.missions()) == 8 and len(release.track(others[1]).time) == others[1]["samples"]
