@@ -104,7 +104,7 @@ class Heightfield:
 
     @property
     def values(self) -> npt.NDArray[np.float64]:
-        """The heights, m. Other arrays of two dimensions may be assigned."""
+        """The heights, m. Another two-dimensional array may be assigned."""
         return self._values
 
     @values.setter
@@ -138,6 +138,8 @@ class Heightfield:
     def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
         if copy:
             return np.array(self.values, dtype=dtype)
+        if copy is False and dtype is not None and np.dtype(dtype) != self.values.dtype:
+            raise ValueError(f"heights are {self.values.dtype}; {np.dtype(dtype)} requires a copy")
         return np.asarray(self.values, dtype=dtype)
 
     def __repr__(self) -> str:

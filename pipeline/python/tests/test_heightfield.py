@@ -66,6 +66,18 @@ def test_arrays_of_any_memory(tmp_path):
         assert np.array_equal(dem.values, values) and np.array_equal(np.load(tmp_path / f"{name}.npy"), values), name
 
 
+def test_heightfields_as_arrays():
+    """As NumPy asks: a copy only if it is allowed, and then of any type."""
+    dem = Heightfield([[1.0, 2.0]], cell=1.0)
+    assert np.asarray(dem) is dem.values and dem.__array__(np.float64, copy=False) is dem.values
+    copied = np.array(dem)
+    assert copied is not dem.values and np.asarray(dem, dtype=np.float32).tolist() == [[1.0, 2.0]]
+    with pytest.raises(ValueError, match="heights are float64; float32 requires a copy"):
+        dem.__array__(np.float32, copy=False)
+    # Numbers that are objects are numbers.
+    assert Heightfield(np.array([[1, 2.5]], dtype=object), cell=1.0).values.tolist() == [[1.0, 2.5]]
+
+
 def test_masks_are_holes(tmp_path):
     """Of a masked array, as rasters are read elsewhere, the hidden cells are holes, whatever lies under the mask."""
     array = np.ma.masked_equal(np.array([[1, -9999], [3, 4]], dtype=np.int32), -9999)
@@ -85,6 +97,7 @@ def test_heights_are_real_numbers():
         (np.array([["1", "2"]]), "an array of <U1"),
         ([[1.0], [1.0, 2.0]], "[[1.0], [1.0, 2.0]]"),
         (np.array([["a", None]], dtype=object), "an array of object"),
+        (np.array([["1", 2.0]], dtype=object), "an array of object"),
     ]:
         with pytest.raises(sastrugi.SastrugiError) as refused:
             Heightfield(wrong, cell=1.0)
