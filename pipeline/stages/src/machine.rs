@@ -18,7 +18,7 @@ mod os {
 /// Whether the same call may succeed later.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub enum Fault {
-    /// It may: out of space, quota, memory or open files.
+    /// It may: out of space, quota, memory or open files; a network file system that does not answer.
     Passing,
     /// Not until the cause is fixed: read-only file system, no permission, file-size limit exceeded, failing device.
     Lasting,
@@ -32,6 +32,7 @@ pub fn fault(error: &(dyn Error + 'static)) -> Option<Fault> {
 fn of_io(error: &io::Error) -> Option<Fault> {
     match (error.kind(), error.raw_os_error()) {
         (ErrorKind::StorageFull | ErrorKind::QuotaExceeded | ErrorKind::OutOfMemory, _) => Some(Fault::Passing),
+        (ErrorKind::TimedOut | ErrorKind::StaleNetworkFileHandle, _) => Some(Fault::Passing),
         (_, Some(os::EMFILE | os::ENFILE)) => Some(Fault::Passing),
         (ErrorKind::FileTooLarge | ErrorKind::ReadOnlyFilesystem | ErrorKind::PermissionDenied, _) => {
             Some(Fault::Lasting)
@@ -54,7 +55,7 @@ mod tests {
 
     #[test]
     fn val_faults_are_distinguished_from_other_errors() {
-        let passing = [28, 122, 12, 24, 23];
+        let passing = [28, 122, 12, 24, 23, 110, 116];
         let lasting = [27, 5, 30, 13, 1];
         let cases = passing.map(|n| (n, Fault::Passing)).into_iter().chain(lasting.map(|n| (n, Fault::Lasting)));
         for (number, expected) in cases {

@@ -144,7 +144,8 @@ pub fn run_sharing(
 /// written otherwise.
 ///
 /// # Errors
-/// As [`run`]; also a cache that is only read, or that an item could not be published to, because the shards would compute it again.
+/// A busy work area; a cache that is only read, or that an item could not be published to, because the shards would compute it again.
+/// Failed items are listed, even if all of them failed: other items of the study may have results.
 pub fn run_ancestors(
     loaded: &Loaded,
     count: u32,
@@ -164,10 +165,12 @@ pub fn run_ancestors(
     check_memory(loaded, &cache, &needed, request.limits)?;
     let execution = execute(&loaded.graph, &cache, &needed, request.limits, progress)?;
     write_timings(&cache, &execution)?;
-    if execution.done.is_empty() && !execution.failures.is_empty() {
-        return Err(all_failed(&execution.failures));
-    }
     let summary = summary(&work, needed.len(), execution, &cache);
+    if let Some(problem) = cache.shared().and_then(Sharing::lasting_problem) {
+        let message =
+            format!("some ancestors may be missing from the cache: {problem}; remove the cause and run again");
+        return Err(Error::Failed(message));
+    }
     match summary.cache.as_ref().and_then(|tally| tally.problems.first().cloned()) {
         Some(problem) => {
             Err(Error::Retry(format!("some ancestors may be missing from the cache: {problem}; run again")))

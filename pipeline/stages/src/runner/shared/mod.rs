@@ -8,7 +8,7 @@
 //! removes it, computes the item and publishes it again. The hashes find damage, not malice: whoever may write to a cache decides what its
 //! readers get.
 //!
-//! A cache saves work and decides nothing: a run computes what it cannot read, and notes what it cannot publish.
+//! A cache saves work and never changes results: a run computes what it cannot read, and notes what it cannot publish.
 
 mod eviction;
 mod folder;
@@ -31,7 +31,7 @@ use std::collections::BTreeSet;
 use std::fmt::Debug;
 use std::io::Write;
 use std::path::Path;
-use std::sync::{Mutex, MutexGuard, PoisonError};
+use std::sync::{Mutex, MutexGuard, OnceLock, PoisonError};
 use std::time::SystemTime;
 
 /// Maximum number of problems that a run keeps.
@@ -132,6 +132,8 @@ pub struct Tally {
 pub struct Sharing {
     place: Box<dyn Shared>,
     tally: Mutex<Tally>,
+    /// The first problem that a retry does not solve.
+    lasting: OnceLock<String>,
 }
 
 /// What was found under a key.
@@ -141,16 +143,29 @@ enum Found {
     Nothing,
 }
 
+/// Why an entry could not be copied.
+enum CopyError {
+    /// The place could not be read.
+    Place(Error),
+    /// The work area could not be written to. The run meets that error again when it computes the item, and reports it then.
+    WorkArea,
+}
+
 impl Sharing {
     /// Starts to use a cache.
     pub fn new(place: Box<dyn Shared>) -> Self {
         let tally = Tally { read_only: place.is_read_only(), ..Tally::default() };
-        Self { place, tally: Mutex::new(tally) }
+        Self { place, tally: Mutex::new(tally), lasting: OnceLock::new() }
     }
 
     /// What has been done so far.
     pub fn tally(&self) -> Tally {
         self.lock().clone()
+    }
+
+    /// The first problem so far that a retry does not solve, such as a missing permission.
+    pub fn lasting_problem(&self) -> Option<&str> {
+        self.lasting.get().map(String::as_str)
     }
 
     fn lock(&self) -> MutexGuard<'_, Tally> {
@@ -160,7 +175,13 @@ impl Sharing {
     /// Copies an intact entry into an empty folder. Without one, the folder may hold parts of an entry afterwards.
     pub fn fetch(&self, item: &ItemRef, key: &str, folder: Draft<'_>) -> Option<Record> {
         let name = name_of(key);
-        match copy(&*self.place, &name, item, key, folder) {
+        let attempt = || copy(&*self.place, &name, item, key, folder);
+        // An entry that was evicted while it was read, and perhaps published again, looks damaged once, but not twice.
+        let found = match attempt() {
+            Ok(Found::Damaged) => attempt(),
+            found => found,
+        };
+        match found {
             Ok(Found::Intact(record)) => {
                 self.place.mark_used(&name);
                 self.lock().fetched += 1;
@@ -173,8 +194,8 @@ impl Sharing {
                 }
                 None
             }
-            Ok(Found::Nothing) => None,
-            Err(error) => {
+            Ok(Found::Nothing) | Err(CopyError::WorkArea) => None,
+            Err(CopyError::Place(error)) => {
                 self.note::<()>(Err(error));
                 None
             }
@@ -211,6 +232,10 @@ impl Sharing {
     /// Keeps the message of an error.
     fn note<T>(&self, result: Result<T, Error>) -> Option<T> {
         let keep = |error: Error| {
+            if !matches!(error, Error::Retry(_)) {
+                // Only the first is kept.
+                let _ = self.lasting.set(error.to_string());
+            }
             let mut tally = self.lock();
             tally.problems.len() < PROBLEMS_MAX && tally.problems.insert(error.to_string())
         };
@@ -219,9 +244,9 @@ impl Sharing {
 }
 
 /// Copies an entry into a folder, checking every file on the way.
-fn copy(place: &dyn Shared, name: &str, item: &ItemRef, key: &str, folder: Draft<'_>) -> Result<Found, Error> {
+fn copy(place: &dyn Shared, name: &str, item: &ItemRef, key: &str, folder: Draft<'_>) -> Result<Found, CopyError> {
     let mut text = Vec::new();
-    if !place.read(name, RECORD, &mut text)? {
+    if !place.read(name, RECORD, &mut text).map_err(CopyError::Place)? {
         return Ok(Found::Nothing);
     }
     let Some(record) = record_of(&text, item, key) else { return Ok(Found::Damaged) };
@@ -231,8 +256,7 @@ fn copy(place: &dyn Shared, name: &str, item: &ItemRef, key: &str, folder: Draft
             return Ok(Found::Damaged);
         }
     }
-    let path = folder.0.join(RECORD);
-    sastrugi_store::atomic::write(&folder.file(RECORD), &text).map_err(|e| Error::at(&path, e))?;
+    sastrugi_store::atomic::write(&folder.file(RECORD), &text).map_err(|_| CopyError::WorkArea)?;
     Ok(Found::Intact(Box::new(record)))
 }
 
@@ -245,14 +269,23 @@ fn record_of(text: &[u8], item: &ItemRef, key: &str) -> Option<Record> {
 }
 
 /// Size and SHA-256 of a copied file; `None` if it does not exist.
-fn copy_file(place: &dyn Shared, name: &str, file: &str, folder: Draft<'_>) -> Result<Option<(u64, String)>, Error> {
-    let path = folder.0.join(file);
-    let at = |e| Error::at(&path, e);
-    let mut copied = Hashed::new(AtomicFile::create(&folder.file(file)).map_err(at)?);
-    if !place.read(name, file, &mut copied)? {
+fn copy_file(
+    place: &dyn Shared,
+    name: &str,
+    file: &str,
+    folder: Draft<'_>,
+) -> Result<Option<(u64, String)>, CopyError> {
+    let target = AtomicFile::create(&folder.file(file)).map_err(|_| CopyError::WorkArea)?;
+    let refused = target.refused();
+    let mut copied = Hashed::new(target);
+    let is_there = place.read(name, file, &mut copied).map_err(|error| match refused.error() {
+        Some(_) => CopyError::WorkArea,
+        None => CopyError::Place(error),
+    })?;
+    if !is_there {
         return Ok(None);
     }
     let (target, bytes, sha256) = copied.finish();
-    target.commit().map_err(at)?;
+    target.commit().map_err(|_| CopyError::WorkArea)?;
     Ok(Some((bytes, sha256)))
 }

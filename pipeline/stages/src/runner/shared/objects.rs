@@ -2,9 +2,10 @@
 //!
 //! The objects of an entry are `entries/ab/ab12.../<file>`. There is no rename, so the record is written last, and only if there is none: an
 //! entry exists when its record does. It disappears with its record, which is removed first. Writers that meet write the same bytes; a
-//! reader that meets a removal finds a file missing and computes the item. Entries age from their publication.
+//! reader that meets a removal finds a file missing and computes the item. A removal leaves files that are newer than the record: another
+//! run is uploading them to publish the item again. Entries age from their publication.
 
-use super::{Entry, Shared, is_entry};
+use super::{DRAFT_AGE_MAX, Entry, Shared, is_entry};
 use crate::error::Error;
 use crate::runner::cache::{RECORD, Record, is_unchanged};
 use crate::runner::damage::Changed;
@@ -14,6 +15,7 @@ use std::collections::BTreeMap;
 use std::io::Write;
 use std::path::Path;
 use std::sync::Arc;
+use std::time::SystemTime;
 
 /// A shared cache in a bucket.
 #[derive(Debug)]
@@ -63,11 +65,16 @@ impl Shared for Objects {
     }
 
     fn remove(&self, name: &str) -> Result<(), Error> {
-        self.bucket.remove(&format!("{name}/{RECORD}"))?;
-        for object in self.bucket.list(name)? {
-            self.bucket.remove(&object.name)?;
-        }
-        Ok(())
+        let objects = self.bucket.list(name)?;
+        let own = format!("{name}/{RECORD}");
+        let (record, files): (Vec<&Object>, Vec<&Object>) = objects.iter().partition(|object| object.name == own);
+        // Without a record, only what a killed run left is removed.
+        let until = match record.first() {
+            Some(record) => record.modified,
+            None => SystemTime::now() - DRAFT_AGE_MAX,
+        };
+        let old = files.into_iter().filter(|file| file.modified <= until);
+        record.into_iter().chain(old).try_for_each(|object| Ok(self.bucket.remove(&object.name)?))
     }
 
     fn list(&self) -> Result<Vec<Entry>, Error> {

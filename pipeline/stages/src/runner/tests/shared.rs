@@ -1,17 +1,22 @@
 //! The shared cache, with jobs that only write a line of text.
 
-use super::{Area, FILE, all, diamond, graph, item, limits, node, run, text_of};
+use super::{Area, Ending, FILE, all, diamond, graph, item, limits, node, run, text_of};
 use crate::error::Error;
-use crate::runner::cache::Cache;
+use crate::loaded::{Loaded, load_text};
+use crate::runner::cache::{Cache, Record};
 use crate::runner::execute::execute;
 use crate::runner::graph::Graph;
 use crate::runner::progress::Silent;
 use crate::runner::shared::{Entry, Folder, Keep, Objects, Shared, Sharing, Tally, prune};
+use crate::studies::{RunRequest, RunSummary, run_ancestors};
+use sastrugi_store::atomic::Draft;
 use sastrugi_store::objects::Bucket;
 use std::collections::BTreeSet;
 use std::fs;
+use std::io::Write;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, SystemTime};
 
 fn hours(count: u64) -> Duration {
@@ -330,4 +335,164 @@ fn val_a_release_in_a_bucket_is_not_a_shared_cache() {
         assert!(matches!(&refused, Error::Usage(why) if why.starts_with("s3://bucket/snow is a release")), "{refused}");
     }
     assert!(Objects::open(Bucket::in_memory("s3://bucket/snow").unwrap(), false).is_ok());
+}
+
+/// An unfinished upload of another run, which is newer than the record, stays when an entry is removed, and without a record until it is old.
+#[test]
+fn val_removal_leaves_what_another_run_uploads() {
+    let bucket = Arc::new(Bucket::in_memory("s3://bucket/cache").unwrap());
+    let place = || Box::new(Objects::new(Arc::clone(&bucket), false));
+    run_with(diamond, place());
+    let Entry { name, .. } = place().list().unwrap().swap_remove(0);
+    let [file, record] = [FILE, "record.json"].map(|file| format!("{name}/{file}"));
+    let uploaded = tempfile::NamedTempFile::new().unwrap();
+    bucket.replace_from(&file, uploaded.path()).unwrap();
+    for _ in 0..2 {
+        place().remove(&name).unwrap();
+        assert!(bucket.contains(&file).unwrap() && !bucket.contains(&record).unwrap());
+    }
+    let Entry { name, .. } = place().list().unwrap().into_iter().find(|entry| entry.is_complete).unwrap();
+    place().remove(&name).unwrap();
+    assert!(bucket.list(&name).unwrap().is_empty());
+}
+
+/// A cache whose first entry disappears after its record was read, and perhaps comes back at once, as another run publishes it.
+#[derive(Debug)]
+struct Evicting {
+    folder: Folder,
+    root: PathBuf,
+    aside: PathBuf,
+    comes_back: bool,
+    is_evicted: AtomicBool,
+}
+
+impl Shared for Evicting {
+    fn read(&self, name: &str, file: &str, to: &mut dyn Write) -> Result<bool, Error> {
+        if file != FILE || self.is_evicted.swap(true, Ordering::SeqCst) {
+            return self.folder.read(name, file, to);
+        }
+        fs::rename(self.root.join(name), &self.aside).unwrap();
+        let is_there = self.folder.read(name, file, to);
+        if self.comes_back {
+            fs::rename(&self.aside, self.root.join(name)).unwrap();
+        }
+        is_there
+    }
+
+    fn publish(&self, name: &str, record: &Record, folder: &Path) -> Result<bool, Error> {
+        self.folder.publish(name, record, folder)
+    }
+
+    fn remove(&self, name: &str) -> Result<(), Error> {
+        panic!("{name} is not damaged");
+    }
+
+    fn list(&self) -> Result<Vec<Entry>, Error> {
+        self.folder.list()
+    }
+
+    fn is_read_only(&self) -> bool {
+        false
+    }
+}
+
+/// An entry that is evicted while it is copied is neither damaged nor removed: it may have been published again meanwhile.
+#[test]
+fn val_evicted_entries_are_not_damaged() {
+    for comes_back in [false, true] {
+        let (shared, elsewhere) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
+        run_fresh(diamond, shared.path());
+        let place = Evicting {
+            folder: Folder::open(shared.path(), false).unwrap(),
+            root: shared.path().to_owned(),
+            aside: elsewhere.path().join("entry"),
+            comes_back,
+            is_evicted: AtomicBool::new(false),
+        };
+        let (ran, tally) = run_with(diamond, Box::new(place));
+        assert_eq!((tally.damaged, tally.problems), (BTreeSet::new(), BTreeSet::new()));
+        assert_eq!((ran.len(), tally.fetched), if comes_back { (0, 4) } else { (1, 3) });
+        assert!(run_fresh(diamond, shared.path()).0.is_empty());
+    }
+}
+
+/// A work area that cannot be written to is not reported as a problem of the cache, whose entry stays.
+#[test]
+fn val_a_failing_work_area_is_not_blamed_on_the_cache() {
+    let shared = tempfile::tempdir().unwrap();
+    run_fresh(diamond, shared.path());
+    let (area, file) = (Area::new(), tempfile::NamedTempFile::new().unwrap());
+    let sharing = Sharing::new(Box::new(Folder::open(shared.path(), false).unwrap()));
+    let below_a_file = file.path().join("folder");
+    assert!(sharing.fetch(&item("a"), diamond(&area).key(0), Draft(&below_a_file)).is_none());
+    assert_eq!(sharing.tally(), Tally::default());
+    entry(shared.path(), "a");
+}
+
+/// The outcome of `run --ancestors` for two shards with one common ancestor, which ends in this way.
+fn ancestors(ending: Ending, place: Box<dyn Shared>) -> Result<RunSummary, Error> {
+    let area = Area::new();
+    let mut nodes = vec![node(area.ending("a", ending), &[])];
+    nodes.extend((0..30).map(|k| node(area.line(&format!("n{k:02}")), &["a"])));
+    let text = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
+        size_px = [64, 64]\n";
+    let loaded = Loaded { graph: graph(nodes), ..load_text(text, "study", Path::new("")).unwrap() };
+    let output = area.folder.path().join("none");
+    let request = RunRequest {
+        output: &output,
+        work: Some(area.folder.path()),
+        part: None,
+        purpose: None,
+        replace: false,
+        limits: limits(1),
+    };
+    run_ancestors(&loaded, 2, &request, Sharing::new(place), &Silent)
+}
+
+/// That all common ancestors fail is no reason to run no shard: other items may have results.
+#[test]
+fn val_failed_ancestors_are_listed() {
+    let shared = tempfile::tempdir().unwrap();
+    let place = Folder::open(shared.path(), false).unwrap();
+    let summary = ancestors(Ending::Refused, Box::new(place)).unwrap();
+    assert_eq!((summary.items, summary.computed, summary.failures.len()), (1, 0, 1));
+    assert_eq!(summary.failures[0].message, "the DEM is flat");
+}
+
+/// A cache to which nothing can be published, with the reason.
+#[derive(Debug)]
+struct Refusing(fn(String) -> Error);
+
+impl Shared for Refusing {
+    fn read(&self, _: &str, _: &str, _: &mut dyn Write) -> Result<bool, Error> {
+        Ok(false)
+    }
+
+    fn publish(&self, _: &str, _: &Record, _: &Path) -> Result<bool, Error> {
+        Err(self.0("no room".to_owned()))
+    }
+
+    fn remove(&self, _: &str) -> Result<(), Error> {
+        Ok(())
+    }
+
+    fn list(&self) -> Result<Vec<Entry>, Error> {
+        Ok(Vec::new())
+    }
+
+    fn is_read_only(&self) -> bool {
+        false
+    }
+}
+
+/// Ancestors that could not be published are retried only if that may help.
+#[test]
+fn val_problems_of_the_cache_keep_their_kind() {
+    let said = |error: fn(String) -> Error| ancestors(Ending::Written, Box::new(Refusing(error))).unwrap_err();
+    let missing = "some ancestors may be missing from the cache: no room; ";
+    assert!(matches!(said(Error::Retry), Error::Retry(why) if why == format!("{missing}run again")));
+    for lasting in [Error::Failed, Error::Input] {
+        let expected = format!("{missing}remove the cause and run again");
+        assert!(matches!(said(lasting), Error::Failed(why) if why == expected));
+    }
 }
