@@ -289,7 +289,7 @@ fn temporary_file(folder: &Path) -> io::Result<(File, PathBuf)> {
 
 /// True while the path refers to this open file.
 #[cfg(unix)]
-fn is_at(file: &File, path: &Path) -> bool {
+pub fn is_at(file: &File, path: &Path) -> bool {
     use std::os::unix::fs::MetadataExt;
     let identity = |data: fs::Metadata| (data.dev(), data.ino());
     file.metadata().is_ok_and(|open| fs::symlink_metadata(path).is_ok_and(|there| identity(open) == identity(there)))
@@ -297,7 +297,7 @@ fn is_at(file: &File, path: &Path) -> bool {
 
 /// True while the path refers to this open file, assuming that its name is unique.
 #[cfg(not(unix))]
-fn is_at(_: &File, path: &Path) -> bool {
+pub fn is_at(_: &File, path: &Path) -> bool {
     path.exists()
 }
 

@@ -95,7 +95,7 @@ impl DestinationLock {
 
 impl Drop for DestinationLock {
     fn drop(&mut self) {
-        // A leftover lock file is harmless: only the lock matters.
+        // While the lock is held: those who opened the file before find it gone. A leftover is harmless, as only the lock matters.
         let _ = std::fs::remove_file(&self.path);
     }
 }
@@ -278,6 +278,7 @@ fn files_below(root: &Path, folder: &Path) -> Result<Vec<String>, Error> {
 mod tests {
     use super::*;
     use crate::registry;
+    use std::sync::atomic::{AtomicUsize, Ordering};
 
     #[test]
     fn val_one_writer_per_destination() {
@@ -288,6 +289,31 @@ mod tests {
         assert!(matches!(second, Error::Retry(_)) && second.to_string().contains("another run"));
         drop(first);
         drop(DestinationLock::take(&dest).unwrap());
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    /// However they meet, also while one removes its lock file, one writes at a time.
+    #[test]
+    fn val_writers_take_turns() {
+        let folder = tempfile::tempdir().unwrap();
+        let dest = folder.path().join("release");
+        let writing = AtomicUsize::new(0);
+        let write = || {
+            let mut turns = 0;
+            while turns < 200 {
+                let lock = match DestinationLock::take(&dest) {
+                    Ok(lock) => lock,
+                    Err(Error::Retry(_)) => continue,
+                    Err(other) => panic!("{other}"),
+                };
+                assert_eq!(writing.fetch_add(1, Ordering::SeqCst), 0);
+                std::thread::yield_now();
+                writing.fetch_sub(1, Ordering::SeqCst);
+                drop(lock);
+                turns += 1;
+            }
+        };
+        std::thread::scope(|scope| (0..4).for_each(|_| drop(scope.spawn(write))));
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
