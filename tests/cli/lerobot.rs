@@ -99,6 +99,23 @@ fn val_a_release_becomes_a_dataset() {
     assert_eq!(sastrugi_in(path, &["verify", "release", "--quiet"]).code, 0);
 }
 
+/// Two conversions into one folder would mix: the second is told to wait, and leaves nothing behind.
+#[test]
+fn val_one_conversion_writes_a_folder() {
+    let folder = area();
+    let path = folder.path();
+    release(path);
+    let lock = fs::File::create(path.join(".sastrugi-lock-dataset")).unwrap();
+    lock.lock().unwrap();
+    let call = ["convert", "release", "dataset", "--for", "lerobot", "--traverse", "t", "--quiet"];
+    let refused = sastrugi_in(path, &call);
+    assert!(refused.code == 75 && refused.stderr.contains("another run is writing dataset"), "{}", refused.stderr);
+    assert!(!path.join("dataset").exists());
+    drop(lock);
+    assert_eq!(sastrugi_in(path, &call).code, 0);
+    assert!(path.join("dataset/meta/info.json").is_file() && !path.join(".sastrugi-lock-dataset").exists());
+}
+
 #[test]
 fn val_what_is_not_a_dataset_is_refused() {
     let folder = area();

@@ -10,6 +10,7 @@ use crate::documents::{folded, hub_license, quoted, source_line};
 use crate::error::Error;
 use crate::operations::dem::input_error;
 use crate::remote::check_local;
+use crate::runner::assemble::DestinationLock;
 use crate::splits::{OTHER, PARTS};
 use crate::studies::check_outside;
 use sastrugi_numeric::{Grid, PatchShape, relative_height_patch};
@@ -128,7 +129,7 @@ pub struct Converted {
 ///
 /// # Errors
 /// A folder that is not a release or has no missions; missions of several vehicles or rates; samples that are not evenly spaced; an output
-/// within the release, or that holds other files.
+/// within the release, that holds other files, or that another conversion is writing.
 pub fn convert(release: &Path, output: &Path, settings: &Settings) -> Result<Converted, Error> {
     check_local(output)?;
     let refusal = "the dataset cannot be written into the release, which is sealed; choose a folder outside it";
@@ -136,6 +137,7 @@ pub fn convert(release: &Path, output: &Path, settings: &Settings) -> Result<Con
     let opened = Release::open(release)?;
     lerobot::check_folder(output).map_err(refused)?;
     let chosen = Chosen::of(&opened, settings)?;
+    let _lock = DestinationLock::take(output)?;
     let mut export =
         Export { release: &opened, output, settings, chosen: &chosen, writer: None, counts: Counts::default() };
     for ((split, terrain), missions) in &chosen.missions {

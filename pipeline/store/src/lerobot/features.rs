@@ -6,6 +6,7 @@ use arrow_array::{Array, ArrayRef, BooleanArray, FixedSizeListArray, Float32Arra
 use arrow_schema::{ArrowError, DataType, Field};
 use parquet::schema::types::ColumnPath;
 use serde_json::{Value, json};
+use std::ops::Range;
 use std::sync::Arc;
 
 /// Type of a feature's values.
@@ -26,6 +27,14 @@ impl Kind {
             Self::F32 => "float32",
             Self::I64 => "int64",
             Self::Bool => "bool",
+        }
+    }
+
+    const fn bytes(self) -> usize {
+        match self {
+            Self::F32 => 4,
+            Self::I64 => 8,
+            Self::Bool => 1,
         }
     }
 
@@ -125,17 +134,28 @@ impl Feature {
         (self.kind == Kind::F32).then(|| ColumnPath::new(path))
     }
 
-    /// The values of an episode as a column.
+    /// Size of the values of a frame, bytes.
+    pub(super) const fn frame_bytes(&self) -> usize {
+        self.kind.bytes() * self.shape.count()
+    }
+
+    /// Checks the values of an episode.
     ///
     /// # Panics
     /// If there are not `frames` times as many as in one frame, or they are of another type.
-    pub(super) fn array(&self, values: &Values, frames: usize) -> Result<ArrayRef, ArrowError> {
+    pub(super) fn check(&self, values: &Values, frames: usize) {
         assert_eq!((values.kind(), values.len()), (self.kind, frames * self.shape.count()), "values of {}", self.name);
+    }
+
+    /// The values of some frames of an episode as a column.
+    pub(super) fn array(&self, values: &Values, frames: &Range<usize>) -> Result<ArrayRef, ArrowError> {
+        let count = self.shape.count();
+        let flat = values.flat(count * frames.start..count * frames.end);
         match self.shape {
-            Shape::Scalar => Ok(values.flat()),
-            Shape::Vector(n) => Ok(Arc::new(fixed(values.flat(), n)?)),
+            Shape::Scalar => Ok(flat),
+            Shape::Vector(n) => Ok(Arc::new(fixed(flat, n)?)),
             Shape::Matrix([rows, cols]) => {
-                let lines = ListArray::from(fixed(values.flat(), cols)?);
+                let lines = ListArray::from(fixed(flat, cols)?);
                 Ok(Arc::new(ListArray::from(fixed(Arc::new(lines), rows)?)))
             }
         }
@@ -211,11 +231,12 @@ impl Values {
         }
     }
 
-    fn flat(&self) -> ArrayRef {
+    /// Some of the values, one after the other.
+    fn flat(&self, range: Range<usize>) -> ArrayRef {
         match self {
-            Self::F32(values) => Arc::new(Float32Array::from(values.clone())),
-            Self::I64(values) => Arc::new(Int64Array::from(values.clone())),
-            Self::Bool(values) => Arc::new(BooleanArray::from(values.clone())),
+            Self::F32(values) => Arc::new(Float32Array::from(values[range].to_vec())),
+            Self::I64(values) => Arc::new(Int64Array::from(values[range].to_vec())),
+            Self::Bool(values) => Arc::new(BooleanArray::from(values[range].to_vec())),
         }
     }
 }

@@ -52,8 +52,12 @@ const STATS: &str = "meta/stats.json";
 const TASKS: &str = "meta/tasks.parquet";
 /// Key of our own entry in `meta/info.json`; the package keeps unknown keys.
 const OWN: &str = "sastrugi";
-/// Rows of a row group of frames: about 16 MiB with a patch of 32 x 32.
+/// Most rows of a row group of frames: about 22 MiB with a patch of 32 x 32.
 const FRAME_ROWS: usize = 4096;
+/// Most bytes of a row group of frames, unless one frame has more.
+const GROUP_BYTES: usize = 64 << 20;
+/// Most values of a feature in one Arrow array, whose lists have offsets of 32 bits.
+const VALUES_MAX: usize = i32::MAX as usize;
 /// Rows of a row group of episodes.
 const EPISODE_ROWS: usize = 1024;
 
@@ -147,6 +151,8 @@ pub struct DatasetWriter {
     description: Description,
     /// Features of the description, then those of every dataset.
     features: Vec<Feature>,
+    /// Frames of an episode that fit in one array of each feature.
+    frames_at_once: usize,
     data: Parts,
     episodes: Parts,
     stats: Option<Vec<Stats>>,
@@ -171,10 +177,14 @@ impl DatasetWriter {
         let parts = |name: &str, schema: SchemaRef, properties: WriterProperties| {
             Parts::new(staging.path().join(name), schema, properties, file_bytes)
         };
-        let data = parts(DATA, Arc::new(Schema::new(fields)), properties(FRAME_ROWS, floats));
+        let frame_bytes: usize = features.iter().map(Feature::frame_bytes).sum();
+        let group_rows = (GROUP_BYTES / frame_bytes).clamp(1, FRAME_ROWS);
+        let data = parts(DATA, Arc::new(Schema::new(fields)), properties(group_rows, floats));
         let episodes = parts(EPISODES, episode_schema(&features), properties(EPISODE_ROWS, std::iter::empty()));
+        let most_values = features.iter().map(|feature| feature.shape.count()).max().unwrap_or(1);
+        let frames_at_once = (VALUES_MAX / most_values).max(1);
         let written = Summary { episodes: 0, frames: 0, tasks: vec![], splits: vec![] };
-        Ok(Self { staging, description, features, data, episodes, stats: None, written })
+        Ok(Self { staging, description, features, frames_at_once, data, episodes, stats: None, written })
     }
 
     /// Appends an episode.
@@ -189,9 +199,13 @@ impl DatasetWriter {
         let own = Values::of_every_dataset(episode.frames, self.description.fps, &self.written, task);
         let values: Vec<&Values> = episode.values.iter().chain(&own).collect();
         assert_eq!(values.len(), self.features.len(), "every feature has its values");
+        self.features.iter().zip(&values).for_each(|(feature, values)| feature.check(values, episode.frames));
         let place = self.data.place(episode.frames as u64)?;
-        let arrays = self.features.iter().zip(&values).map(|(feature, values)| feature.array(values, episode.frames));
-        self.data.write(arrays.collect())?;
+        for first in (0..episode.frames).step_by(self.frames_at_once) {
+            let some = first..episode.frames.min(first + self.frames_at_once);
+            let arrays = self.features.iter().zip(&values).map(|(feature, values)| feature.array(values, &some));
+            self.data.write(arrays.collect())?;
+        }
         let stats = self.features.iter().zip(&values).map(|(feature, values)| feature.stats(values, episode.frames));
         let stats: Vec<Stats> = stats.collect();
         let row_place = self.episodes.place(1)?;

@@ -141,6 +141,46 @@ fn val_frames_and_episodes_point_at_each_other() {
     }
 }
 
+/// Episodes with more values than an array can hold are written in several arrays, and the rows are the same.
+#[test]
+fn val_long_episodes_are_written_in_parts() {
+    let folder = tempfile::tempdir().unwrap();
+    let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name));
+    write_to(&whole, FILE_MB << 20);
+    let mut writer = DatasetWriter::beside(&parts, description()).unwrap();
+    // A patch has six values.
+    assert_eq!(writer.frames_at_once, VALUES_MAX / 6);
+    writer.frames_at_once = 3;
+    episodes().iter().for_each(|episode| writer.push(episode).unwrap());
+    writer.finish(&parts, &[]).unwrap();
+    for name in ["data/chunk-000/file-000.parquet", "meta/episodes/chunk-000/file-000.parquet"] {
+        assert_eq!(rows(&parts.join(name)), rows(&whole.join(name)), "{name}");
+    }
+}
+
+/// The larger the frames, the fewer of them in a row group, so that memory is bounded.
+#[test]
+fn val_row_groups_are_limited_by_bytes() {
+    let folder = tempfile::tempdir().unwrap();
+    let out = folder.path().join("out");
+    let side = 1024;
+    let patch = Feature {
+        name: "patch",
+        kind: Kind::F32,
+        shape: Shape::Matrix([side, side]),
+        names: vec!["row".to_owned(); 2],
+    };
+    let mut writer = DatasetWriter::beside(&out, Description { features: vec![patch], ..description() }).unwrap();
+    let frames = 20;
+    let values = vec![Values::F32(vec![0.5; frames * side * side])];
+    writer.push(&Episode { frames, values, ..episode("train", 0, 1) }).unwrap();
+    writer.finish(&out, &[]).unwrap();
+    let file = fs::File::open(out.join("data/chunk-000/file-000.parquet")).unwrap();
+    let groups = ParquetRecordBatchReaderBuilder::try_new(file).unwrap().metadata().row_groups().to_vec();
+    // A frame has 4 MiB, and a few bytes more.
+    assert_eq!(groups.iter().map(|group| group.num_rows()).collect::<Vec<_>>(), [15, 5]);
+}
+
 /// Full files are closed between episodes; the rows say in which file they are.
 #[test]
 fn val_files_are_filled_with_whole_episodes() {
