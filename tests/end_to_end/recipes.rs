@@ -1,12 +1,14 @@
-//! The recipes of `fixtures/cluster`, run as they are: in each, a shard is killed in mid-run, and the release is that of one machine.
+//! The recipes of `fixtures/cluster`, run as they are: in each, a shard is killed mid-run, and the release is that of one machine.
 //! `tests/engines` starts clusters of hosts, of which one crashes.
 
 #![cfg(unix)]
 
-use sastrugi_tests::{Called, area, called, differing, installed, program, python, run_study, small_study, sums};
+use sastrugi_tests::{
+    Called, area, called, differing, installed, program, python, run_study, small_study, sums, write,
+};
 use std::collections::BTreeMap;
 use std::fs;
-use std::os::unix::fs::symlink;
+use std::os::unix::fs::{PermissionsExt, symlink};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::time::Instant;
@@ -109,6 +111,31 @@ fn val_steps() {
     let mut nowhere = Command::new("env");
     nowhere.arg("PARTS=study.toml/parts").arg(recipe("step")).arg("merge");
     assert_eq!(site.call(&mut nowhere).code, 1);
+}
+
+/// The jobs wait for each other, also in a federation, where `sbatch` prints the cluster's name after the number; a log has the job's number.
+#[test]
+fn val_slurm_jobs_wait_for_each_other() {
+    let folder = area();
+    let path = folder.path();
+    let sbatch = "#!/bin/sh\necho \"$@\" >> calls\necho \"$(wc -l < calls);north\"\n";
+    write(path, "sbatch", sbatch);
+    fs::set_permissions(path.join("sbatch"), fs::Permissions::from_mode(0o755)).unwrap();
+    let places = std::env::join_paths([path, Path::new("/usr/bin"), Path::new("/bin")]).unwrap();
+    let mut submit = Command::new(recipe("slurm/submit"));
+    submit.arg("--partition=short").current_dir(path).env("PATH", places).env("SHARDS", "4").env("PARTS", "parts");
+    let call = called(&mut submit);
+    assert_eq!((call.code, call.stdout.as_str()), (0, "3\n"), "{}", call.stderr);
+    let calls = fs::read_to_string(path.join("calls")).unwrap();
+    let expected: [&[&str]; 3] = [
+        &["ancestors-%j.log", "--partition=short"],
+        &["shard-%A-%a.log", "--array=1-4", "--dependency=afterok:1 ", "--partition=short"],
+        &["merge-%j.log", "--dependency=afterok:2 ", "--partition=short"],
+    ];
+    assert_eq!(calls.lines().count(), expected.len(), "{calls}");
+    for (line, words) in calls.lines().zip(expected) {
+        assert!(words.iter().all(|word| line.contains(word)), "{line}");
+    }
 }
 
 /// True if Slurm can be started here; else a message.
