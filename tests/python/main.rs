@@ -6,7 +6,7 @@
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 
-use sastrugi_tests::{Called, area, called, copy_build, outside_package, program};
+use sastrugi_tests::{Called, area, called, copy_build, outside_package, program, sastrugi_in, write};
 use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -96,6 +96,67 @@ fn val_notebooks_run() {
     assemble(package.path());
     let mut run = with_package(&python, package.path(), folder.path());
     check(&called(run.arg(root().join("tests/python/run_notebooks.py")).args(notebooks())));
+}
+
+/// Missions on three terrains, for [`LOADER`].
+const STUDY: &str = r#"
+[study]
+name = "small"
+seed = 7
+date = "2026-01-01"
+
+[[terrain]]
+id = "rough"
+kind = "multifractal"
+count = 3
+size_px = [320, 300]
+
+[[missions]]
+id = "short"
+terrains = ["rough"]
+count = 2
+length_m = 5.0
+border_m = 1.5
+
+[[traverse]]
+id = "husky"
+missions = "short"
+"#;
+
+/// Takes the example dataset in batches, in this process and in two of its own, and compares them with its items.
+const LOADER: &str = r#"
+import sys
+
+import numpy as np
+import torch
+
+sys.path.insert(0, sys.argv[1])
+import sastrugi
+from height_patches import HeightPatches
+
+if __name__ == "__main__":
+    dataset = HeightPatches(sastrugi.Release("release"))
+    heights, arrived = zip(*(dataset[k] for k in range(len(dataset))))
+    for workers in [{}, {"num_workers": 2, "multiprocessing_context": "spawn"}]:
+        batches = list(torch.utils.data.DataLoader(dataset, batch_size=4, **workers))
+        assert [len(batch[0]) for batch in batches] == [4, 2]
+        loaded = [torch.cat(parts) for parts in zip(*batches)]
+        assert loaded[0].dtype == torch.float32 and np.array_equal(loaded[0].numpy(), np.stack(heights))
+        assert loaded[1].tolist() == [float(one) for one in arrived]
+"#;
+
+/// PyTorch's own loader takes the example dataset as it is.
+#[test]
+#[ignore = "slow: needs PyTorch"]
+fn val_torch_loads_the_example_dataset() {
+    let Some(python) = sastrugi_tests::python("lerobot", "tests/readers/set_up lerobot") else { return };
+    let (package, folder) = (area(), area());
+    assemble(package.path());
+    write(folder.path(), "study.toml", STUDY);
+    check(&sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]));
+    write(folder.path(), "loader.py", LOADER);
+    let mut load = with_package(&python, package.path(), folder.path());
+    check(&called(load.arg("loader.py").arg(sources().join("examples"))));
 }
 
 /// The wheel, built by maturin and installed in an empty environment: module, program, tests and notebooks.

@@ -64,6 +64,38 @@ def test_ctrl_c_ends_a_run(study, release, tmp_path):
     assert sums(again.path) == sums(whole.path)
 
 
+KERNEL = """
+import sys, sastrugi
+snow = sastrugi.Fit({{"model": "exponential", "parameters": {{"sigma_m": 0.05, "range_m": 0.2}}}})
+site = snow.texture(16.0, 0.1, seed=1, phase="gaussian", periodic=False)
+print("started", flush=True)
+try:
+    {call}
+except KeyboardInterrupt:
+    print("interrupted", flush=True)
+    sys.exit(9)
+"""
+
+
+@pytest.mark.parametrize(
+    "call",
+    [
+        'sastrugi.terrain("spheroids", size_px=[1000, 1000], spheroids=1000000, major_max_px=150)',
+        "sastrugi.fit(site, outer_scale=1.0, bootstrap=100000)",
+    ],
+)
+def test_ctrl_c_ends_a_call_within_a_kernel(call):
+    """A kernel cannot be stopped, but its caller is free after two seconds. These take many times as long."""
+    process = subprocess.Popen([sys.executable, "-c", KERNEL.format(call=call)], stdout=subprocess.PIPE, text=True)
+    assert process.stdout.readline() == "started\n"
+    time.sleep(0.5)
+    process.send_signal(signal.SIGINT)
+    start = time.monotonic()
+    output, _ = process.communicate(timeout=60)
+    assert (process.returncode, output) == (9, "interrupted\n")
+    assert time.monotonic() - start < 6
+
+
 def test_ctrl_c_ends_the_console_script(tmp_path):
     (tmp_path / "study.toml").write_text(LONG_STUDY)
     command = [sys.executable, "-m", "sastrugi", "run", "study.toml", "-o", "release"]

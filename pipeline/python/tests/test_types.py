@@ -37,3 +37,11 @@ def test_parameters():
                 member = getattr(members, method.name)
                 if not method.decorator_list:
                     assert parameters(method) == list(inspect.signature(member).parameters), f"{node.name}.{method.name}"
+
+
+def test_syntax():
+    """The wheel is for CPython 3.10 and later; these tests run with one of them."""
+    sources = [file for file in files("sastrugi").iterdir() if file.name.endswith((".py", ".pyi"))]
+    assert len(sources) > 10
+    for file in sources:
+        ast.parse(file.read_text(encoding="utf-8"), file.name, feature_version=(3, 10))
