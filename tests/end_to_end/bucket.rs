@@ -24,7 +24,7 @@ impl Server {
         let server = installed("engines/s3/bin/s3s-fs", "tests/engines/set_up s3")?;
         let root = area();
         fs::create_dir(root.path().join("terrains")).unwrap();
-        // Free when it was asked for.
+        // Free at this moment; the server takes it in the next.
         let port = TcpListener::bind((Ipv4Addr::LOCALHOST, 0)).unwrap().local_addr().unwrap().port();
         let child = Command::new(server)
             .args(["--host", "127.0.0.1", "--port", &port.to_string(), "--access-key", KEY, "--secret-key", SECRET])
@@ -143,7 +143,7 @@ fn val_an_interrupted_upload_is_no_release() {
     succeeds(&server.call(path, &["verify", "s3://terrains/a/small", "--quiet"]));
 }
 
-/// Two runs on one cache in a bucket, then a server that is gone: exit code 75, and a shorter word for what will never work.
+/// Two runs share a cache in a bucket; a bucket that does not exist is a failure (1), and a server that has gone is worth a retry (75).
 #[test]
 #[ignore = "slow: needs an S3 server"]
 fn val_a_store_that_fails_is_reported() {

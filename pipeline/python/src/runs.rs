@@ -39,15 +39,15 @@ impl Destination {
     }
 }
 
-/// Summary of a run as JSON, with doubts about its study.
-fn summary(run: &RunSummary, doubts: &[String]) -> PyResult<String> {
+/// Summary of a run as JSON, with warnings about its study.
+fn summary(run: &RunSummary, warnings: &[String]) -> PyResult<String> {
     text(&json!({
         "output": run.output,
         "items": run.items,
         "computed": run.computed,
         "failures": run.failures,
         "notes": run.notes,
-        "doubts": doubts,
+        "warnings": warnings,
     }))
 }
 
@@ -61,13 +61,13 @@ pub fn run(
     replace: bool,
     progress: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<String> {
-    let (done, doubts) = watched(py, progress, move |watched| {
+    let (done, warnings) = watched(py, progress, move |watched| {
         let loaded = load(&study)?;
         let request =
             RunRequest { output: &output, work: work.as_deref(), part: None, purpose: None, replace, limits: limits() };
         Ok((studies::run(&loaded, &request, watched)?, loaded.doubts))
     })?;
-    summary(&done, &doubts)
+    summary(&done, &warnings)
 }
 
 /// A table of a request, empty if absent.
@@ -88,11 +88,11 @@ pub fn traverse(
 ) -> PyResult<String> {
     let request = value(request)?;
     let destination = Destination { output, work, replace };
-    let (done, doubts) = watched(py, progress, move |watched| {
+    let (done, warnings) = watched(py, progress, move |watched| {
         let mut parameters = json!({});
         known::assign_vehicle(&mut parameters, request["vehicle"].as_str().unwrap_or_default())?;
         let parameters = joined(parameters, &table(&request, "parameters"));
-        let doubts = known::vehicle_doubts(&parameters);
+        let warnings = known::vehicle_doubts(&parameters);
         let drive = driving::Request {
             dem: &dem,
             seed: request["seed"].as_u64().unwrap_or_default(),
@@ -101,9 +101,9 @@ pub fn traverse(
             parameters,
             date: request["date"].as_str().unwrap_or_default(),
         };
-        Ok((driving::traverse(&drive, &destination.place(), watched)?, doubts))
+        Ok((driving::traverse(&drive, &destination.place(), watched)?, warnings))
     })?;
-    summary(&done, &doubts)
+    summary(&done, &warnings)
 }
 
 /// One table with the keys of both; those of the second win.

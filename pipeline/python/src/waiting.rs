@@ -23,7 +23,7 @@ const GRACE: Duration = Duration::from_secs(2);
 /// Items done, items in total, and what happened.
 type Step = (usize, usize, String);
 
-/// The listener of the work: passes on its progress, and knows whether the caller still waits. The work has ended when it is dropped.
+/// The listener of the work: passes on its progress, and tells it when the caller has been interrupted. The work has ended when it is dropped.
 pub struct Watched {
     steps: Sender<Step>,
     cancelled: Arc<AtomicBool>,

@@ -125,7 +125,7 @@ impl From<ObjectError> for Error {
             ObjectError::Address(_) | ObjectError::Environment { .. } | ObjectError::Credentials { .. } => {
                 Self::Usage(error.to_string())
             }
-            ObjectError::Request { .. } if error.may_pass() => Self::Retry(error.to_string()),
+            ObjectError::Request { .. } if error.is_transient() => Self::Retry(error.to_string()),
             ObjectError::Request { .. } => Self::Failed(error.to_string()),
             ObjectError::File { path, source } => Self::at(&path, source),
         }
@@ -173,7 +173,7 @@ mod tests {
         assert!(matches!(usage, Error::Usage(message) if message == "`trim` is 2"));
     }
 
-    /// A full disk may pass, a file that is not one is the user's, everything else is a failure; messages name the file.
+    /// A full disk is worth a retry, a path that is not a file is the user's mistake, anything else is a failure; messages name the file.
     #[test]
     fn val_errors_of_files_name_them() {
         let path = Path::new("a/b.tif");

@@ -8,7 +8,7 @@
 //! only if it does not exist ([`Bucket::create`]): its presence says that the rest is there.
 //!
 //! The client is asynchronous. Its runtime lives in this module: calls block, and may come from any thread that is not part of another
-//! runtime. Failed requests are repeated for up to a minute; errors say whether a later attempt may succeed ([`ObjectError::may_pass`]).
+//! runtime. Failed requests are repeated for up to a minute; errors say whether a later attempt may succeed ([`ObjectError::is_transient`]).
 
 use crate::digest::Hashed;
 use futures_util::StreamExt;
@@ -75,7 +75,7 @@ pub enum ObjectError {
 
 impl ObjectError {
     /// True if the same request may succeed later: the store does not answer, is overloaded, or failed itself.
-    pub fn may_pass(&self) -> bool {
+    pub fn is_transient(&self) -> bool {
         let Self::Request { source: object_store::Error::Generic { source, .. }, .. } = self else { return false };
         // The type of this error is private to the client; refusals that it does not name otherwise have a status of 400 to 499 in their text.
         let text = source.to_string();
@@ -382,7 +382,7 @@ mod tests {
         {
             let error = parts(wrong).unwrap_err();
             assert!(error.to_string().starts_with(&format!("\"{wrong}\" is not an address")), "{wrong}: {error}");
-            assert!(!error.may_pass());
+            assert!(!error.is_transient());
         }
         assert!(Bucket::is_address("s3://x") && !Bucket::is_address("release") && !Bucket::is_address("./s3://x"));
     }
@@ -469,8 +469,9 @@ mod tests {
 
     /// Whether to try again follows from the cause.
     #[test]
-    fn val_only_some_requests_may_pass() {
-        let of = |source: object_store::Error| ObjectError::Request { address: "s3://b".to_owned(), source }.may_pass();
+    fn val_only_some_requests_are_transient() {
+        let of =
+            |source: object_store::Error| ObjectError::Request { address: "s3://b".to_owned(), source }.is_transient();
         let generic = |text: &str| object_store::Error::Generic { store: "S3", source: text.into() };
         assert!(of(generic("error sending request")));
         assert!(of(generic("Server returned non-2xx status code: 503 Service Unavailable")));

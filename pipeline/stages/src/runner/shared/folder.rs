@@ -260,7 +260,7 @@ fn is_taken(error: &io::Error) -> bool {
 mod tests {
     use super::*;
 
-    /// Too many open files may pass; a missing permission does not.
+    /// Too many open files are transient; a missing permission is not.
     #[test]
     fn val_what_makes_a_cache_unusable_decides() {
         let of = |number| unusable(Path::new("cache"), io::Error::from_raw_os_error(number));
