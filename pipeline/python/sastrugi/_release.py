@@ -423,8 +423,9 @@ class Release:
     @cached_property
     def _starts(self) -> npt.NDArray[np.int64]:
         """Samples of all missions before each."""
-        samples = np.asarray(self._columns["samples"], dtype=np.int64)
-        starts: npt.NDArray[np.int64] = np.cumsum(samples) - samples
+        samples = self._columns["samples"]
+        starts = np.zeros(len(samples), dtype=np.int64)
+        np.cumsum(samples[:-1], out=starts[1:])
         return starts
 
     def _place(self, mission: Mission | str) -> int:
