@@ -197,7 +197,7 @@ class Mission:
 
 
 class Missions(Sequence[Mission]):
-    """Missions of a release in the order of their ids. Each is made when it is asked for; `list(missions)` makes all of them."""
+    """Missions of a release, sorted by terrain and mission. Each is made when it is asked for; `list(missions)` makes all of them."""
 
     __slots__ = ("_release", "_split", "_columns", "_places")
 
