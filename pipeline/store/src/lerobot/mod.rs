@@ -52,7 +52,7 @@ const STATS: &str = "meta/stats.json";
 const TASKS: &str = "meta/tasks.parquet";
 /// Key of our own entry in `meta/info.json`; the package keeps unknown keys.
 const OWN: &str = "sastrugi";
-/// Most rows of a row group of frames: about 22 MiB with a patch of 32 x 32.
+/// Most rows of a row group of frames: about 21 MiB with a patch of 32 x 32.
 const FRAME_ROWS: usize = 4096;
 /// Most bytes of a row group of frames, unless one frame has more.
 const GROUP_BYTES: usize = 64 << 20;
