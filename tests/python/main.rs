@@ -1,8 +1,8 @@
 //! The Python package: its tests, its docstrings, its types and the notebooks, with the library that the workspace builds; and, slowly, the
-//! wheel in an empty environment.
+//! wheel in an empty environment and the example dataset under PyTorch.
 //!
-//! The packages that these need are installed in `.cache/python` by `./test`. Without them, the tests are skipped with a message; with CI set,
-//! that is a failure.
+//! The packages that these need are installed in `.cache/python` by `./test`, PyTorch with LeRobot in `.cache/lerobot`. Without them, the tests
+//! are skipped with a message; with CI set, that is a failure.
 
 #![allow(clippy::unwrap_used, reason = "a test may end where it stands")]
 

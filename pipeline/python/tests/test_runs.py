@@ -85,8 +85,9 @@ except KeyboardInterrupt:
     ],
 )
 def test_ctrl_c_ends_a_call_within_a_kernel(call):
-    """A kernel cannot be stopped, but its caller is free after two seconds. These take many times as long."""
-    process = subprocess.Popen([sys.executable, "-c", KERNEL.format(call=call)], stdout=subprocess.PIPE, text=True)
+    """A kernel cannot be stopped, but its caller is free after two seconds. These take many times as long on one thread, however many cores there are."""
+    command, environment = [sys.executable, "-c", KERNEL.format(call=call)], {**os.environ, "RAYON_NUM_THREADS": "1"}
+    process = subprocess.Popen(command, env=environment, stdout=subprocess.PIPE, text=True)
     assert process.stdout.readline() == "started\n"
     time.sleep(0.5)
     process.send_signal(signal.SIGINT)
