@@ -10,7 +10,8 @@
 //!
 //! The map is closed as sets, one threshold at a time. A cell belongs to the dilated set if, in some row of its disk, a
 //! member of the set is no farther along that row than the half width of the disk there. Cost: two distances and
-//! `2 radius / cell` integer comparisons per cell, for each of two thresholds and two steps.
+//! `2 radius / cell` integer comparisons per cell, for each of two thresholds and two steps. Distances are bytes if the radius is below
+//! 255 cells, so that a vector compares many of them.
 
 use crate::classes::{HIGH, NO_CLASS, SEMI};
 use rayon::prelude::*;
@@ -32,7 +33,12 @@ const RADIUS_SLACK: f64 = 1e-9;
 /// ```
 pub fn close_disk(classes: &Grid<u8>, radius_m: f64) -> Grid<u8> {
     let half_widths = disk(classes, radius_m);
-    let closed = [SEMI, HIGH].map(|threshold| close_set(classes, threshold, &half_widths));
+    let narrow: Option<Vec<u8>> =
+        half_widths.iter().map(|&width| u8::try_from(width).ok().filter(|&w| w < u8::FAR)).collect();
+    let closed = [SEMI, HIGH].map(|threshold| match &narrow {
+        Some(half_widths) => close_set(classes, threshold, half_widths),
+        None => close_set(classes, threshold, &half_widths),
+    });
     let values = classes.values.iter().enumerate().map(|(k, &class)| match class {
         NO_CLASS => NO_CLASS,
         _ => u8::from(closed[0][k]) + u8::from(closed[1][k]),
@@ -50,8 +56,37 @@ fn disk(classes: &Grid<u8>, radius_m: f64) -> Vec<u32> {
     (0..classes.rows()).map(rest).take_while(|&rest| rest >= 0.0).map(half_width).collect()
 }
 
+/// Distance in columns to the nearest member of a set.
+trait Distance: Copy + Ord + Send + Sync {
+    /// At a member.
+    const ZERO: Self;
+    /// In a row without one, and beyond the widest disk.
+    const FAR: Self;
+
+    /// One column further, at most [`Self::FAR`].
+    fn further(self) -> Self;
+}
+
+impl Distance for u8 {
+    const ZERO: Self = 0;
+    const FAR: Self = Self::MAX;
+
+    fn further(self) -> Self {
+        self.saturating_add(1)
+    }
+}
+
+impl Distance for u32 {
+    const ZERO: Self = 0;
+    const FAR: Self = Self::MAX;
+
+    fn further(self) -> Self {
+        self.saturating_add(1)
+    }
+}
+
 /// The cells that the closing raises to `threshold` or above.
-fn close_set(classes: &Grid<u8>, threshold: u8, half_widths: &[u32]) -> Vec<bool> {
+fn close_set<D: Distance>(classes: &Grid<u8>, threshold: u8, half_widths: &[D]) -> Vec<bool> {
     let set: Vec<bool> = classes.values.iter().map(|&c| c >= threshold && c != NO_CLASS).collect();
     let dilated = dilate(&set, classes.cols(), half_widths);
     let outside = |(&d, &c): (&bool, &u8)| !d && c != NO_CLASS;
@@ -60,8 +95,8 @@ fn close_set(classes: &Grid<u8>, threshold: u8, half_widths: &[u32]) -> Vec<bool
 }
 
 /// The cells with a member of `set` within the disk.
-fn dilate(set: &[bool], cols: usize, half_widths: &[u32]) -> Vec<bool> {
-    let mut distances = vec![u32::MAX; set.len()];
+fn dilate<D: Distance>(set: &[bool], cols: usize, half_widths: &[D]) -> Vec<bool> {
+    let mut distances = vec![D::FAR; set.len()];
     distances.par_chunks_mut(cols).zip(set.par_chunks(cols)).for_each(|(out, row)| distances_along(row, out));
     let rows = set.len() / cols;
     let mut dilated = vec![false; set.len()];
@@ -76,16 +111,16 @@ fn dilate(set: &[bool], cols: usize, half_widths: &[u32]) -> Vec<bool> {
     dilated
 }
 
-/// Distance in columns to the nearest member of the row; `u32::MAX` in a row without one.
-fn distances_along(row: &[bool], out: &mut [u32]) {
-    let mut distance = u32::MAX;
+/// Distance in columns of each cell to the nearest member of the row.
+fn distances_along<D: Distance>(row: &[bool], out: &mut [D]) {
+    let mut distance = D::FAR;
     for (o, &member) in out.iter_mut().zip(row) {
-        distance = if member { 0 } else { distance.saturating_add(1) };
+        distance = if member { D::ZERO } else { distance.further() };
         *o = distance;
     }
-    distance = u32::MAX;
+    distance = D::FAR;
     for (o, &member) in out.iter_mut().zip(row).rev() {
-        distance = if member { 0 } else { distance.saturating_add(1) };
+        distance = if member { D::ZERO } else { distance.further() };
         *o = distance.min(*o);
     }
 }
@@ -135,6 +170,21 @@ mod tests {
             for radius in [0.0, 0.05, 0.11, 0.2, 0.5, 9.0, f64::INFINITY] {
                 assert_eq!(close_disk(&map, radius), brute_force(&map, radius), "cell {cell:?}, radius {radius}");
             }
+        }
+    }
+
+    /// Distances as bytes and as 32-bit numbers give the same map; a disk of 255 cells or more takes the latter.
+    #[test]
+    fn val_narrow_and_wide_distances_agree() {
+        let mut s = Streams::for_seed(4, "closing-test").stream("sparse");
+        let class = |u: f64| if u < 0.004 { HIGH } else { LOW };
+        let map = Grid::new(Geometry::square(3, 900, 1.0), (0..2700).map(|_| class(s.uniform())).collect());
+        for radius in [3.0, 120.0, 254.0, 255.0, 300.0] {
+            let half_widths = disk(&map, radius);
+            let wide = close_set(&map, HIGH, &half_widths);
+            let raised: Vec<bool> = close_disk(&map, radius).values.iter().map(|&class| class == HIGH).collect();
+            assert_eq!(raised, wide, "{radius}");
+            assert!(radius > 3.0 || wide.iter().any(|&high| !high), "{radius}");
         }
     }
 
