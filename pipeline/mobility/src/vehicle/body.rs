@@ -49,14 +49,19 @@ impl Body {
     /// Position and velocity of the base_link origin.
     pub(crate) fn base(&self, vehicle: &Vehicle) -> (Vec3, Vec3) {
         let axes = self.axes();
-        let arm = axes.to_map(scale(vehicle.centre_of_mass_m, -1.0));
+        let arm = base_arm(vehicle, &axes);
         (add(self.position, arm), add(self.velocity, cross(axes.to_map(self.rate), arm)))
     }
 
-    /// True when pitch or roll exceeds the angle with that sine and cosine (below 90 deg), or the vehicle is upside down.
-    pub(crate) fn is_tipped(&self, (sin_limit, cos_limit): (f64, f64)) -> bool {
-        let axes = self.axes();
-        let (pitch_sin, roll_sin, roll_cos) = (axes.x[2].abs(), axes.y[2].abs(), axes.z[2]);
-        pitch_sin > sin_limit || roll_sin * cos_limit > roll_cos * sin_limit
+    /// Position of the base_link origin of a body with these axes.
+    #[inline(always)]
+    pub(crate) fn base_position(&self, vehicle: &Vehicle, axes: &Axes) -> Vec3 {
+        add(self.position, base_arm(vehicle, axes))
     }
+}
+
+/// The base_link origin from the centre of mass, in the map frame.
+#[inline(always)]
+fn base_arm(vehicle: &Vehicle, axes: &Axes) -> Vec3 {
+    axes.to_map(scale(vehicle.centre_of_mass_m, -1.0))
 }

@@ -148,11 +148,11 @@ pub(crate) struct Channel<'a> {
 
 impl Channel<'_> {
     /// Spin at the end of the step, rad/s, given the wheels of the channel that touch the ground.
-    pub(crate) fn solve<'g>(&self, start: f64, grips: impl Iterator<Item = &'g Grip> + Clone) -> f64 {
+    pub(crate) fn solve(&self, start: f64, grips: &[Grip]) -> f64 {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut spin = start;
         for _ in 0..STEPS_MAX {
-            let (residual, slope) = self.residual(spin, start, grips.clone());
+            let (residual, slope) = self.residual(spin, start, grips);
             if residual > 0.0 {
                 high = spin
             } else {
@@ -171,7 +171,7 @@ impl Channel<'_> {
 
     /// Residual of the channel's momentum balance, N m, and its derivative with respect to the spin.
     #[inline(always)]
-    fn residual<'g>(&self, spin: f64, start: f64, grips: impl Iterator<Item = &'g Grip>) -> (f64, f64) {
+    fn residual(&self, spin: f64, start: f64, grips: &[Grip]) -> (f64, f64) {
         let torque = self.servo.torque(spin - self.mount_spin);
         let servo_slope = if torque.abs() < self.servo.limit { self.servo.gain } else { 0.0 };
         let mut residual = self.inertia_over_step * (spin - start) - torque;
@@ -284,7 +284,7 @@ mod tests {
                         .map(|&normal_n| Grip::new(&TREAD, GROUND, normal_n, DEFLECTION, VELOCITY, start))
                         .collect();
                     let channel = Channel { tread: &TREAD, servo, inertia_over_step: 4.0, mount_spin };
-                    let spin = channel.solve(start, grips.iter());
+                    let spin = channel.solve(start, &grips);
                     let of_ground = |grip: &Grip| 0.2 * grip.settle(&TREAD, spin).0[0] - grip.rolling_n_m(spin);
                     let taken: f64 = grips.iter().map(of_ground).sum();
                     let motor = (servo.gain * (servo.target - (spin - mount_spin))).clamp(-servo.limit, servo.limit);

@@ -41,6 +41,8 @@ pub(crate) struct Simulation<'a> {
     bristles: Bristles,
     /// Motion and load of each wheel in the last step.
     rolls: Vec<Roll>,
+    /// The wheels of one channel that touch the ground.
+    grips: Vec<Grip>,
     rim: Vec<Vec3>,
     steered_rim: Vec<Vec3>,
     joint_forces: Vec<f64>,
@@ -102,6 +104,7 @@ impl<'a> Simulation<'a> {
             deflections: vec![[0.0; 2]; wheels],
             bristles: vehicle.belly.at_rest(),
             rolls: vec![Roll::default(); wheels],
+            grips: Vec::with_capacity(wheels),
             rim: Vec::new(),
             steered_rim: Vec::new(),
             chassis_force: [0.0; 3],
@@ -215,8 +218,10 @@ impl<'a> Simulation<'a> {
                 inertia_over_step: self.vehicle.spin_inertia[channel] / self.tread.step_s,
                 mount_spin: mounts.clone().sum::<f64>() / mounts.count() as f64,
             };
-            let grips = of_channel.filter_map(|(_, roll)| roll.touch.as_ref().map(|(_, grip)| grip));
-            *spun = step.solve(self.spin[channel], grips);
+            // Every iteration of the solver reads all of them.
+            self.grips.clear();
+            self.grips.extend(of_channel.filter_map(|(_, roll)| roll.touch.map(|(_, grip)| grip)));
+            *spun = step.solve(self.spin[channel], &self.grips);
         }
     }
 

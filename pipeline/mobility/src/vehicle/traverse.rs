@@ -345,12 +345,13 @@ impl<'a> Run<'a> {
     fn outcome(&mut self) -> Option<(EventKind, String)> {
         let rules = self.parameters();
         let body = &self.simulation.body;
-        let ([x, y, _], _) = body.base(self.vehicle);
+        let axes = body.axes();
+        let [x, y, _] = body.base_position(self.vehicle, &axes);
         if self.simulation.undefined || !self.ground.contains(body.position[0], body.position[1]) {
             let text = format!("at ({x:.2}, {y:.2}) m the ground ends or has no data");
             return Some((EventKind::OutOfBounds, text));
         }
-        if body.is_tipped(self.settings.tip_sin_cos()) {
+        if axes.are_tipped(self.settings.tip_sin_cos()) {
             let text = format!("pitch or roll beyond {} deg at ({x:.2}, {y:.2}) m", rules.tip_deg);
             return Some((EventKind::Tipped, text));
         }

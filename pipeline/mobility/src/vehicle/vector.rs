@@ -93,6 +93,13 @@ impl Axes {
         [dot(self.x, v), dot(self.y, v), dot(self.z, v)]
     }
 
+    /// True when pitch or roll exceeds the angle with that sine and cosine (below 90 deg), or the body is upside down.
+    #[inline(always)]
+    pub(crate) fn are_tipped(&self, (sin_limit, cos_limit): (f64, f64)) -> bool {
+        let (pitch_sin, roll_sin, roll_cos) = (self.x[2].abs(), self.y[2].abs(), self.z[2]);
+        pitch_sin > sin_limit || roll_sin * cos_limit > roll_cos * sin_limit
+    }
+
     /// The quaternion of a right-handed set of unit axes (Shepperd, 1978: the branch with the largest divisor).
     pub(crate) fn quaternion(self) -> Quaternion {
         let (x, y, z) = (self.x, self.y, self.z);

@@ -111,7 +111,7 @@ fn val_a_vehicle_tips_beyond_its_limit() {
         // Pitch, then roll in the pitched frame.
         let orientation = [sr * cp, cr * sp, -sr * sp, cr * cp];
         let body = body::Body { position: [0.0; 3], velocity: [0.0; 3], orientation, rate: [0.0; 3] };
-        body.is_tipped(limit)
+        body.axes().are_tipped(limit)
     };
     for sign in [1.0, -1.0] {
         assert!(!tipped(sign * 74.0, 0.0) && tipped(sign * 76.0, 0.0) && tipped(sign * 120.0, 0.0), "{sign}");
