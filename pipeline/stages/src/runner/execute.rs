@@ -68,13 +68,43 @@ struct Ran {
 
 struct State {
     waiting_for: BTreeMap<usize, usize>,
-    ready: BTreeSet<usize>,
+    ready: Ready,
     running: usize,
     memory_bytes: u64,
     execution: Execution,
     failed: BTreeMap<usize, Failure>,
     stopped: Option<Stopped>,
 }
+
+/// Items that may start, in graph order and by the memory that they need.
+#[derive(Default)]
+struct Ready {
+    in_order: BTreeSet<usize>,
+    by_memory: BTreeSet<(u64, usize)>,
+}
+
+impl Ready {
+    fn insert(&mut self, position: usize, memory_bytes: u64) {
+        self.in_order.insert(position);
+        self.by_memory.insert((memory_bytes, position));
+    }
+
+    fn remove(&mut self, position: usize, memory_bytes: u64) {
+        self.in_order.remove(&position);
+        self.by_memory.remove(&(memory_bytes, position));
+    }
+
+    /// One of the first items that fits, or else the smallest: a search through all would take too long where very many are ready and
+    /// memory is short.
+    fn first_that_fits(&self, fits: impl Fn(usize) -> bool) -> Option<usize> {
+        let mut first = self.in_order.iter().take(FIRST_READY).copied();
+        let smallest = || self.by_memory.first().map(|&(_, position)| position).filter(|&position| fits(position));
+        first.find(|&position| fits(position)).or_else(smallest)
+    }
+}
+
+/// Number of ready items that are looked at in graph order.
+const FIRST_READY: usize = 64;
 
 struct Run<'a> {
     graph: &'a Graph,
@@ -148,7 +178,10 @@ fn initial(graph: &Graph, missing: &[usize]) -> State {
     let open: BTreeSet<usize> = missing.iter().copied().collect();
     let waiting_for: BTreeMap<usize, usize> =
         missing.iter().map(|&p| (p, graph.parents(p).filter(|q| open.contains(q)).count())).collect();
-    let ready = waiting_for.iter().filter(|(_, n)| **n == 0).map(|(p, _)| *p).collect();
+    let mut ready = Ready::default();
+    for (&position, _) in waiting_for.iter().filter(|(_, n)| **n == 0) {
+        ready.insert(position, graph.node(position).job.memory_bytes());
+    }
     State {
         waiting_for,
         ready,
@@ -177,13 +210,14 @@ impl Run<'_> {
     fn take(&self) -> Option<usize> {
         let mut state = self.lock();
         loop {
-            if state.stopped.is_some() || state.ready.is_empty() && state.running == 0 {
+            if state.stopped.is_some() || state.ready.in_order.is_empty() && state.running == 0 {
                 return None;
             }
             if let Some(position) = self.first_that_fits(&state) {
-                state.ready.remove(&position);
+                let memory_bytes = self.memory_bytes(position);
+                state.ready.remove(position, memory_bytes);
                 state.running += 1;
-                state.memory_bytes += self.graph.node(position).job.memory_bytes();
+                state.memory_bytes += memory_bytes;
                 return Some(position);
             }
             state = self.changed.wait(state).unwrap_or_else(PoisonError::into_inner);
@@ -191,11 +225,12 @@ impl Run<'_> {
     }
 
     fn first_that_fits(&self, state: &State) -> Option<usize> {
-        let fits = |p: &usize| {
-            state.running == 0
-                || state.memory_bytes + self.graph.node(*p).job.memory_bytes() <= self.limits.memory_bytes
-        };
-        state.ready.iter().copied().find(fits)
+        let free = |position| state.memory_bytes + self.memory_bytes(position) <= self.limits.memory_bytes;
+        state.ready.first_that_fits(|position| state.running == 0 || free(position))
+    }
+
+    fn memory_bytes(&self, position: usize) -> u64 {
+        self.graph.node(position).job.memory_bytes()
     }
 
     /// Copies a result from the shared cache, or computes it.
@@ -275,7 +310,7 @@ impl Run<'_> {
             if let Some(count) = state.waiting_for.get_mut(child) {
                 *count -= 1;
                 if *count == 0 && !state.failed.contains_key(child) {
-                    state.ready.insert(*child);
+                    state.ready.insert(*child, self.memory_bytes(*child));
                 }
             }
         }
@@ -304,4 +339,25 @@ impl Run<'_> {
 fn panic_text(panic: &(dyn std::any::Any + Send)) -> String {
     let text = panic.downcast_ref::<&str>().map(|s| (*s).to_owned());
     text.or_else(|| panic.downcast_ref::<String>().cloned()).unwrap_or_else(|| "panic".to_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The first in graph order that fits among those looked at; beyond them, the smallest one.
+    #[test]
+    fn val_the_next_item_fits() {
+        let mut ready = Ready::default();
+        let memory = |position: usize| if position < 100 { 1000 } else { 200 - position as u64 };
+        (0..150).for_each(|position| ready.insert(position, memory(position)));
+        let next = |ready: &Ready, free: u64| ready.first_that_fits(|position| memory(position) <= free);
+        assert_eq!((next(&ready, 1000), next(&ready, 999), next(&ready, 51)), (Some(0), Some(149), Some(149)));
+        assert_eq!(next(&ready, 50), None);
+        (0..40).for_each(|position| ready.remove(position, memory(position)));
+        // Position 100 is now among the first 64.
+        assert_eq!((next(&ready, 1000), next(&ready, 999), next(&ready, 99)), (Some(40), Some(100), Some(101)));
+        (40..150).for_each(|position| ready.remove(position, memory(position)));
+        assert!(next(&ready, 1000).is_none() && ready.by_memory.is_empty());
+    }
 }
