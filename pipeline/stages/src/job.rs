@@ -4,12 +4,13 @@ use crate::machine::{Fault, fault};
 use crate::revision::Room;
 use sastrugi_schemas::{Cell, Record, Table};
 use sastrugi_store::atomic::{self, Draft, DraftFile};
-use sastrugi_store::parquet::{TableSummary, write_table};
+use sastrugi_store::parquet::{TableError, TableSummary, TableWriter};
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
 use std::collections::BTreeMap;
 use std::fmt;
 use std::io::ErrorKind;
+use std::marker::PhantomData;
 use std::path::{Path, PathBuf};
 
 /// Name of an item: its stage and its id.
@@ -143,17 +144,61 @@ impl Outcome {
         work: &Work<'_>,
         rows: impl IntoIterator<Item = R>,
     ) -> Result<(), JobError> {
-        let mut rows = rows.into_iter().peekable();
-        if rows.peek().is_none() {
-            return Ok(());
+        let mut writer = RowWriter::new(work);
+        writer.push(rows)?;
+        writer.finish(self)
+    }
+}
+
+/// Writes the item's rows of a table as they come, sorted by key, so that they need not all be in memory. Without rows, no file is written.
+pub struct RowWriter<'w, R> {
+    work: &'w Work<'w>,
+    /// Created with the first row.
+    writer: Option<TableWriter>,
+    rows: PhantomData<R>,
+}
+
+impl<'w, R: Record> RowWriter<'w, R> {
+    /// A table without rows.
+    pub fn new(work: &'w Work<'w>) -> Self {
+        Self { work, writer: None, rows: PhantomData }
+    }
+
+    /// Appends rows, whose keys must be greater than those before.
+    ///
+    /// # Errors
+    /// Rows that are not sorted (a bug); a file that cannot be written.
+    pub fn push(&mut self, rows: impl IntoIterator<Item = R>) -> Result<(), JobError> {
+        for row in rows {
+            self.write(row.cells()).map_err(|e| self.work.without_folder(JobError::io(e)))?;
         }
-        let file = format!("{}.parquet", R::TABLE.name);
-        if self.products.iter().any(|product| product.file == file) {
+        Ok(())
+    }
+
+    fn write(&mut self, cells: Vec<Cell>) -> Result<(), TableError> {
+        if self.writer.is_none() {
+            self.writer = Some(TableWriter::create(&self.work.output(&Self::file()), &R::TABLE, None)?);
+        }
+        self.writer.as_mut().map_or(Ok(()), |writer| writer.push(cells))
+    }
+
+    /// Completes the file and lists it among the products.
+    ///
+    /// # Errors
+    /// A table written twice by the item (a bug); a file that cannot be written.
+    pub fn finish(self, outcome: &mut Outcome) -> Result<(), JobError> {
+        let Some(writer) = self.writer else { return Ok(()) };
+        let file = Self::file();
+        if outcome.products.iter().any(|product| product.file == file) {
             return Err(JobError::new(format!("{file} was written twice")));
         }
-        let summary = write_table(&work.output(&file), rows, None).map_err(|e| work.without_folder(JobError::io(e)))?;
-        self.products.push(Product::fragment(file, &R::TABLE, summary));
+        let summary = writer.finish().map_err(|e| self.work.without_folder(JobError::io(e)))?;
+        outcome.products.push(Product::fragment(file, &R::TABLE, summary));
         Ok(())
+    }
+
+    fn file() -> String {
+        format!("{}.parquet", R::TABLE.name)
     }
 }
 
@@ -249,5 +294,51 @@ impl JobError {
     /// The same with another message.
     pub fn reworded(self, words: impl FnOnce(&str) -> String) -> Self {
         Self { message: words(&self.message), ..self }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_schemas::tables::PsdRow;
+
+    fn row(bin: i64) -> PsdRow {
+        let frequency_cycles_m = 0.1 * bin as f64;
+        PsdRow {
+            surface_id: "a".to_owned(),
+            bin,
+            frequency_cycles_m,
+            psd_m4: 1.0 / (1.0 + frequency_cycles_m),
+            modes: 3,
+        }
+    }
+
+    /// Rows written in pieces of any size make the same file, and the same product, as rows written at once; no rows make none.
+    #[test]
+    fn prop_rows_in_pieces_make_the_same_file() {
+        const ROWS: i64 = 5000;
+        let parents = BTreeMap::new();
+        let written = |piece: usize| {
+            let folder = tempfile::tempdir().unwrap();
+            let work = Work { folder: Draft(folder.path()), parents: &parents };
+            let (mut outcome, mut rows) = (Outcome::default(), RowWriter::new(&work));
+            for first in (0..ROWS).step_by(piece) {
+                rows.push((first..ROWS.min(first + piece as i64)).map(row)).unwrap();
+            }
+            rows.finish(&mut outcome).unwrap();
+            let again = outcome.write_rows(&work, [row(0)]).unwrap_err().message;
+            assert_eq!(again, "psd.parquet was written twice");
+            (std::fs::read(folder.path().join("psd.parquet")).unwrap(), outcome.products)
+        };
+        let whole = written(ROWS as usize);
+        assert_eq!(whole.1[0].records, Some(ROWS as u64));
+        for piece in [1, 700, 1024] {
+            assert!(written(piece) == whole, "{piece}");
+        }
+        let folder = tempfile::tempdir().unwrap();
+        let work = Work { folder: Draft(folder.path()), parents: &parents };
+        let mut outcome = Outcome::default();
+        outcome.write_rows::<PsdRow>(&work, []).unwrap();
+        assert!(outcome.products.is_empty() && std::fs::read_dir(folder.path()).unwrap().next().is_none());
     }
 }

@@ -3,7 +3,9 @@
 use super::dem as measured;
 use super::{missions, roughness, vehicle};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
-use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work, joined as joined_recipe, parsed};
+use crate::job::{
+    Estimate, ItemRef, Job, JobError, Outcome, Product, RowWriter, Work, joined as joined_recipe, parsed,
+};
 use crate::operations::dem::input_error;
 use crate::operations::drawn::Lines;
 use crate::revision::Room;
@@ -32,6 +34,9 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "traverse";
+
+/// Missions that are driven before their samples are written; their samples are in memory, about 0.7 MB a mission of 35 s.
+const MISSIONS_AT_ONCE: usize = 32;
 
 /// The one kind of run.
 pub fn kinds() -> Vec<Kind> {
@@ -274,6 +279,10 @@ impl TraverseJob {
         Ok(ground.with_surface(surface))
     }
 
+    fn mission_id(&self, mission: &Mission) -> String {
+        format!("{}-{:04}", self.drive.id, mission.index + 1)
+    }
+
     /// Drives a mission from all its starts and records the first.
     fn drive(
         &self,
@@ -282,7 +291,7 @@ impl TraverseJob {
         view: &TerrainView<'_>,
         mission: &Mission,
     ) -> Result<Driven, JobError> {
-        let id = format!("{}-{:04}", self.drive.id, mission.index + 1);
+        let id = self.mission_id(mission);
         let fail = |e: JobError| e.reworded(|words| format!("{id}: {words}"));
         let release_path = match self.drive.head.mcap {
             McapFlavour::Viewer => format!("mcap/{}/{id}.mcap", self.terrain),
@@ -349,7 +358,7 @@ impl TraverseJob {
                 _ => Cow::Owned(self.recording(site, &start)?),
             };
             let row = replicate_row(labels, &start, replicate as i64 + 1, &recording, self.differentiator());
-            Ok(ReplicateRow { mission_id: format!("{}-{:04}", self.drive.id, mission.index + 1), ..row })
+            Ok(ReplicateRow { mission_id: self.mission_id(mission), ..row })
         };
         (0..self.drive.starts.count()).into_par_iter().map(row).collect()
     }
@@ -440,11 +449,12 @@ impl Job for TraverseJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, ground with its bound, classes and rasters once; the samples of every mission, about 1000 bytes each including
-        // the wheels; the rows of the starts.
+        // Heights, ground with its bound, classes and rasters once; the samples of the missions that are driven at once, about 1000 bytes
+        // each including the wheels; the rows of the starts.
         let Drive { count, seconds_each, starts, settings, .. } = &*self.drive;
         let rows = (count * starts.count()) as u64;
-        let samples = *count as f64 * seconds_each * f64::from(settings.parameters().sample_rate_hz);
+        let samples =
+            (*count).min(MISSIONS_AT_ONCE) as f64 * seconds_each * f64::from(settings.parameters().sample_rate_hz);
         ((64 << 20) + 48 * self.cells).saturating_add((1000.0 * samples) as u64).saturating_add(400 * rows)
     }
 
@@ -459,31 +469,39 @@ impl Job for TraverseJob {
     fn run(&self, work: &Work<'_>) -> Result<Outcome, JobError> {
         let site = self.site(work)?;
         let view = TerrainView::new(&site.heights, Some(&site.classes)).map_err(JobError::new)?;
-        let missions = missions::read(&missions::file(work, &self.lines.item)?)?;
-        let driven: Result<Vec<Driven>, JobError> =
-            missions.par_iter().map(|mission| self.drive(work, &site, &view, mission)).collect();
-        let mut driven = driven?;
+        let mut missions = missions::read(&missions::file(work, &self.lines.item)?)?;
         // Ids sort as text: 10000 comes before 9999.
-        driven.sort_by(|a, b| a.row.mission_id.cmp(&b.row.mission_id));
-        let notes = site.ground.warnings().iter().cloned().chain(no_ground_note(&driven)).collect();
-        let products = driven.iter_mut().flat_map(|d| std::mem::take(&mut d.products)).collect();
+        missions.sort_by_cached_key(|mission| self.mission_id(mission));
+        let mut samples = RowWriter::new(work);
+        let (mut products, mut replicates, mut rows) = (Vec::new(), Vec::new(), Vec::with_capacity(missions.len()));
+        for missions in missions.chunks(MISSIONS_AT_ONCE) {
+            let driven: Result<Vec<Driven>, JobError> =
+                missions.par_iter().map(|mission| self.drive(work, &site, &view, mission)).collect();
+            for driven in driven? {
+                products.extend(driven.products);
+                samples.push(driven.samples)?;
+                replicates.extend(driven.replicates);
+                rows.push(driven.row);
+            }
+        }
+        let notes = site.ground.warnings().iter().cloned().chain(no_ground_note(&rows)).collect();
         let mut outcome = Outcome { products, notes };
         outcome.write_rows(work, self.parameters())?;
-        outcome.write_rows(work, driven.iter_mut().flat_map(|d| std::mem::take(&mut d.samples)))?;
-        outcome.write_rows(work, driven.iter_mut().flat_map(|d| std::mem::take(&mut d.replicates)))?;
-        outcome.write_rows(work, driven.into_iter().map(|d| d.row))?;
+        samples.finish(&mut outcome)?;
+        outcome.write_rows(work, replicates)?;
+        outcome.write_rows(work, rows)?;
         Ok(outcome)
     }
 }
 
 /// A note on missions that ended where they began.
-fn no_ground_note(driven: &[Driven]) -> Option<String> {
-    let nowhere = |row: &MissionRow| row.time_s == 0.0 && row.outcome == EventKind::OutOfBounds.name();
-    let count = driven.iter().filter(|d| nowhere(&d.row)).count();
+fn no_ground_note(missions: &[MissionRow]) -> Option<String> {
+    let nowhere = |row: &&MissionRow| row.time_s == 0.0 && row.outcome == EventKind::OutOfBounds.name();
+    let count = missions.iter().filter(nowhere).count();
     (count > 0).then(|| {
         format!(
             "{count} of {} missions start with the vehicle over cells without data; fill the gaps of the DEM first",
-            driven.len()
+            missions.len()
         )
     })
 }
