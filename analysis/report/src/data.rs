@@ -208,89 +208,40 @@ impl Data {
     /// Generated terrains by group, groups in natural order: the plain terrains, or all if every one is a variant.
     pub fn terrain_groups(&self) -> Vec<Group<'_, TerrainRow>> {
         let all: Vec<&TerrainRow> = self.of_stage("terrain").collect();
-        self.grouped(plain(all, |t| t.variant.is_none()).into_iter().map(|t| ((label(t), None), t)))
+        self.grouping().grouped(plain(all, |t| t.variant.is_none()).into_iter().map(|t| ((label(t), None), t)))
     }
 
     /// Missions of the plain run by group, groups in natural order; all missions if every one belongs to a variant.
     pub fn mission_groups(&self) -> Vec<Group<'_, Mission>> {
-        self.groups_of(plain(self.missions.iter().collect(), |m| m.variant.is_none()))
+        self.grouping().groups_of(plain(self.missions.iter().collect(), |m| m.variant.is_none()))
     }
 
-    /// Missions by group, groups in natural order. If the release has several runs, each is a separate group, because other vehicles
-    /// or other paths are not repetitions.
-    pub fn groups_of<'a>(&'a self, missions: Vec<&'a Mission>) -> Vec<Group<'a, Mission>> {
-        let mut names = self.names();
-        self.grouped(missions.into_iter().map(|m| (names(m), m)))
-    }
-
-    /// Function that returns label and run of a mission.
-    fn names<'a>(&'a self) -> impl FnMut(&'a Mission) -> Of<'a> {
-        let unnamed = self.missions.iter().any(|m| m.group.is_none());
-        let terrains = self.terrains.iter().filter(|_| unnamed);
-        let kinds: BTreeMap<&str, &str> = terrains.map(|t| (t.terrain_id.as_str(), label(t))).collect();
-        let runs = self.runs();
-        let mut last: Option<(&'a Mission, Of<'a>)> = None;
-        move |m| {
-            // Missions of one terrain follow each other.
-            let alike =
-                |n: &Mission| n.traverse_id == m.traverse_id && n.terrain_id == m.terrain_id && n.group == m.group;
-            let of_terrain = || kinds.get(m.terrain_id.as_str()).copied();
-            let of = match last {
-                Some((before, of)) if alike(before) => of,
-                _ => (m.group.as_deref().or_else(of_terrain).unwrap_or("all"), run(&runs, m)),
-            };
-            last = Some((m, of));
-            of
+    /// The missions of each variant, in the order of the table.
+    pub fn missions_by_variant(&self) -> BTreeMap<&str, Vec<&Mission>> {
+        let mut variants: BTreeMap<&str, Vec<&Mission>> = BTreeMap::new();
+        for mission in &self.missions {
+            if let Some(variant) = mission.variant.as_deref() {
+                variants.entry(variant).or_default().push(mission);
+            }
         }
+        variants
+    }
+
+    /// What rows are grouped by. Takes a few passes over all missions, so those who group several times make it once.
+    pub fn grouping(&self) -> Grouping<'_> {
+        Grouping::of(self)
     }
 
     /// Ids of the runs of the plain missions; variants belong to these.
     fn runs(&self) -> Vec<&str> {
-        let plain = plain(self.missions.iter().collect(), |m| m.variant.is_none());
-        distinct(plain.into_iter().map(|m| m.traverse_id.as_str())).into_iter().collect()
+        let has_plain = self.missions.iter().any(|m| m.variant.is_none());
+        let plain = self.missions.iter().filter(|m| !has_plain || m.variant.is_none());
+        distinct(plain.map(|m| m.traverse_id.as_str())).into_iter().collect()
     }
 
     /// True when plain missions belong to several runs.
     pub fn has_several_runs(&self) -> bool {
         self.runs().len() > 1
-    }
-
-    /// Rows by label and run; a group has the same number whatever is grouped.
-    fn grouped<'a, R>(&'a self, rows: impl Iterator<Item = (Of<'a>, &'a R)>) -> Vec<Group<'a, R>> {
-        let runs = self.runs();
-        let named = |label: &str, run: Option<&str>| match run {
-            Some(run) if runs.len() > 1 => format!("{label}, {run}"),
-            _ => label.to_owned(),
-        };
-        let missions = self.missions.iter().map(self.names());
-        let terrains = self.terrains.iter().map(|t| (label(t), None));
-        let names: BTreeSet<Natural> =
-            distinct(terrains.chain(missions)).into_iter().map(|(label, run)| natural(&named(label, run))).collect();
-        let index = |key: &Natural| names.iter().position(|n| n == key).unwrap_or(names.len());
-        let mut groups: Vec<(Of, Vec<&R>)> = Vec::new();
-        let (mut places, mut keys) = (BTreeMap::<Of, usize>::new(), BTreeMap::<Natural, usize>::new());
-        for (of, row) in rows {
-            let place = *places.entry(of).or_insert_with(|| {
-                // Labels and runs may have one name.
-                let place = *keys.entry(natural(&named(of.0, of.1))).or_insert(groups.len());
-                if place == groups.len() {
-                    groups.push((of, Vec::new()));
-                }
-                place
-            });
-            groups[place].1.push(row);
-        }
-        let group = |(key, place): (Natural, usize)| {
-            let ((label, run), rows) = &mut groups[place];
-            Group {
-                index: index(&key),
-                name: key.1,
-                label: (*label).to_owned(),
-                run: run.map(str::to_owned),
-                rows: std::mem::take(rows),
-            }
-        };
-        keys.into_iter().map(group).collect()
     }
 
     /// Heightfields of a stage.
@@ -357,6 +308,93 @@ impl Data {
     /// Histogram of a heightfield.
     pub fn histogram(&self, id: &str) -> Vec<&HeightDistributionRow> {
         of_key(&self.heights, |r| &r.surface_id, id).iter().filter(|r| r.density_per_m.is_finite()).collect()
+    }
+}
+
+/// Labels, runs and numbers of all groups of a release.
+pub struct Grouping<'a> {
+    /// Labels of the terrains of missions that have none of their own, by terrain.
+    of_terrains: BTreeMap<&'a str, &'a str>,
+    /// Ids of the runs of the plain missions.
+    runs: Vec<&'a str>,
+    /// Number of each group of the release, by the key of its name.
+    numbers: BTreeMap<Natural, usize>,
+}
+
+impl<'a> Grouping<'a> {
+    fn of(data: &'a Data) -> Self {
+        let unnamed = data.missions.iter().any(|m| m.group.is_none());
+        let terrains = data.terrains.iter().filter(|_| unnamed);
+        let of_terrains = terrains.map(|t| (t.terrain_id.as_str(), label(t))).collect();
+        let mut grouping = Self { of_terrains, runs: data.runs(), numbers: BTreeMap::new() };
+        let all = {
+            let missions = data.missions.iter().map(grouping.names());
+            let terrains = data.terrains.iter().map(|t| (label(t), None));
+            distinct(terrains.chain(missions))
+        };
+        let keys: BTreeSet<Natural> = all.into_iter().map(|of| grouping.key(of)).collect();
+        grouping.numbers = keys.into_iter().zip(0..).collect();
+        grouping
+    }
+
+    /// Missions by group, groups in natural order. If the release has several runs, each is a separate group, because other vehicles
+    /// or other paths are not repetitions.
+    pub fn groups_of(&self, missions: Vec<&'a Mission>) -> Vec<Group<'a, Mission>> {
+        let mut names = self.names();
+        self.grouped(missions.into_iter().map(|m| (names(m), m)))
+    }
+
+    /// Function that returns label and run of a mission.
+    fn names(&self) -> impl FnMut(&'a Mission) -> Of<'a> {
+        let mut last: Option<(&'a Mission, Of<'a>)> = None;
+        move |m| {
+            // Missions of one terrain follow each other.
+            let alike =
+                |n: &Mission| n.traverse_id == m.traverse_id && n.terrain_id == m.terrain_id && n.group == m.group;
+            let of_terrain = || self.of_terrains.get(m.terrain_id.as_str()).copied();
+            let of = match last {
+                Some((before, of)) if alike(before) => of,
+                _ => (m.group.as_deref().or_else(of_terrain).unwrap_or("all"), run(&self.runs, m)),
+            };
+            last = Some((m, of));
+            of
+        }
+    }
+
+    /// Sort key of the name of a group, and the name.
+    fn key(&self, (label, run): Of<'_>) -> Natural {
+        match run {
+            Some(run) if self.runs.len() > 1 => natural(&format!("{label}, {run}")),
+            _ => natural(label),
+        }
+    }
+
+    /// Rows by label and run; a group has the same number whatever is grouped.
+    fn grouped<R>(&self, rows: impl Iterator<Item = (Of<'a>, &'a R)>) -> Vec<Group<'a, R>> {
+        let mut groups: Vec<(Of, Vec<&R>)> = Vec::new();
+        let (mut places, mut keys) = (BTreeMap::<Of, usize>::new(), BTreeMap::<Natural, usize>::new());
+        for (of, row) in rows {
+            let place = *places.entry(of).or_insert_with(|| {
+                // Labels and runs may have one name.
+                let place = *keys.entry(self.key(of)).or_insert(groups.len());
+                if place == groups.len() {
+                    groups.push((of, Vec::new()));
+                }
+                place
+            });
+            groups[place].1.push(row);
+        }
+        let group = |(key, place): (Natural, usize)| {
+            let ((label, run), rows) = &mut groups[place];
+            Group {
+                index: self.numbers.get(&key).copied().unwrap_or(self.numbers.len()),
+                name: key.1,
+                label: (*label).to_owned(),
+                run: run.map(str::to_owned),
+                rows: std::mem::take(rows),
+            }
+        };
+        keys.into_iter().map(group).collect()
     }
 }
 
@@ -447,6 +485,27 @@ pub fn parameter(terrain: &TerrainRow, key: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A group has the same number whichever rows are grouped, alone or together; the numbers are the places of all groups in natural order.
+    #[test]
+    fn prop_numbers_of_groups_do_not_depend_on_what_is_grouped() {
+        let data = crate::tests::made_up::full(2, 24);
+        let grouping = data.grouping();
+        let numbers: BTreeMap<String, usize> =
+            data.mission_groups().into_iter().map(|group| (group.name, group.index)).collect();
+        assert_eq!(numbers.values().copied().collect::<Vec<_>>(), (0..numbers.len()).collect::<Vec<_>>());
+        assert!(data.terrain_groups().iter().all(|group| numbers[&group.name] == group.index));
+        let variants = data.missions_by_variant();
+        assert!(variants.len() > 2);
+        let of_variants: usize = variants.values().map(Vec::len).sum();
+        assert_eq!(of_variants, data.missions.iter().filter(|m| m.variant.is_some()).count());
+        for (variant, missions) in variants {
+            for group in grouping.groups_of(missions) {
+                assert_eq!(numbers.get(&group.name), Some(&group.index), "{variant}");
+                assert!(group.rows.iter().all(|m| m.variant.as_deref() == Some(variant)));
+            }
+        }
+    }
 
     #[test]
     fn val_labels_sort_naturally() {

@@ -11,7 +11,7 @@ use crate::render::chart::{Entry, Mark, Plot, RowLabel, Rows, WIDTH};
 use crate::render::number as set;
 use crate::render::svg::{Anchor, Paint, text_width};
 use sastrugi_statistics::{Components, Interval, bootstrap, components};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Query for the rows from which everything here is computed.
 const REPLICATES_QUERY: &str = "select * from 'tables/replicates/*.parquet'";
@@ -103,15 +103,13 @@ fn introduction(groups: &[Split]) -> String {
 
 /// Missions with several starts, by group: those of the plain run, or of the first variant that has any.
 fn groups(data: &Data) -> Vec<Split<'_>> {
-    // Without starts, every variant would be looked at, each time among all missions.
+    // Without starts, every variant would be looked at.
     if data.replicates.is_empty() {
         return Vec::new();
     }
-    let variants: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).collect();
-    let of = |variant: &str| {
-        data.groups_of(data.missions.iter().filter(|m| m.variant.as_deref() == Some(variant)).collect())
-    };
-    let runs = std::iter::once(data.mission_groups()).chain(variants.into_iter().map(of));
+    let grouping = data.grouping();
+    let variants = data.missions_by_variant().into_values().map(|missions| grouping.groups_of(missions));
+    let runs = std::iter::once(data.mission_groups()).chain(variants);
     let mut splits = runs.map(|groups| groups.iter().filter_map(|g| split(data, g)).collect::<Vec<_>>());
     splits.find(|run| !run.is_empty()).unwrap_or_default()
 }

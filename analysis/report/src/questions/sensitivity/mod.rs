@@ -14,7 +14,7 @@ use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_numeric::sums;
 use sastrugi_statistics::Interval;
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 
 /// Registry entry.
 pub const QUESTION: Question = Question {
@@ -90,14 +90,13 @@ fn strongest(effects: &[Effect]) -> String {
 
 /// Every variant in every group that has a plain run, the variant with the largest effect first.
 fn effects(data: &Data) -> Vec<Effect> {
-    let differs = |v: &&str| !v.starts_with(MORE_STARTS);
-    let names: BTreeSet<&str> = data.missions.iter().filter_map(|m| m.variant.as_deref()).filter(differs).collect();
-    let plain = data.mission_groups();
+    let variants = data.missions_by_variant().into_iter().filter(|(name, _)| !name.starts_with(MORE_STARTS));
+    let (grouping, plain) = (data.grouping(), data.mission_groups());
+    let plain: BTreeMap<&str, &Group<Mission>> = plain.iter().map(|group| (group.name.as_str(), group)).collect();
     let mut effects = Vec::new();
-    for name in names {
-        let missions = data.missions.iter().filter(|m| m.variant.as_deref() == Some(name)).collect();
-        for group in data.groups_of(missions) {
-            let reference = plain.iter().find(|g| g.name == group.name);
+    for (name, missions) in variants {
+        for group in grouping.groups_of(missions) {
+            let reference = plain.get(group.name.as_str());
             effects.extend(reference.map(|plain| effect(data, name, &group, plain)));
         }
     }
