@@ -100,8 +100,8 @@ pub struct Data {
     pub failed: Vec<FailedItem>,
     /// Heightfields.
     pub terrains: Vec<TerrainRow>,
-    /// Ids of generated terrains whose curves are not kept, because their group has more than [`CURVES_MAX`]: the others are a random
-    /// sample of that many.
+    /// Ids of surfaces whose curves are not kept: generated terrains beyond a random sample of [`CURVES_MAX`] of their group, textures that
+    /// are not drawn, and the residuals of these, of which only the structure function over all directions is kept.
     pub without_curves: BTreeSet<String>,
     /// Fits.
     pub fits: Vec<FitRow>,
@@ -170,7 +170,27 @@ pub struct Against {
 /// Maximum number of terrains of a group whose curves (spectra, structure functions, histograms) are kept.
 pub const CURVES_MAX: usize = 200;
 
-/// The generated terrains beyond a random sample of [`CURVES_MAX`] of each group and variant.
+/// Textures drawn; all are in the table.
+pub const TEXTURES_DRAWN: usize = 4;
+/// End of the id under which a texture's stage stores its residual, after the detrending and trimming of the fit.
+pub const RESIDUAL: &str = ".residual";
+
+/// Textures in the order in which they are drawn: first those without a base.
+pub fn textures(terrains: &[TerrainRow]) -> Vec<&TerrainRow> {
+    let on_base = |t: &&TerrainRow| parameter(t, "onto").is_some();
+    let all = terrains.iter().filter(|t| t.stage == "texture");
+    let (based, mut textures): (Vec<&TerrainRow>, Vec<_>) = all.partition(on_base);
+    textures.extend(based);
+    textures
+}
+
+/// True for the structure function of a residual over all directions, with which every texture is judged.
+pub(crate) fn is_judged(row: &StructureRow) -> bool {
+    row.direction == "all" && row.surface_id.ends_with(RESIDUAL)
+}
+
+/// The generated terrains beyond a random sample of [`CURVES_MAX`] of each group and variant, and the textures that are not drawn with
+/// their residuals.
 pub(crate) fn without_curves(seed: u64, terrains: &[TerrainRow]) -> BTreeSet<String> {
     let mut groups: BTreeMap<(&str, Option<&str>), Vec<&str>> = BTreeMap::new();
     for terrain in terrains.iter().filter(|terrain| terrain.stage == "terrain") {
@@ -181,7 +201,9 @@ pub(crate) fn without_curves(seed: u64, terrains: &[TerrainRow]) -> BTreeSet<Str
         let kept: BTreeSet<&str> = sample(ids.clone(), CURVES_MAX, &mut stream).into_iter().collect();
         ids.into_iter().filter(move |id| !kept.contains(id)).map(str::to_owned).collect::<Vec<_>>()
     };
-    groups.into_iter().flat_map(beyond).collect()
+    let undrawn = textures(terrains).into_iter().skip(TEXTURES_DRAWN);
+    let undrawn = undrawn.flat_map(|t| [t.terrain_id.clone(), format!("{}{RESIDUAL}", t.terrain_id)]);
+    groups.into_iter().flat_map(beyond).chain(undrawn).collect()
 }
 
 /// Rows with one label, which are compared with other groups.
@@ -491,10 +513,15 @@ mod tests {
     fn prop_numbers_of_groups_do_not_depend_on_what_is_grouped() {
         let data = crate::tests::made_up::full(2, 24);
         let grouping = data.grouping();
-        let numbers: BTreeMap<String, usize> =
-            data.mission_groups().into_iter().map(|group| (group.name, group.index)).collect();
-        assert_eq!(numbers.values().copied().collect::<Vec<_>>(), (0..numbers.len()).collect::<Vec<_>>());
-        assert!(data.terrain_groups().iter().all(|group| numbers[&group.name] == group.index));
+        let mut numbers: BTreeMap<String, usize> = BTreeMap::new();
+        let missions = data.mission_groups().into_iter().map(|group| (group.name, group.index));
+        let terrains = data.terrain_groups().into_iter().map(|group| (group.name, group.index));
+        for (name, index) in missions.chain(terrains) {
+            assert_eq!(*numbers.entry(name.clone()).or_insert(index), index, "{name}");
+        }
+        let mut names: Vec<&String> = numbers.keys().collect();
+        names.sort_by_key(|name| natural(name));
+        assert!(names.len() > 2 && names.is_sorted_by(|a, b| numbers[*a] < numbers[*b]), "{numbers:?}");
         let variants = data.missions_by_variant();
         assert!(variants.len() > 2);
         let of_variants: usize = variants.values().map(Vec::len).sum();
@@ -521,7 +548,8 @@ mod tests {
         assert_eq!(plain(vec![&one, &two], |_| false), [&1, &2]);
     }
 
-    /// Of a group with many terrains, the curves of 200 are kept, the same each time; smaller groups and other stages keep all.
+    /// Of a group with many terrains, the curves of 200 are kept, the same each time; smaller groups keep all. Of textures, those that are
+    /// drawn: the first four, in the order of the table, those without a base before the others.
     #[test]
     fn prop_curves_of_a_sample_of_each_large_group() {
         let one = crate::tests::made_up::full(1, 24).terrains.swap_remove(0);
@@ -535,10 +563,28 @@ mod tests {
         let mut terrains: Vec<TerrainRow> = (0..450).map(|k| terrain("large", None, "terrain", k)).collect();
         terrains.extend((0..CURVES_MAX).map(|k| terrain("large", Some("v = 1"), "terrain", k)));
         terrains.extend((0..300).map(|k| terrain("small", None, "texture", k)));
+        terrains.iter_mut().filter(|t| t.stage == "texture").take(2).for_each(|t| t.params = r#"{"onto": "x"}"#.into());
         let without = without_curves(7, &terrains);
-        assert_eq!(without.len(), 250);
-        assert!(without.iter().all(|id| id.starts_with("large-terrain-plain-")), "{without:?}");
+        let (of_terrains, of_textures): (Vec<&String>, Vec<_>) =
+            without.iter().partition(|id| id.starts_with("large-terrain-plain-"));
+        assert_eq!((of_terrains.len(), of_textures.len()), (250, 2 * (300 - TEXTURES_DRAWN)));
+        assert!(of_textures.iter().all(|id| id.starts_with("small-texture-plain-")), "{of_textures:?}");
+        let texture = |k: usize| format!("small-texture-plain-{k}");
+        assert!((2..6).all(|k| !without.contains(&texture(k))));
+        assert!([0, 1, 6, 299].into_iter().all(|k| without.contains(&texture(k))));
+        assert!(without.contains(&(texture(6) + RESIDUAL)));
         assert!(without == without_curves(7, &terrains) && without != without_curves(8, &terrains));
+        let row = |id: &str, direction: &str| StructureRow {
+            surface_id: id.into(),
+            direction: direction.into(),
+            bin: 0,
+            lag_m: 1.0,
+            value_m2: 1.0,
+            pairs: 1,
+        };
+        let judged =
+            [("a.residual", "all"), ("a.residual", "x"), ("a", "all")].map(|(id, way)| is_judged(&row(id, way)));
+        assert_eq!(judged, [true, false, false]);
     }
 
     /// Every surface is found by its id, and no other.

@@ -1,6 +1,6 @@
 //! Reading of an assembled release, sealed or not. This is the only file that reads through `sastrugi-store`.
 
-use crate::data::{Against, Data, Files, Mission, Names, Start, Stored, Study, without_curves};
+use crate::data::{Against, Data, Files, Mission, Names, Start, Stored, Study, is_judged, without_curves};
 use crate::{Companions, ReportError};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::Record;
@@ -58,7 +58,7 @@ impl Data {
             candidate_curves: release.rows()?,
             likelihood_profile: release.rows()?,
             surfaces: release.rows()?,
-            structure: release.rows_where(|row: &StructureRow| kept(&row.surface_id))?,
+            structure: release.rows_where(|row: &StructureRow| kept(&row.surface_id) || is_judged(row))?,
             profile_psd: release.rows_where(|row: &ProfilePsdRow| kept(&row.surface_id))?,
             psd: release.rows_where(|row: &PsdRow| kept(&row.surface_id))?,
             heights: release.rows_where(|row: &HeightDistributionRow| kept(&row.surface_id))?,

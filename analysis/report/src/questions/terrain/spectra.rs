@@ -112,9 +112,17 @@ fn in_words(data: &Data, group: &Group<TerrainRow>, curves: &[Curve]) -> (String
     }
 }
 
-/// Approximate number of rows of all terrains of a group, from those of the terrains whose curves are kept.
+/// Approximate number of rows of all terrains of a group, from those of the terrains whose curves are kept: two digits, since surfaces
+/// differ in their numbers of bins.
 fn of_whole_group(data: &Data, group: &Group<TerrainRow>, rows: usize) -> usize {
-    rows * group.rows.len() / kept(data, group).max(1)
+    let (kept, all) = (kept(data, group), group.rows.len());
+    if kept == all { rows } else { two_digits(rows * all / kept.max(1)).max(rows + 1) }
+}
+
+/// The number rounded to two digits.
+fn two_digits(n: usize) -> usize {
+    let unit = 10_usize.pow(n.checked_ilog10().unwrap_or(0).saturating_sub(1));
+    (n + unit / 2) / unit * unit
 }
 
 fn file_id(what: &str, group: &Group<TerrainRow>) -> String {
@@ -128,6 +136,12 @@ fn finish(id: String, title: String, caption: &str, description: String, plot: P
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn val_estimates_have_two_digits() {
+        let rounded = [0, 7, 99, 104, 105, 1249, 1250, 98_765].map(two_digits);
+        assert_eq!(rounded, [0, 7, 99, 100, 110, 1200, 1300, 99_000]);
+    }
 
     /// Of a group with many terrains, lines are of a sample and medians of all; both are named as what they are.
     #[test]

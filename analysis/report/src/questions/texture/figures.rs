@@ -1,7 +1,7 @@
 //! Surface parameters of the measured residual and of the texture, side by side.
 
 use crate::content::{Numbers, TableBlock, number, slug, text};
-use crate::data::Data;
+use crate::data::{Data, RESIDUAL};
 use crate::questions::sql::quoted;
 use crate::render::number as set;
 use sastrugi_schemas::Cell;
@@ -30,7 +30,7 @@ const ROWS: [Row; 15] = [
 
 /// Id under which a texture's stage stores its residual, after the detrending and trimming of the fit.
 pub fn residual_id(texture: &TerrainRow) -> String {
-    format!("{}.residual", texture.terrain_id)
+    format!("{}{RESIDUAL}", texture.terrain_id)
 }
 
 /// Columns: measured residual, residual of the texture, texture as synthesised; without rows if the release describes none of them.

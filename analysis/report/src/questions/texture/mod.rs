@@ -13,10 +13,11 @@ use super::relief::{Style, Words, deviations, exaggeration_words, limit_m, middl
 use super::sql::quoted;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, slug};
-use crate::data::{self, Data};
+use crate::data::{self, Data, TEXTURES_DRAWN};
 use crate::render::chart::Plot;
 use crate::render::svg::{Paint, Stroke};
 use crate::render::{number as set, thin};
+use crate::sample::{ROWS_MAX, sample};
 use sastrugi_imaging::hillshade::exaggeration;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::TerrainRow;
@@ -30,17 +31,13 @@ pub const QUESTION: Question = Question {
     answer,
 };
 
-/// Textures drawn; all are in the table.
-const TEXTURES_MAX: usize = 4;
 /// Tiles along each side of the picture of a repeated texture.
 const TILES: usize = 3;
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let on_base = |t: &&TerrainRow| data::parameter(t, "onto").is_some();
-    let (based, mut textures): (Vec<&TerrainRow>, Vec<_>) = data.of_stage("texture").partition(on_base);
-    textures.extend(based);
+    let textures = data::textures(&data.terrains);
     let mut blocks = Vec::new();
-    for texture in textures.iter().take(TEXTURES_MAX) {
+    for texture in textures.iter().take(TEXTURES_DRAWN) {
         let rows = figures(data, texture)?;
         if rows.iter().any(|row| !row.is_empty()) {
             blocks.push(Block::Heading(heading(texture)));
@@ -53,9 +50,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
             blocks.extend(fit.map(|fit| Block::Table(figures::table(data, texture, &fit))));
         }
     }
-    if textures.len() > TEXTURES_MAX {
+    if textures.len() > TEXTURES_DRAWN {
         let all = textures.len();
-        blocks.push(Block::Text(format!("The first {TEXTURES_MAX} of {all} textures are drawn; the table lists all.")));
+        let words = format!("The first {TEXTURES_DRAWN} of {all} textures are drawn; the table lists all.");
+        blocks.push(Block::Text(words));
     }
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
@@ -385,6 +383,9 @@ fn all(data: &Data) -> TableBlock {
         "kurtosis",
         "path",
     ];
-    let numbers = Numbers::select("stage = 'texture'", data.of_stage("texture"), &names);
+    let all: Vec<&TerrainRow> = data.of_stage("texture").collect();
+    let count = all.len();
+    let listed = sample(all, ROWS_MAX, &mut data.stream("textures", "listed"));
+    let numbers = Numbers::select("stage = 'texture'", listed, &names).of_all(count);
     TableBlock { id: "textures".into(), caption: "All textures".into(), numbers }
 }

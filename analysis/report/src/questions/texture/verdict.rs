@@ -13,7 +13,7 @@
 //! * Cannot tell: neither of these; or the fit found that the surface is not stationary, so that the scatter above does not apply.
 
 use super::figures::residual_id;
-use crate::data::Data;
+use crate::data::{Data, of_key};
 use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::{CovarianceRow, FitRow, SurfaceRow, TerrainRow};
@@ -128,7 +128,7 @@ const INCREMENT: &str = "RMS increment";
 fn compared(data: &Data, texture: &TerrainRow, fit: &FitRow) -> Option<Vec<Compared>> {
     let residual = residual_id(texture);
     let surfaces = [data.surface(&fit.fit_id)?, data.surface(&residual)?];
-    let bins: Vec<&CovarianceRow> = data.covariance.iter().filter(|r| r.fit_id == fit.fit_id).collect();
+    let bins: Vec<&CovarianceRow> = of_key(&data.covariance, |r| &r.fit_id, &fit.fit_id).iter().collect();
     let per_area: f64 = surfaces.iter().map(|s| 1.0 / area_m2(s)).sum();
     let scatter = |factor: f64, power: i32| (factor * correlated_m2(&bins, power) * per_area).sqrt();
     let (of_ratios, of_skewness, of_kurtosis) = (scatter(0.5, 2), scatter(6.0, 3), scatter(24.0, 4));
