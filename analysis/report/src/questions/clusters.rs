@@ -154,6 +154,26 @@ impl<T: Copy> Clusters<T> {
     }
 }
 
+impl Clusters<f64> {
+    /// As [`Self::interval`], of a function of the medians of the groups, whose values are sorted: without a copy of the values for each
+    /// bootstrap sample.
+    pub fn interval_of_medians(
+        &self,
+        stream: &mut Stream,
+        level: f64,
+        statistic: impl Fn(&[f64]) -> f64,
+    ) -> Option<Interval> {
+        let values: usize = self.groups.iter().map(|g| g.1.len()).sum();
+        cluster_interval(&self.samples, replicates(values), level, stream, |drawn| {
+            let times: Vec<Vec<usize>> = drawn.iter().zip(&self.samples).map(|(drawn, n)| times(drawn, *n)).collect();
+            let median = |(sample, items): &(usize, Vec<(usize, f64)>)| {
+                sums::median_counted(items.iter().map(|(cluster, value)| (*value, times[*sample][*cluster])))
+            };
+            statistic(&self.groups.iter().map(median).collect::<Vec<_>>())
+        })
+    }
+}
+
 /// The clusters that intervals resample, in words.
 pub fn in_words(pairing: &Pairing) -> &'static str {
     if pairing.is_common() { "blocks of paired terrains" } else { "terrains" }
@@ -185,6 +205,37 @@ mod tests {
             let median = |pooled: &[Vec<f64>]| sums::median(&pooled[0]);
             let slow = [BAND, LEVEL].map(|level| pooled.interval(&mut stream(&data, "group", "figure"), level, median));
             assert_eq!(fast, slow, "{n}");
+        }
+    }
+
+    /// The same bits as the medians of the pooled values, for groups with clusters of their own and with common ones, some of which have no
+    /// values in one group.
+    #[test]
+    fn prop_intervals_of_medians_are_those_of_pooled_values() {
+        let mut s = Streams::for_seed(2, "clusters-test").stream("medians");
+        for (n, clusters) in [(3, 9), (40, 9), (41, 3), (200, 50)] {
+            let names: Vec<String> = (0..2 * n).map(|_| format!("t{}", s.below(clusters))).collect();
+            let values = [(); 2].map(|()| (0..n).map(|_| (4.0 * s.normal()).round()).collect::<Vec<f64>>());
+            let of = |names: &[String], values: &[f64], prefix: &str| {
+                let mut items: Vec<(String, f64)> =
+                    names.iter().zip(values).map(|(name, value)| (format!("{prefix}{name}"), *value)).collect();
+                items.sort_by(|a, b| a.1.total_cmp(&b.1));
+                items
+            };
+            for prefix in ["", "own-"] {
+                let items = [of(&names[..n], &values[0], ""), of(&names[n..], &values[1], prefix)];
+                let groups =
+                    items.each_ref().map(|g| g.iter().map(|(name, v)| (name.as_str(), *v)).collect::<Vec<_>>());
+                let clusters = Clusters::new(&groups);
+                let stream = || Streams::for_seed(3, "clusters-test").stream("drawn");
+                let change = |medians: &[f64]| medians[1] - 0.5 * medians[0];
+                let fast = clusters.interval_of_medians(&mut stream(), BAND, change);
+                let slow = clusters.interval(&mut stream(), BAND, |pooled| {
+                    change(&[sums::median(&pooled[0]), sums::median(&pooled[1])])
+                });
+                assert!(fast.is_some() || n < 9, "{n}");
+                assert_eq!(format!("{fast:?}"), format!("{slow:?}"), "{n} {prefix}");
+            }
         }
     }
 

@@ -13,6 +13,7 @@ use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_statistics::{BoxPlot, Interval};
+use std::collections::BTreeSet;
 
 /// Registry entry.
 pub const QUESTION: Question = Question {
@@ -100,86 +101,141 @@ impl Row<'_> {
     }
 }
 
+/// Rows of the values, then of the steps, in the paper's order. The values behind them are collected once for each figure, and held for one
+/// figure at a time.
 fn rows<'a>(data: &Data, paper: &'a Paper, pairing: &Pairing) -> Vec<Row<'a>> {
-    let mut rows = Vec::new();
-    for published in &paper.values {
-        let Sample { groups, statistic } = sample(data, paper, pairing, &published.figure);
-        for (g, (name, items)) in groups.iter().enumerate() {
-            let Some(k) = paper.groups.iter().position(|p| papers::same(name, *p)) else { continue };
-            let of = |pooled: &[Vec<f64>]| statistic(&pooled[0]);
-            let item = [items.as_slice()];
-            let (ours, band) = ours(data, name, &format!("published {g} {}", published.figure), &item, of);
-            let (value, rounding) = (published.values[k], published.rounding[k]);
-            rows.push(Row { published, of: name.clone(), value, rounding, ours, band });
-        }
-    }
-    for published in &paper.steps {
-        let Sample { groups, statistic } = sample(data, paper, pairing, &published.figure);
-        for (k, pair) in groups.windows(2).enumerate() {
-            let change = |pooled: &[Vec<f64>]| {
-                let (from, to) = (statistic(&pooled[0]), statistic(&pooled[1]));
-                if published.relative { 100.0 * (to / from - 1.0) } else { to - from }
+    let ours = Ours {
+        terrains: shared(data.terrain_groups(), paper),
+        missions: shared(data.mission_groups(), paper),
+        pairing,
+    };
+    let mut rows: Vec<Vec<Row>> = Vec::new();
+    rows.resize_with(paper.values.len() + paper.steps.len(), Vec::new);
+    let values = paper.values.iter().map(|published| (published, false));
+    let all: Vec<(&Published, bool)> = values.chain(paper.steps.iter().map(|published| (published, true))).collect();
+    let figures: BTreeSet<&str> = all.iter().map(|(published, _)| published.figure.as_str()).collect();
+    for figure in figures {
+        let sample = ours.sample(figure);
+        for (place, &(published, is_step)) in all.iter().enumerate().filter(|(_, (p, _))| p.figure == figure) {
+            rows[place] = match is_step {
+                true => steps(data, published, &sample),
+                false => of_groups(data, paper, published, &sample),
             };
-            let of = format!("{} to {}", pair[0].0, pair[1].0);
-            let items = [pair[0].1.as_slice(), pair[1].1.as_slice()];
-            let (ours, band) =
-                ours(data, &of, &format!("published step {} {}", published.figure, published.unit), &items, change);
-            let (value, rounding) = (published.values[k], published.rounding[k]);
-            rows.push(Row { published, of, value, rounding, ours, band });
         }
     }
-    rows
+    rows.into_iter().flatten().collect()
+}
+
+/// A published value of each group, and ours.
+fn of_groups<'a>(data: &Data, paper: &Paper, published: &'a Published, sample: &Sample) -> Vec<Row<'a>> {
+    let row = |(g, (name, items)): (usize, &Items)| {
+        let k = paper.groups.iter().position(|p| papers::same(name, *p))?;
+        let purpose = format!("published {g} {}", published.figure);
+        let (ours, band) = estimate(data, name, &purpose, &[items.as_slice()], sample.statistic, |own| own[0]);
+        let (value, rounding) = (published.values[k], published.rounding[k]);
+        Some(Row { published, of: name.clone(), value, rounding, ours, band })
+    };
+    sample.groups.iter().enumerate().filter_map(row).collect()
+}
+
+/// A published change from each group to the next, and ours.
+fn steps<'a>(data: &Data, published: &'a Published, sample: &Sample) -> Vec<Row<'a>> {
+    let row = |(k, pair): (usize, &[Items])| {
+        let change = |own: &[f64]| if published.relative { 100.0 * (own[1] / own[0] - 1.0) } else { own[1] - own[0] };
+        let of = format!("{} to {}", pair[0].0, pair[1].0);
+        let items = [pair[0].1.as_slice(), pair[1].1.as_slice()];
+        let purpose = format!("published step {} {}", published.figure, published.unit);
+        let (ours, band) = estimate(data, &of, &purpose, &items, sample.statistic, change);
+        let (value, rounding) = (published.values[k], published.rounding[k]);
+        Row { published, of, value, rounding, ours, band }
+    };
+    sample.groups.windows(2).enumerate().map(row).collect()
 }
 
 /// Name of a group, and its values with the clusters that they belong to.
 type Items<'a> = (String, Vec<(&'a str, f64)>);
 
-/// Our value for one or two groups, and its sampling band.
-fn ours(
+/// A function of the statistics of one or two groups, and its sampling band.
+fn estimate(
     data: &Data,
     item: &str,
     purpose: &str,
     groups: &[&[(&str, f64)]],
-    statistic: impl Fn(&[Vec<f64>]) -> f64,
+    statistic: Statistic,
+    of: impl Fn(&[f64]) -> f64,
 ) -> (f64, Option<Interval>) {
     let groups: Vec<Vec<(&str, f64)>> = groups.iter().map(|g| g.to_vec()).collect();
-    let all: Vec<Vec<f64>> = groups.iter().map(|g| g.iter().map(|v| v.1).collect()).collect();
-    let band = Clusters::new(&groups).interval(&mut stream(data, item, purpose), BAND, &statistic);
-    (statistic(&all), band)
+    let (clusters, mut stream) = (Clusters::new(&groups), stream(data, item, purpose));
+    let band = match statistic {
+        Statistic::Median => clusters.interval_of_medians(&mut stream, BAND, &of),
+        _ => clusters.interval(&mut stream, BAND, |pooled| {
+            of(&pooled.iter().map(|values| statistic.of(values)).collect::<Vec<_>>())
+        }),
+    };
+    let own = |group: &Vec<(&str, f64)>| statistic.of(&group.iter().map(|v| v.1).collect::<Vec<_>>());
+    (of(&groups.iter().map(own).collect::<Vec<_>>()), band)
+}
+
+/// What is published of the values of a group.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Statistic {
+    Mean,
+    Median,
+    /// Number of values beyond 1.5 interquartile ranges of the quartiles.
+    Outliers,
+}
+
+impl Statistic {
+    fn of(self, values: &[f64]) -> f64 {
+        match self {
+            Self::Mean => sums::mean(values),
+            Self::Median => sums::median(values),
+            Self::Outliers => BoxPlot::of(values).map_or(f64::NAN, |b| b.outliers.len() as f64),
+        }
+    }
 }
 
 /// The values behind a published number, by group, and the statistic over those of a group.
 struct Sample<'a> {
     groups: Vec<Items<'a>>,
-    statistic: fn(&[f64]) -> f64,
+    statistic: Statistic,
 }
 
-/// Values and statistic of a published number.
-fn sample<'a>(data: &'a Data, paper: &Paper, pairing: &Pairing<'a>, figure: &str) -> Sample<'a> {
-    let terrains = || shared(data.terrain_groups(), paper);
-    let of_terrain = |t: &&'a TerrainRow| (t.terrain_id.as_str(), 100.0 * share(t, figure));
-    let shares = || terrains().iter().map(|g| (g.name.clone(), g.rows.iter().map(of_terrain).collect())).collect();
-    let missions = || shared(data.mission_groups(), paper);
-    let metric = METRICS.iter().find(|m| m.column == figure || figure == "time_outliers" && m.column == "time_s");
-    let values: Vec<Items> = match (figure, metric) {
-        (_, Some(metric)) => missions().iter().map(|g| (g.name.clone(), successful(g, metric))).collect(),
-        ("success_percent", _) => missions().iter().map(|g| (g.name.clone(), percents(g))).collect(),
-        ("success", _) => missions().iter().map(|g| (g.name.clone(), success_shares(g))).collect(),
-        _ => shares(),
-    };
-    let clustered = |(name, items): Items<'a>| {
-        let known = items.into_iter().filter(|v| v.1.is_finite());
-        let mut known: Vec<(&str, f64)> = known.map(|v| (pairing.cluster(v.0), v.1)).collect();
-        // Resampling keeps the order, and medians and quartiles of sorted values are fast.
-        known.sort_by(|a, b| a.1.total_cmp(&b.1));
-        (name, known)
-    };
-    let statistic = match figure {
-        "success_percent" => sums::mean,
-        "time_outliers" => outliers,
-        _ => sums::median,
-    };
-    Sample { groups: values.into_iter().map(clustered).collect(), statistic }
+/// The groups that the paper has too.
+struct Ours<'a, 'p> {
+    terrains: Vec<Group<'a, TerrainRow>>,
+    missions: Vec<Group<'a, Mission>>,
+    pairing: &'p Pairing<'a>,
+}
+
+impl<'a> Ours<'a, '_> {
+    /// Values and statistic of a published number.
+    fn sample(&self, figure: &str) -> Sample<'a> {
+        let of_terrain = |t: &&'a TerrainRow| (t.terrain_id.as_str(), 100.0 * share(t, figure));
+        let of_group =
+            |g: &Group<'a, TerrainRow>| -> Items<'a> { (g.name.clone(), g.rows.iter().map(of_terrain).collect()) };
+        let metric = METRICS.iter().find(|m| m.column == figure || figure == "time_outliers" && m.column == "time_s");
+        let missions = self.missions.iter();
+        let values: Vec<Items<'a>> = match (figure, metric) {
+            (_, Some(metric)) => missions.map(|g| (g.name.clone(), successful(g, metric))).collect(),
+            ("success_percent", _) => missions.map(|g| (g.name.clone(), percents(g))).collect(),
+            ("success", _) => missions.map(|g| (g.name.clone(), success_shares(g))).collect(),
+            _ => self.terrains.iter().map(of_group).collect(),
+        };
+        let clustered = |(name, items): Items<'a>| {
+            let known = items.into_iter().filter(|v| v.1.is_finite());
+            let mut known: Vec<(&'a str, f64)> = known.map(|v| (self.pairing.cluster(v.0), v.1)).collect();
+            // Resampling keeps the order; medians need it, and quartiles of sorted values are fast.
+            known.sort_by(|a, b| a.1.total_cmp(&b.1));
+            (name, known)
+        };
+        let statistic = match figure {
+            "success_percent" => Statistic::Mean,
+            "time_outliers" => Statistic::Outliers,
+            _ => Statistic::Median,
+        };
+        Sample { groups: values.into_iter().map(clustered).collect(), statistic }
+    }
 }
 
 /// 100 for a successful mission of a group, otherwise 0, with its terrain.
@@ -195,11 +251,6 @@ fn share(terrain: &TerrainRow, column: &str) -> f64 {
         "share_high" => terrain.share_high,
         _ => f64::NAN,
     }
-}
-
-/// Values beyond 1.5 interquartile ranges of the quartiles.
-fn outliers(values: &[f64]) -> f64 {
-    BoxPlot::of(values).map_or(f64::NAN, |b| b.outliers.len() as f64)
 }
 
 /// How many of the published values are inside, in a sentence; `None` without a band.
