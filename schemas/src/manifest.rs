@@ -1,7 +1,9 @@
 //! `manifest.json` of a release: origin and hashes of each file. No clock times.
 
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize, Serializer};
 use serde_json::Value;
+use std::fmt;
+use std::sync::Arc;
 
 /// Version of the manifest's format.
 pub const FORMAT: u32 = 1;
@@ -117,8 +119,57 @@ pub struct FailedItem {
     pub item: String,
     /// The error.
     pub error: String,
-    /// Parameters of the item.
-    pub parameters: Value,
+    /// Parameters of the item; none of one that was skipped because another failed, which `error` names.
+    pub parameters: Option<JsonText>,
+}
+
+/// A JSON value, kept as its text: a study may have very many failed items, and a value takes several times the memory. Copies share the
+/// text.
+#[derive(Clone, PartialEq, Eq)]
+pub struct JsonText(Arc<str>);
+
+impl JsonText {
+    /// A value from its text, which must be JSON: otherwise it cannot be serialised.
+    pub fn of_text(text: String) -> Self {
+        Self(text.into())
+    }
+
+    /// The text.
+    pub fn as_str(&self) -> &str {
+        &self.0
+    }
+}
+
+impl From<&Value> for JsonText {
+    fn from(value: &Value) -> Self {
+        Self::of_text(value.to_string())
+    }
+}
+
+impl fmt::Display for JsonText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+impl fmt::Debug for JsonText {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(&self.0)
+    }
+}
+
+/// Serialised as the value, not as a string.
+impl Serialize for JsonText {
+    fn serialize<S: Serializer>(&self, serializer: S) -> Result<S::Ok, S::Error> {
+        let value: Value = serde_json::from_str(&self.0).map_err(serde::ser::Error::custom)?;
+        value.serialize(serializer)
+    }
+}
+
+impl<'de> Deserialize<'de> for JsonText {
+    fn deserialize<D: Deserializer<'de>>(deserializer: D) -> Result<Self, D::Error> {
+        Value::deserialize(deserializer).map(|value| Self::from(&value))
+    }
 }
 
 #[cfg(test)]
@@ -154,6 +205,23 @@ mod tests {
         assert_eq!(written["artifacts"][0], readme);
         assert_eq!(written["seed"], u64::MAX);
         assert_eq!(serde_json::from_value::<Manifest>(written).unwrap(), manifest());
+    }
+
+    /// Parameters are written as the value that their text states, and read back; a skipped item has none. Text that is not JSON is not
+    /// written.
+    #[test]
+    fn val_parameters_of_failed_items() {
+        let value = serde_json::json!({ "b": 0.1, "a": [null, "x"], "n": u64::MAX });
+        let failed =
+            |parameters| FailedItem { stage: "s".to_owned(), item: "i".to_owned(), error: "no".to_owned(), parameters };
+        let own = failed(Some(JsonText::from(&value)));
+        let written = serde_json::to_value(&own).unwrap();
+        assert_eq!(written["parameters"], value);
+        assert_eq!(serde_json::from_value::<FailedItem>(written).unwrap(), own);
+        let skipped = serde_json::to_string(&failed(None)).unwrap();
+        assert!(skipped.ends_with(r#""parameters":null}"#), "{skipped}");
+        assert_eq!(serde_json::from_str::<FailedItem>(&skipped).unwrap(), failed(None));
+        assert!(serde_json::to_value(failed(Some(JsonText::of_text("{".to_owned())))).is_err());
     }
 
     /// Manifests without sources and notes, of earlier versions, are read; unknown keys are not passed over.

@@ -702,7 +702,7 @@ fn prop_large_releases_are_sampled_and_say_so() {
         stage: "traverse".into(),
         item: format!("t{k:05}"),
         error: "no start".into(),
-        parameters: serde_json::Value::Null,
+        parameters: None,
     };
     data.failed = (0..21_000).map(failed).collect();
     let (files, _) = report(&data);

@@ -3,7 +3,7 @@
 use super::{assert_sound, made_up};
 use crate::{Companions, ReportError, Summary, render, render_with};
 use sastrugi_schemas::Record;
-use sastrugi_schemas::manifest::{FailedItem, Origin};
+use sastrugi_schemas::manifest::{FailedItem, JsonText, Origin};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::release::{Head, PartWriter, ReleaseBuilder, TablePart, for_each_artifact};
 use std::collections::BTreeMap;
@@ -118,12 +118,13 @@ fn val_failed_items_are_listed() {
     let folder = tempfile::tempdir().unwrap();
     let dest = folder.path().join("release");
     let mut builder = assembled(&dest);
-    let parameters = serde_json::json!({ "size_m": [1, 1] });
+    let parameters = Some(JsonText::from(&serde_json::json!({ "size_m": [1, 1] })));
     builder.failed(FailedItem { stage: "terrain".into(), item: "x".into(), error: "too small".into(), parameters });
     builder.seal(&dest).unwrap();
     let (files, _) = report(&dest);
     assert!(files["index.html"].contains("1 item of the study failed"));
     assert!(files["data/failed.json"].contains("too small"));
+    assert!(files["data/failed.json"].contains(r#"{\"size_m\":[1,1]}"#), "{}", files["data/failed.json"]);
 }
 
 /// Hypotheses are read from the study file; an invalid one makes the file unreadable.

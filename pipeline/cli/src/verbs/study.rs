@@ -380,7 +380,7 @@ mod tests {
             message: "the surface is flat".to_owned(),
             unusable_input: false,
             skipped_for: skipped_for.map(|cause| ItemRef::new("fit", cause)),
-            parameters: json!({}),
+            parameters: None,
         }
     }
 

@@ -6,9 +6,9 @@ use super::progress::{End, Progress};
 use crate::job::{Cause, ItemRef, JobError, Work};
 use crate::machine::Fault;
 use rayon::prelude::*;
+use sastrugi_schemas::manifest::JsonText;
 use sastrugi_store::atomic::Draft;
 use serde::{Deserialize, Serialize};
-use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
 use std::panic::{AssertUnwindSafe, catch_unwind};
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -36,8 +36,8 @@ pub struct Failure {
     pub unusable_input: bool,
     /// The failed parent because of which this item was skipped.
     pub skipped_for: Option<ItemRef>,
-    /// Its recipe.
-    pub parameters: Value,
+    /// Its recipe, unless it was skipped.
+    pub parameters: Option<JsonText>,
 }
 
 /// A run stopped early because an item met an error of the machine.
@@ -295,7 +295,7 @@ impl Run<'_> {
                     message: error.message,
                     unusable_input: error.cause == Cause::Input,
                     skipped_for: None,
-                    parameters: job.recipe(),
+                    parameters: Some(JsonText::of_text(job.recipe_text())),
                 };
                 state.failed.insert(position, failure);
                 self.skip_children(&mut state, position, item);
@@ -327,7 +327,7 @@ impl Run<'_> {
                 message: format!("skipped, because {cause} failed"),
                 unusable_input: false,
                 skipped_for: Some(cause.clone()),
-                parameters: node.job.recipe(),
+                parameters: None,
             };
             state.failed.insert(child, failure);
             self.progress.ended(&node.item, &End::Skipped(cause.clone()), node.job.estimate().seconds);

@@ -500,7 +500,7 @@ mod tests {
             message: "failed".to_owned(),
             unusable_input: false,
             skipped_for: None,
-            parameters: serde_json::Value::Null,
+            parameters: None,
         }
     }
 

@@ -107,7 +107,7 @@ impl Serialize for Files<'_> {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sastrugi_schemas::manifest::{FORMAT, FailedItem, ItemNote, PROGRAM, Source};
+    use sastrugi_schemas::manifest::{FORMAT, FailedItem, ItemNote, JsonText, PROGRAM, Source};
     use serde_json::json;
 
     fn manifest(artifacts: Vec<Artifact>) -> Manifest {
@@ -126,7 +126,7 @@ mod tests {
                 stage: stage.clone(),
                 item: item.clone(),
                 error: text.clone(),
-                parameters: json!({ "b": 0.1, "a": null }),
+                parameters: Some(JsonText::from(&json!({ "b": 0.1, "a": null }))),
             }],
             notes: vec![ItemNote { stage, item, note: text }],
         }

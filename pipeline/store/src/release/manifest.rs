@@ -1,7 +1,7 @@
 //! The manifest of a release with very many files, read without holding the list of them.
 
 use super::{MANIFEST, ReleaseError, check_head, check_listed, unread};
-use sastrugi_schemas::manifest::{Artifact, Manifest};
+use sastrugi_schemas::manifest::{Artifact, FailedItem, Manifest};
 use serde::de::{DeserializeSeed, Deserializer, Error as _, MapAccess, SeqAccess, Visitor};
 use serde_json::{Map, Value};
 use std::fmt;
@@ -43,15 +43,20 @@ pub fn for_each_artifact(folder: &Path, f: impl FnMut(Artifact)) -> Result<Manif
 
 fn read(file: File, f: impl FnMut(Artifact)) -> Result<Manifest, serde_json::Error> {
     let mut json = serde_json::Deserializer::from_reader(BufReader::with_capacity(1 << 16, file));
-    let keys = json.deserialize_map(Parts(f))?;
+    let mut failed = Vec::new();
+    let keys = json.deserialize_map(Parts { f, failed: &mut failed })?;
     json.end()?;
-    serde_json::from_value(Value::Object(keys))
+    let manifest: Manifest = serde_json::from_value(Value::Object(keys))?;
+    Ok(Manifest { failed, ..manifest })
 }
 
-/// The keys of a manifest; the files go to the function.
-struct Parts<F>(F);
+/// The keys of a manifest; the files go to the function, and failed items, of which there may be many, to their list.
+struct Parts<'a, F> {
+    f: F,
+    failed: &'a mut Vec<FailedItem>,
+}
 
-impl<'de, F: FnMut(Artifact)> Visitor<'de> for Parts<F> {
+impl<'de, F: FnMut(Artifact)> Visitor<'de> for Parts<'_, F> {
     type Value = Map<String, Value>;
 
     fn expecting(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
@@ -66,7 +71,11 @@ impl<'de, F: FnMut(Artifact)> Visitor<'de> for Parts<F> {
             }
             let value = match key.as_str() {
                 "artifacts" => {
-                    map.next_value_seed(Files(&mut self.0))?;
+                    map.next_value_seed(Files(&mut self.f))?;
+                    Value::Array(Vec::new())
+                }
+                "failed" => {
+                    *self.failed = map.next_value()?;
                     Value::Array(Vec::new())
                 }
                 _ => map.next_value()?,

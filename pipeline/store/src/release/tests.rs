@@ -308,7 +308,7 @@ fn val_paths_stay_inside() {
         stage: "terrain".to_owned(),
         item: "b".to_owned(),
         error: "no".to_owned(),
-        parameters: serde_json::Value::Null,
+        parameters: None,
     });
     let dest = folder.path().join("d");
     builder.seal(&dest).unwrap();

@@ -17,7 +17,8 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut numbers =
         Numbers::of_file("manifest.json, failed", &[("stage", ""), ("item", ""), ("error", ""), ("parameters", "")]);
     for item in sample(data.failed.iter().collect(), ROWS_MAX, &mut data.stream("failed", "listed")) {
-        numbers.row([text(&item.stage), text(&item.item), text(&item.error), text(item.parameters.to_string())]);
+        let parameters = item.parameters.as_ref().map_or("", |parameters| parameters.as_str());
+        numbers.row([text(&item.stage), text(&item.item), text(&item.error), text(parameters)]);
     }
     let table =
         TableBlock { id: "failed".into(), caption: "Failed items".into(), numbers: numbers.of_all(data.failed.len()) };
