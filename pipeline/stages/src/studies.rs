@@ -512,7 +512,7 @@ mod tests {
         for name in ["file", "foreign/thesis.txt"] {
             fs::write(path(name), "precious").unwrap();
         }
-        let description = r#"{ "part": { "index": 1, "count": 2 }, "program": "sastrugi", "study_sha256": "", "items": [], "failures": [] }"#;
+        let description = r#"{ "part": { "index": 1, "count": 2 }, "program": "sastrugi", "study_sha256": "", "study_items": { "number": 0, "sha256": "" }, "items": [], "failures": [] }"#;
         fs::write(path("shard").join(release::SHARD), description).unwrap();
         let limits = Limits { workers: 1, memory_bytes: 1 << 20, beyond: true };
         let text =

@@ -1,7 +1,8 @@
 //! Shards: a run split into N parts on N machines, and the merge of the parts.
 //!
 //! An item belongs to shard `1 + (key modulo N)`. A shard computes its own items and all their parents, but keeps only its own
-//! items.
+//! items. Its description lists them with their places in the study, and the hash of the list of all items: the lists of N shards together
+//! are that list, and take the space of one.
 
 use super::assemble::{DestinationLock, fewer_items};
 use super::cache::{Cache, Record, StoredFile, copy_result, load_record};
@@ -15,7 +16,7 @@ use crate::splits::Splits;
 use crate::studies::head_of;
 use crate::study::Study;
 use sastrugi_store::atomic::{self, AtomicFile};
-use sastrugi_store::digest;
+use sastrugi_store::digest::{self, ContentHash};
 use sastrugi_store::release::{Staging, check_path};
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -29,6 +30,8 @@ const STUDY: &str = "study.toml";
 const ITEMS_NAMED: usize = 5;
 /// Maximum number of parts of a run.
 pub const PARTS_MAX: u32 = 10_000;
+/// The part that holds what all have in common.
+const FIRST: u32 = 1;
 
 /// Part `index` of `count`, counted from 1.
 ///
@@ -89,18 +92,49 @@ struct Description {
     part: Part,
     program: String,
     study_sha256: String,
-    /// Every item of the study with its key, in graph order; the same in all shards.
-    items: Vec<(ItemRef, String)>,
+    /// All items of the study; the same in all shards.
+    study_items: StudyItems,
+    /// Own items, in graph order.
+    items: Vec<OwnItem>,
     /// Own items without a result.
     failures: Vec<Failure>,
-    /// Assignment of terrains to train, validation and test; the same in all shards.
+    /// Assignment of terrains to train, validation and test; only in the first shard.
     #[serde(default)]
     splits: Splits,
 }
 
-/// Every item of a study with its key, in graph order.
-pub fn all_items(graph: &Graph) -> Vec<(ItemRef, String)> {
-    (0..graph.len()).map(|p| (graph.node(p).item.clone(), graph.key(p).to_owned())).collect()
+/// All items of a study, as a number and a hash.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct StudyItems {
+    number: u64,
+    /// SHA-256 of stages, ids and keys, in graph order.
+    sha256: String,
+}
+
+impl StudyItems {
+    fn of<'a>(items: impl Iterator<Item = (&'a ItemRef, &'a str)>) -> Self {
+        let (mut number, mut hash) = (0, ContentHash::new("items"));
+        for (item, key) in items {
+            [item.stage.as_str(), &item.id, key].into_iter().for_each(|text| hash.text(text));
+            number += 1;
+        }
+        Self { number, sha256: hash.finish() }
+    }
+}
+
+/// An item of a shard.
+#[derive(Clone, Debug, PartialEq, Eq, Serialize, Deserialize)]
+struct OwnItem {
+    /// Place among all items of the study, in graph order.
+    position: usize,
+    item: ItemRef,
+    key: String,
+}
+
+impl OwnItem {
+    fn at(graph: &Graph, position: usize) -> Self {
+        Self { position, item: graph.node(position).item.clone(), key: graph.key(position).to_owned() }
+    }
 }
 
 /// Writes the folder of a shard, completely or not at all.
@@ -122,8 +156,9 @@ pub fn write(
     check_occupant(replaced.as_ref(), &loaded.study, target, part, replace)?;
     let staging = Staging::beside(target)?;
     let changed = Changed::default();
-    for position in (0..graph.len()).filter(|&p| part.owns(graph.key(p))) {
-        let (item, key) = (&graph.node(position).item, graph.key(position));
+    let own = (0..graph.len()).filter(|&position| part.owns(graph.key(position)));
+    let items: Vec<OwnItem> = own.map(|position| OwnItem::at(graph, position)).collect();
+    for OwnItem { item, key, .. } in &items {
         if let Some(record) = cache.load(item, key) {
             let to = item_folder(staging.path(), item);
             fs::create_dir_all(&to).map_err(|e| Error::at(&to, e))?;
@@ -136,9 +171,10 @@ pub fn write(
         part,
         program: sastrugi_store::PROGRAM.to_owned(),
         study_sha256: sastrugi_store::digest::of_text(study),
-        items: all_items(graph),
+        study_items: StudyItems::of((0..graph.len()).map(|p| (&graph.node(p).item, graph.key(p)))),
+        items,
         failures: failures.iter().filter(owned).cloned().collect(),
-        splits: loaded.splits.clone(),
+        splits: if part.index == FIRST { loaded.splits.clone() } else { Splits::new() },
     };
     if let Some(before) = replaced.filter(|before| !replace && before.holds_more_than(&description)) {
         return Err(fewer_items(target, before.failures.len(), description.failures.len()));
@@ -150,14 +186,14 @@ pub fn write(
 }
 
 impl Description {
-    /// Writes the description piece by piece: it lists all items of the study.
+    /// Writes the description piece by piece: it may list very many items.
     fn write(&self, path: &Path) -> io::Result<()> {
         let mut file = AtomicFile::create(path)?;
         serde_json::to_writer_pretty(&mut file, self)?;
         file.commit()
     }
 
-    /// Checks that the part is valid and that all items stay inside the folder.
+    /// Checks that the part is valid, and that all items belong to it and stay inside the folder.
     fn check(&self) -> Result<(), String> {
         let Part { index, count } = self.part;
         if !self.part.is_valid() {
@@ -165,9 +201,9 @@ impl Description {
                 "part {index} of {count} is invalid; parts count from 1, and there are at most {PARTS_MAX}"
             ));
         }
-        self.items.iter().try_for_each(|(item, _)| {
-            let place = format!("{}/{}", item.stage, item.id);
-            check_path(&place).map_err(|e| e.to_string())
+        self.items.iter().try_for_each(|OwnItem { item, key, .. }| {
+            check_path(&item.to_string()).map_err(|e| e.to_string())?;
+            if self.part.owns(key) { Ok(()) } else { Err(format!("{item} does not belong to part {index} of {count}")) }
         })
     }
 
@@ -245,7 +281,7 @@ pub struct Joined {
 /// Folders that are not shards; shards of different studies or programs; missing, repeated or incomplete shards. All are listed, with what to
 /// run again. Nothing that is complete is computed again.
 pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
-    let (shards, mut problems) = read_all(folders);
+    let (mut shards, mut problems) = read_all(folders);
     let of_set = check_set(&shards);
     if let Some(one) = shards.first().filter(|_| !problems.is_empty() && of_set.is_empty()) {
         let it = if problems.len() == 1 { "it" } else { "them" };
@@ -255,7 +291,8 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     if !problems.is_empty() {
         return Err(Error::Input(problems.join("; ")));
     }
-    let Some(Placed { folder, shard: first, .. }) = shards.first() else {
+    let items = all_items(&mut shards)?;
+    let Some(Placed { folder, shard: first }) = shards.first() else {
         return Err(Error::Usage("no shards given".to_owned()));
     };
     let study = sastrugi_store::file::read_text(&folder.join(STUDY))
@@ -267,22 +304,20 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
         shards.iter().flat_map(|p| &p.shard.failures).map(|f| (f.item.clone(), f.clone())).collect();
     let failed_in = shards.iter().map(|p| &p.shard);
     let failed_in = failed_in.flat_map(|s| s.failures.iter().map(|f| (f.item.to_string(), s.part.index)));
+    let holder = shards.iter().find(|placed| placed.shard.part.index == FIRST);
     Ok(Joined {
         study,
-        results: results(&shards, &failures)?,
+        results: results(&shards, &items, &failures)?,
         failed_in: failed_in.collect(),
+        splits: holder.map_or_else(Splits::new, |placed| placed.shard.splits.clone()),
         failures: failures.into_values().collect(),
-        splits: first.splits.clone(),
     })
 }
 
 /// A shard and its folder.
 struct Placed<'a> {
     folder: &'a PathBuf,
-    /// Its description. Shards of one study list the same items, so only the first one keeps them.
     shard: Description,
-    /// Whether it lists the items of the first one.
-    has_same_items: bool,
 }
 
 /// The shards, and why other folders are not shards.
@@ -290,29 +325,45 @@ fn read_all(folders: &[PathBuf]) -> (Vec<Placed<'_>>, Vec<String>) {
     let (mut shards, mut problems) = (Vec::new(), Vec::new());
     for folder in folders {
         match read(folder) {
-            Ok(shard) => place(&mut shards, folder, shard),
+            Ok(shard) => shards.push(Placed { folder, shard }),
             Err(e) => problems.push(e.to_string()),
         }
     }
     (shards, problems)
 }
 
-/// Adds a shard, whose items are compared with those of the first one.
-fn place<'a>(shards: &mut Vec<Placed<'a>>, folder: &'a PathBuf, mut shard: Description) {
-    let has_same_items = match shards.first() {
-        Some(first) => std::mem::take(&mut shard.items) == first.shard.items,
-        None => true,
-    };
-    shards.push(Placed { folder, shard, has_same_items });
+/// All items of the study in graph order, from the lists of a complete set of shards, which are emptied.
+///
+/// # Errors
+/// Lists that are not all items of the study together.
+fn all_items(shards: &mut [Placed<'_>]) -> Result<Vec<OwnItem>, Error> {
+    let mut items: Vec<OwnItem> =
+        shards.iter_mut().flat_map(|placed| std::mem::take(&mut placed.shard.items)).collect();
+    items.sort_by_key(|own| own.position);
+    let is_complete = items.iter().enumerate().all(|(place, own)| own.position == place);
+    let found = StudyItems::of(items.iter().map(|own| (&own.item, own.key.as_str())));
+    match shards.first() {
+        Some(first) if !is_complete || found != first.shard.study_items => {
+            let count = first.shard.part.count;
+            let numbers: Vec<u32> = (1..=count).collect();
+            let advice = mend(&numbers, count);
+            Err(Error::Input(format!("the items that the shards list are not those of the study; {advice}")))
+        }
+        _ => Ok(items),
+    }
 }
 
 /// The folders of all results, parents before children. Their files are on disk.
-fn results(shards: &[Placed<'_>], failures: &BTreeMap<ItemRef, Failure>) -> Result<Vec<PathBuf>, Error> {
+fn results(
+    shards: &[Placed<'_>],
+    items: &[OwnItem],
+    failures: &BTreeMap<ItemRef, Failure>,
+) -> Result<Vec<PathBuf>, Error> {
     let by_part: BTreeMap<u32, &PathBuf> = shards.iter().map(|p| (p.shard.part.index, p.folder)).collect();
     let Some(Placed { shard: first, .. }) = shards.first() else { return Ok(Vec::new()) };
     let mut results = Vec::new();
     let mut missing: BTreeMap<u32, Vec<&ItemRef>> = BTreeMap::new();
-    for (item, key) in &first.items {
+    for OwnItem { item, key, .. } in items {
         let part = owner(key, first.part.count).unwrap_or(1);
         let Some(folder) = by_part.get(&part).map(|folder| item_folder(folder, item)) else { continue };
         if let Some(record) = load_record(&folder).filter(|r| r.key == *key && is_intact(r, &folder)) {
@@ -411,12 +462,12 @@ fn read(folder: &Path) -> Result<Description, Error> {
 
 /// Why shards do not form one complete study.
 fn check_set(shards: &[Placed<'_>]) -> Vec<String> {
-    let Some(Placed { folder: first_folder, shard: first, .. }) = shards.first() else { return Vec::new() };
+    let Some(Placed { folder: first_folder, shard: first }) = shards.first() else { return Vec::new() };
     let mut problems = Vec::new();
     let mut seen: BTreeMap<u32, &PathBuf> = BTreeMap::new();
-    for Placed { folder, shard, has_same_items } in shards {
+    for Placed { folder, shard } in shards {
         let name = folder.display();
-        if shard.study_sha256 != first.study_sha256 || !has_same_items {
+        if shard.study_sha256 != first.study_sha256 || shard.study_items != first.study_items {
             problems.push(format!(
                 "{name} is from another study, or another revision of the program, than {}",
                 first_folder.display()
@@ -483,12 +534,22 @@ mod tests {
         assert!(owned.iter().all(|count| *count > 0), "{owned:?}");
     }
 
+    /// An item of the given part.
+    fn own(index: u32, id: &str) -> OwnItem {
+        let key = format!("{:015x}{}", index - 1, "0".repeat(17));
+        OwnItem { position: index as usize - 1, item: ItemRef::new("terrain", id), key }
+    }
+
+    /// A shard with one item, `a` in the first and so on.
     fn description(index: u32, count: u32) -> Description {
+        let id = |index: u32| char::from(b'a' + (index as u8 - 1)).to_string();
+        let all: Vec<OwnItem> = (1..=count.clamp(1, 26)).map(|index| own(index, &id(index))).collect();
         Description {
             part: Part { index, count },
             program: "sastrugi".to_owned(),
             study_sha256: "ab".to_owned(),
-            items: vec![(ItemRef::new("terrain", "a"), "0".repeat(32))],
+            study_items: StudyItems::of(all.iter().map(|own| (&own.item, own.key.as_str()))),
+            items: all.into_iter().filter(|own| own.position + 1 == index as usize).collect(),
             failures: Vec::new(),
             splits: Splits::new(),
         }
@@ -509,8 +570,8 @@ mod tests {
     fn val_only_complete_sets_are_merged() {
         let folders = ["one", "two", "three"].map(PathBuf::from);
         let check = |shards: &[Description]| {
-            let mut placed = Vec::new();
-            folders.iter().zip(shards.iter().cloned()).for_each(|(folder, shard)| place(&mut placed, folder, shard));
+            let placed = folders.iter().zip(shards.iter().cloned());
+            let placed: Vec<Placed<'_>> = placed.map(|(folder, shard)| Placed { folder, shard }).collect();
             check_set(&placed).join("; ")
         };
         assert_eq!(check(&[description(3, 3), description(1, 3), description(2, 3)]), "");
@@ -521,13 +582,39 @@ mod tests {
         assert_eq!(check(&[description(1, 3)]), format!("shards 2-3 of 3 are missing; {}", mend(&[2, 3], 3)));
         assert_eq!(check(&[description(1, 2), description(1, 2)]), "two and one are both shard 1");
         let counted = "two is one of 3 shards by sastrugi; expected one of 2 by sastrugi";
-        assert_eq!(check(&[description(1, 2), description(2, 3)]), counted);
+        let of_three = Description { study_items: description(1, 2).study_items, ..description(2, 3) };
+        assert_eq!(check(&[description(1, 2), of_three]), counted);
         let other = Description { study_sha256: "cd".to_owned(), ..description(2, 2) };
-        let items = Description { items: Vec::new(), ..description(2, 2) };
+        let items = Description { study_items: description(2, 3).study_items, ..description(2, 2) };
         for stranger in [other, items] {
             let error = check(&[description(1, 2), stranger]);
             assert_eq!(error, "two is from another study, or another revision of the program, than one");
         }
+    }
+
+    /// The lists of a complete set, in whatever order, are the list of the study; one that lacks an item, has another, or has one twice is
+    /// refused.
+    #[test]
+    fn val_the_lists_of_shards_are_one_list() {
+        let folder = PathBuf::from("shard");
+        let all = |shards: Vec<Description>| {
+            let mut placed: Vec<Placed<'_>> =
+                shards.into_iter().map(|shard| Placed { folder: &folder, shard }).collect();
+            let items = all_items(&mut placed);
+            assert!(items.is_err() || placed.iter().all(|placed| placed.shard.items.is_empty()));
+            items.map(|items| items.into_iter().map(|own| own.item.id).collect::<String>())
+        };
+        assert_eq!(all(vec![description(3, 3), description(1, 3), description(2, 3)]).unwrap(), "abc");
+        let changed = |items: Vec<OwnItem>| {
+            let error = all(vec![description(1, 3), Description { items, ..description(2, 3) }, description(3, 3)]);
+            let expected =
+                format!("the items that the shards list are not those of the study; {}", mend(&[1, 2, 3], 3));
+            assert_eq!(error.unwrap_err().to_string(), expected);
+        };
+        changed(Vec::new());
+        changed(vec![own(2, "x")]);
+        changed(vec![own(2, "b"), own(2, "b")]);
+        changed(vec![OwnItem { key: "1".repeat(32), ..own(2, "b") }]);
     }
 
     /// The numbers of shards to run again can be given to Slurm as they are.
@@ -553,9 +640,11 @@ mod tests {
             assert!(error.starts_with(&format!("part {index} of {count} is invalid")), "{error}");
         }
         for id in ["../a", "a/../../b", "", ".hidden"] {
-            let items = vec![(ItemRef::new("terrain", id), "0".repeat(32))];
+            let items = vec![own(1, id)];
             assert!(Description { items, ..description(1, 1) }.check().is_err(), "{id}");
         }
+        let error = Description { items: vec![own(1, "a")], ..description(2, 3) }.check().unwrap_err();
+        assert_eq!(error, "terrain/a does not belong to part 2 of 3");
     }
 
     /// Results that change while they are merged stay where they are; each shard is named with what to run again.
