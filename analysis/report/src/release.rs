@@ -8,8 +8,8 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::manifest::Manifest;
 use sastrugi_schemas::study::{HypothesisItem, RoughnessSection};
 use sastrugi_schemas::tables::{
-    FormationSampleRow, HeightDistributionRow, LogRow, ProfilePsdRow, PsdRow, RoutePointRow, RoverSampleRow, SampleRow,
-    StructureRow, TerrainRow, in_order,
+    FormationSampleRow, HeightDistributionRow, LogRow, ProfilePsdRow, PsdRow, RoutePointRow, RoverRow, RoverSampleRow,
+    SampleRow, StructureRow, TerrainRow, in_order,
 };
 use sastrugi_store::release::{MANIFEST, SHARD, STUDY, TABLES};
 use sastrugi_store::{dem, digest, parquet};
@@ -41,7 +41,8 @@ impl Data {
         }
         let toml = release.text(STUDY)?.unwrap_or_default();
         let study = study(&toml).map_err(|e| read_error(STUDY, e))?;
-        let terrains: Vec<TerrainRow> = release.rows()?;
+        let rovers: Vec<RoverRow> = release.rows()?;
+        let terrains = release.terrains(!rovers.is_empty())?;
         let without_curves = without_curves(study.seed, &terrains);
         let kept = |surface_id: &str| !without_curves.contains(surface_id);
         let (contents, manifest) = release.contents(&terrains)?;
@@ -72,7 +73,7 @@ impl Data {
             photoclinometry_bands: release.rows()?,
             formations: release.rows()?,
             formation_events: release.rows()?,
-            rovers: release.rows()?,
+            rovers,
             rover_effects: release.rows()?,
             parameters: release.rows()?,
             contents,
@@ -246,6 +247,17 @@ impl Release {
     /// Calls `f` with every row of a file, if it exists.
     fn for_each_row<R: Record>(&self, path: &str, f: impl FnMut(R)) -> Result<(), ReportError> {
         self.read(path, |file| parquet::for_each_row(file, f)).map(|_| ())
+    }
+
+    /// All heightfields, sorted by id. The parameters of generated ones, 1 to 2 kB of each, are read only of the worlds of rovers.
+    fn terrains(&self, with_parameters: bool) -> Result<Vec<TerrainRow>, ReportError> {
+        let (rows, is_sorted) = self.rows_as_stored(|mut row: TerrainRow| {
+            if !with_parameters && row.stage == "terrain" {
+                row.params = String::new();
+            }
+            Some(row)
+        })?;
+        Ok(if is_sorted { rows } else { in_order(rows) })
     }
 
     /// All missions, sorted by terrain and id, with shared names.
