@@ -37,6 +37,13 @@ def agreement(ours, theirs):
     return {"same": same, "kappa": kappa, "only_ours": split[0], "only_theirs": split[1], "mcnemar_p": mcnemar_exact(*split)}
 
 
+def geometric(ours, theirs):
+    """Ratio of the geometric means of paired values, and its standard error over the pairs."""
+    logarithms = np.log(ours) - np.log(theirs)
+    ratio = float(np.exp(np.mean(logarithms)))
+    return ratio, ratio * float(np.std(logarithms, ddof=1)) / math.sqrt(len(logarithms))
+
+
 def check_figures(release, rows):
     """Largest relative difference of the release's metrics from those of its samples by the peer's formulas; NaN if any is."""
     differences = []
@@ -68,12 +75,15 @@ def main():
     print(f" (McNemar p {agreed['mcnemar_p']:.3f})\n")
 
     both = success[0] & success[1]
-    print(f"| where both succeed ({both.sum()}) | sastrugi | MuJoCo | ratio | correlation |\n|---|---|---|---|---|")
-    ratios = {}
+    head = "sastrugi | MuJoCo | ratio | ratio of geometric means | correlation"
+    print(f"| medians where both succeed ({both.sum()}) | {head} |\n|---|---|---|---|---|---|")
+    ratios, means = {}, {}
     for key, label in [*FIGURES.items(), ("time_s", "time, s")]:
         a, b = (np.array([row[key] for row in side])[both] for side in (rows, theirs))
         ratios[key] = float(np.median(a) / np.median(b))
-        print(f"| median {label} | {np.median(a):.3f} | {np.median(b):.3f} | {ratios[key]:.3f} | {np.corrcoef(a, b)[0, 1]:.3f} |")
+        means[key], error = geometric(a, b)
+        medians = f"{np.median(a):.3f} | {np.median(b):.3f} | {ratios[key]:.3f}"
+        print(f"| {label} | {medians} | {means[key]:.3f} +- {error:.3f} | {np.corrcoef(a, b)[0, 1]:.3f} |")
     print("\n| outcomes | " + " | ".join(OUTCOMES) + " |\n|---|" + "---|" * len(OUTCOMES))
     for name, side in (("sastrugi", rows), ("MuJoCo", theirs)):
         print(f"| {name} | " + " | ".join(str(sum(row["outcome"] == o for row in side)) for o in OUTCOMES) + " |")
@@ -87,6 +97,7 @@ def main():
         "figures_error": check_figures(release, rows),
         "real_time_factor": speed,
         "ratios": ratios,
+        "geometric": means,
         **agreed,
     }
     print(json.dumps(found))

@@ -1,8 +1,9 @@
 """Drives the missions of a release in MuJoCo and prints their outcomes as JSON.
 
-    drive.py RELEASE VEHICLE.toml [--processes N] [--terrain ID] [--mission ID --poses FILE.csv]
+    drive.py RELEASE VEHICLE.toml [--processes N] [--terrain ID] [--traverse ID] [--mission ID --poses FILE.csv]
 
-With `--poses` the poses of both engines on one mission go to a CSV file for plotting.
+With `--traverse`, missions of that run alone are driven, with its settings. With `--poses` the poses of both engines on one mission go to a CSV
+file for plotting.
 """
 
 import argparse
@@ -115,16 +116,17 @@ class Judge:
         return "timeout" if time_s >= self.rules["timeout_s"] else None
 
 
-def course_of(release, terrain_id, vehicle_file):
-    """A terrain of a release, and its missions."""
-    missions = [row for row in release_files.missions(release) if row["terrain_id"] == terrain_id]
+def course_of(release, terrain_id, vehicle_file, traverse=None):
+    """A terrain of a release, and its missions, of one run if given."""
+    rows = release_files.missions(release)
+    missions = [row for row in rows if row["terrain_id"] == terrain_id and traverse in (None, row["traverse_id"])]
     rules, vehicle = release_files.parameters(release, missions[0]), release_files.vehicle(vehicle_file)
     return Course(release_files.Terrain.of(release, terrain_id), rules, vehicle), missions
 
 
-def drive_terrain(release, terrain_id, vehicle_file):
+def drive_terrain(release, terrain_id, vehicle_file, traverse):
     """Every mission of a terrain, and statistics of the computation."""
-    course, missions = course_of(release, terrain_id, vehicle_file)
+    course, missions = course_of(release, terrain_id, vehicle_file, traverse)
     at_centres, between = course.largest_height_error()
     driven, simulated, start = [], 0.0, time.process_time()
     for mission in missions:
@@ -138,11 +140,11 @@ def drive_terrain(release, terrain_id, vehicle_file):
     return {"missions": driven, "simulated_s": simulated, "cpu_s": spent, "height_error_m": [at_centres, between]}
 
 
-def drive_release(release, vehicle_file, processes, only=None):
+def drive_release(release, vehicle_file, processes, only=None, traverse=None):
     rows = release_files.missions(release)
     terrains = sorted({row["terrain_id"] for row in rows if only in (None, row["terrain_id"])})
     with ProcessPoolExecutor(processes) as pool:
-        jobs = [pool.submit(drive_terrain, release, terrain, vehicle_file) for terrain in terrains]
+        jobs = [pool.submit(drive_terrain, release, terrain, vehicle_file, traverse) for terrain in terrains]
         done = [job.result() for job in jobs]
     return {
         "mujoco": mujoco.__version__,
@@ -172,13 +174,15 @@ def main():
     parser.add_argument("vehicle", type=Path)
     parser.add_argument("--processes", type=int, default=2)
     parser.add_argument("--terrain")
+    parser.add_argument("--traverse")
     parser.add_argument("--mission")
     parser.add_argument("--poses", type=Path)
     arguments = parser.parse_args()
     if arguments.poses:
         write_poses(arguments.release, arguments.vehicle, arguments.terrain, arguments.mission, arguments.poses)
     else:
-        json.dump(drive_release(arguments.release, arguments.vehicle, arguments.processes, arguments.terrain), sys.stdout)
+        a = arguments
+        json.dump(drive_release(a.release, a.vehicle, a.processes, a.terrain, a.traverse), sys.stdout)
 
 
 if __name__ == "__main__":

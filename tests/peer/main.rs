@@ -18,17 +18,40 @@ use std::process::Command;
 /// Published fractal dimensions of the high-frequency layer.
 const GROUPS: [&str; 3] = ["2.30", "2.45", "2.60"];
 const TERRAINS_PER_GROUP: usize = 4;
-const MISSIONS_PER_TERRAIN: usize = 20;
+const MISSIONS_PER_TERRAIN: usize = 10;
+/// Seeds that are used only here, and were chosen before their first run.
+const SEEDS: [u64; 2] = [20261201, 20261202];
 
-/// Our vehicle as it is.
-const OUR_WHEEL: &str = "";
-/// Our vehicle on the engine's wheels.
+/// A wheel of our vehicle.
+struct Wheel {
+    name: &'static str,
+    /// Lines of the traverse.
+    lines: &'static str,
+    /// Metrics, and by how much their ratios of geometric means may differ from 1.
+    bounds: [(&'static str, f64); 3],
+}
+
+static WHEELS: [Wheel; 2] = [
+    Wheel {
+        name: "our wheel",
+        lines: "",
+        // The engine's wheels are hard, so its vehicle accelerates more.
+        bounds: [("rms_pitch_rate_deg_s", 0.1), ("rms_roll_rate_deg_s", 0.1), ("rms_vertical_acceleration_m_s2", 0.25)],
+    },
+    Wheel {
+        name: "the engine's wheel",
+        lines: HARD_WHEEL,
+        bounds: [("rms_pitch_rate_deg_s", 0.1), ("rms_roll_rate_deg_s", 0.1), ("rms_vertical_acceleration_m_s2", 0.1)],
+    },
+];
+/// The engine's wheels on our vehicle.
 const HARD_WHEEL: &str = include_str!("hard_wheel.toml");
+/// Trials of other wheels.
+const TRIALS: &str = include_str!("trials.toml");
 
-/// Four terrains for each fractal dimension with 20 missions each, from a seed that is used only here; `wheel` has lines of the
-/// traverse.
-fn study(wheel: &str) -> String {
-    let mut text = "[study]\nname = \"peer\"\nseed = 20261122\ndate = \"2026-11-21\"\n".to_owned();
+/// Four terrains for each fractal dimension with ten missions each; `wheel` has lines of the traverse.
+fn study(wheel: &str, seed: u64) -> String {
+    let mut text = format!("[study]\nname = \"peer\"\nseed = {seed}\ndate = \"2026-11-27\"\n");
     for group in GROUPS {
         writeln!(
             text,
@@ -61,18 +84,17 @@ fn script(python: &Path, name: &str, arguments: &[&Path]) -> Called {
     call
 }
 
-/// Our program drives the study's missions into the release `name`. The terrains are made once.
-fn driven(folder: &Path, name: &str, wheel: &str) -> PathBuf {
-    let file = format!("{name}.toml");
-    write(folder, &file, &study(wheel));
-    let call = sastrugi_in(folder, &["run", &file, "-o", name, "--work", "work", "--quiet"]);
+/// Our program drives the study's missions into the release `name`. The terrains of a seed are made once.
+fn driven(folder: &Path, name: &str, wheel: &str, seed: u64) -> PathBuf {
+    let (file, work) = (format!("{name}.toml"), format!("work-{seed}"));
+    write(folder, &file, &study(wheel, seed));
+    let call = sastrugi_in(folder, &["run", &file, "-o", name, "--work", &work, "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
     folder.join(name)
 }
 
-/// A release beside the engine's missions: prints the tables of `compare.py` and checks what both engines must share; the medians of
-/// `rates` must agree within 10 %.
-fn assert_alike(python: &Path, release: &Path, peer: &Path, rates: &[&str]) {
+/// A release beside the engine's missions: prints the tables of `compare.py` and checks what both engines must share.
+fn assert_alike(python: &Path, release: &Path, peer: &Path, wheel: &Wheel) {
     let compared = script(python, "compare.py", &[release, peer]).stdout;
     let (table, figures) = compared.trim_end().rsplit_once('\n').unwrap();
     println!("{table}\n");
@@ -82,27 +104,53 @@ fn assert_alike(python: &Path, release: &Path, peer: &Path, rates: &[&str]) {
     assert!(figure("/height_error_m") < 1e-5, "the peer drives on other ground: {figures}");
     assert!(figure("/figures_error") < 1e-6, "the peer computes figures in another way: {figures}");
     assert!(figure("/same") >= 0.8, "{figures}");
-    for rate in rates {
-        let ratio = figure(&format!("/ratios/{rate}"));
-        assert!((ratio - 1.0).abs() <= 0.1, "{rate}: {ratio}");
+    for (metric, bound) in wheel.bounds {
+        let ratio = figure(&format!("/geometric/{metric}"));
+        assert!((ratio - 1.0).abs() <= bound, "{}: {metric}: {ratio}", wheel.name);
     }
 }
 
-/// The same outcome (success or not) on 80 % of 240 missions, and medians of pitch and roll rate within 10 %, over the missions on
-/// which both succeed; on the engine's own wheels (`hard_wheel.toml`) the vertical acceleration as well, so a difference on ours comes
-/// from the wheels. The bounds are agreed ones, not a statistical test: the seed is fixed, and our side is the same every time,
-/// bit for bit.
+/// For each of two seeds, the same outcome (success or not) on 80 % of 120 missions; over those on which both succeed, geometric means of pitch
+/// and roll rate within 10 %, and of vertical acceleration within 25 % with our wheels and within 10 % with the engine's (`hard_wheel.toml`), so
+/// the difference comes from the wheels. (Geometric means of 100 paired values have a standard error of 1 %, half that of medians.) The bounds
+/// are agreed ones, not a statistical test: the seeds are fixed, and our side is the same every time, bit for bit.
 #[test]
 #[ignore = "slow: ./test --full"]
 fn val_an_independent_engine_drives_the_same_missions() {
     let Some(python) = python() else { return };
     let folder = area();
-    let release = driven(folder.path(), "release", OUR_WHEEL);
-    let missions = script(&python, "drive.py", &[&release, &vehicle_file()]).stdout;
-    let peer = write(folder.path(), "peer.json", &missions);
-    let rates = ["rms_pitch_rate_deg_s", "rms_roll_rate_deg_s", "rms_vertical_acceleration_m_s2"];
-    assert_alike(&python, &release, &peer, &rates[..2]);
-    assert_alike(&python, &driven(folder.path(), "hard_wheel", HARD_WHEEL), &peer, &rates);
+    for seed in SEEDS {
+        let releases = WHEELS
+            .iter()
+            .enumerate()
+            .map(|(k, wheel)| (wheel, driven(folder.path(), &format!("release-{seed}-{k}"), wheel.lines, seed)));
+        let releases: Vec<(&Wheel, PathBuf)> = releases.collect();
+        let missions = script(&python, "drive.py", &[&releases[0].1, &vehicle_file()]).stdout;
+        let peer = write(folder.path(), &format!("peer-{seed}.json"), &missions);
+        for (wheel, release) in &releases {
+            println!("Seed {seed}, {}:\n", wheel.name);
+            assert_alike(&python, release, &peer, wheel);
+        }
+    }
+}
+
+/// The trials that explain the difference are a study that can be planned; one of them is the wheel that is checked above, and the script that
+/// prints their table starts from the unchanged vehicle.
+#[test]
+fn val_trials_of_other_wheels_can_be_driven() {
+    let trial = |id: &str, lines: &str| {
+        format!("[[traverse]]\nid = \"{id}\"\nmissions = \"straight\"\nvehicle = \"husky_a200\"\n{lines}\n")
+    };
+    let lines: Vec<&str> = HARD_WHEEL.lines().filter(|line| !line.starts_with('#')).collect();
+    assert!(
+        TRIALS.contains(&trial("unchanged", "")) && TRIALS.contains(&trial("hard-disc", &(lines.join("\n") + "\n")))
+    );
+    assert_eq!(TRIALS.matches("[[traverse]]").count(), 10);
+    let folder = area();
+    write(folder.path(), "trials.toml", TRIALS);
+    let call = sastrugi_in(folder.path(), &["plan", "trials.toml", "--json"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    assert!(call.stdout.contains("disc-1-tangent@d2.60-0002"), "{}", call.stdout);
 }
 
 /// r.walk of GRASS GIS on the measured catchment, 12 pairs: with the coefficients of our linear cost, and slopes so small that plan length equals
