@@ -104,7 +104,7 @@ pub fn release(dest: &Path, shape: &Shape) -> Result<(), ReleaseError> {
     };
     let mut builder = ReleaseBuilder::beside(dest, head)?;
     builder.write_text("study.toml", STUDY, Origin::default())?;
-    let part = |table| TablePart { table, name: TablePart::WHOLE.to_owned(), origin: Origin::default() };
+    let part = |table| TablePart { table, name: TablePart::WHOLE.to_owned(), origin: Default::default() };
     let parts = TABLES.iter().filter_map(|name| tables::by_name(name)).map(part).collect();
     builder.write_tables(parts, |part, writer| fill(part.table, shape, writer))?;
     builder.seal(dest).map(drop)

@@ -14,7 +14,7 @@ const STUDY: &str =
     "[study]\nname = \"made-up\"\ntitle = \"A <title>\"\nseed = 7\ndate = \"2026-11-21\"\ncreators = [\"A\", \"B\"]\n";
 
 fn write_table<R: Record + Sync>(builder: &mut ReleaseBuilder, name: &str, rows: Vec<R>) {
-    let part = TablePart { table: &R::TABLE, name: name.to_owned(), origin: Origin::default() };
+    let part = TablePart { table: &R::TABLE, name: name.to_owned(), origin: Default::default() };
     let fill = |_: &TablePart, writer: &mut PartWriter<'_>| rows.iter().try_for_each(|row| writer.push(row.cells()));
     builder.write_tables(vec![part], fill).unwrap();
 }

@@ -256,7 +256,9 @@ fn entity(file: &Listed) -> String {
 }
 
 fn described_entity(id: &str, described: &Described<'_>) -> Value {
-    if let Some(found) = described.files.iter().find(|file| file.path() == id) {
+    // Files are sorted by path.
+    if let Ok(place) = described.files.binary_search_by(|file| file.path().cmp(id)) {
+        let found = &described.files[place];
         let mut file = json!({
             "@id": id,
             "@type": "File",

@@ -91,9 +91,9 @@ impl Fragments {
         let mut files = BTreeMap::new();
         for table in tables::ALL {
             let Some(of_table) = self.0.remove(table.name) else { continue };
-            let origin = of_table.origin();
+            let origin = Arc::new(of_table.origin());
             for (name, file) in of_table.files(table, splits) {
-                parts.push(TablePart { table, name: name.clone(), origin: origin.clone() });
+                parts.push(TablePart { table, name: name.clone(), origin: Arc::clone(&origin) });
                 files.insert((table.name, name), file);
             }
         }

@@ -64,7 +64,8 @@ struct Claimed {
 struct Written {
     bytes: u64,
     sha256: String,
-    origin: Origin,
+    content_sha256: String,
+    rows: u64,
 }
 
 /// One file of a table.
@@ -74,8 +75,8 @@ pub struct TablePart {
     pub table: &'static Table,
     /// Name of the part; the file is `part-<name>.parquet`.
     pub name: String,
-    /// Origin.
-    pub origin: Origin,
+    /// Origin, which the parts of a table share: it may list very many parents.
+    pub origin: Arc<Origin>,
 }
 
 impl TablePart {
@@ -228,13 +229,13 @@ impl ReleaseBuilder {
             let Some(writer) = rows.writer else { return Ok(None) };
             let summary = writer.finish().map_err(ReleaseError::from)?;
             let (bytes, sha256) = digest::of_file(target).map_err(ReleaseError::io(target))?;
-            let content_sha256 = Some(summary.content_sha256);
-            let origin = Origin { content_sha256, records: Some(summary.rows), ..part.origin.clone() };
-            Ok(Some(Written { bytes, sha256, origin }))
+            Ok(Some(Written { bytes, sha256, content_sha256: summary.content_sha256, rows: summary.rows }))
         };
         let written: Result<Vec<Option<Written>>, E> = parts.par_iter().zip(&claimed).map(write).collect();
-        for (claimed, written) in claimed.into_iter().zip(written?) {
-            if let Some(Written { bytes, sha256, origin }) = written {
+        for ((part, claimed), written) in parts.iter().zip(claimed).zip(written?) {
+            if let Some(Written { bytes, sha256, content_sha256, rows }) = written {
+                let (content_sha256, records) = (Some(content_sha256), Some(rows));
+                let origin = Origin { content_sha256, records, ..Origin::clone(&part.origin) };
                 self.list(claimed, bytes, &sha256, origin);
             }
         }

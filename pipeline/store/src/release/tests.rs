@@ -32,7 +32,7 @@ fn sealed(dest: &Path) -> Release {
     builder.write_text("README.md", "# Demo\n", Origin::default()).unwrap();
     builder.write_text(STUDY, STUDY_TEXT, Origin::default()).unwrap();
     builder.write_text("fit/a.json", "{}\n", Origin { stage: "fit".to_owned(), ..Origin::default() }).unwrap();
-    let single = |table| TablePart { table, name: TablePart::WHOLE.to_owned(), origin: Origin::default() };
+    let single = |table| TablePart { table, name: TablePart::WHOLE.to_owned(), origin: Default::default() };
     let fill = |part: &TablePart, writer: &mut PartWriter<'_>| {
         let rows = if part.table.name == PsdRow::TABLE.name { rows(9000) } else { Vec::new() };
         rows.iter().try_for_each(|row| writer.push(row.cells()))
