@@ -1,7 +1,7 @@
 //! The Husky over the published terrains (1009^2 cells of 5 cm), on one core, compared with a floor: the height lookups of its
 //! wheel rays alone.
 //!
-//! Items are time steps of 1/500 s, settling included: the real-time factor is items per second over 500. Targets: 500 000
+//! Items are time steps of 1/500 s, settling included: the real-time factor is items per second over 500. Targets: 1 500 000
 //! steps per second and core; 40 times the real-time factor of MuJoCo, which drives the same missions on the same terrains in
 //! the same run (`floors/traverse.py`, printed before the table with ours; its processor time is set against our elapsed
 //! time, the fastest of three, so other work on the machine only lowers the ratio). It needs the environment that

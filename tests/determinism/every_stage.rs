@@ -9,6 +9,8 @@ use std::collections::{BTreeMap, BTreeSet};
 use std::process::Command;
 
 const STUDY: &str = include_str!("every_stage.toml");
+/// Other flavours of recordings and rasters.
+const FLAVOURS: &str = include_str!("flavours.toml");
 
 /// The covariance of the snow that lies on one of the DEMs.
 const SNOW: &str = r#"{"model": "exponential", "parameters": {"sigma_m": 0.1, "range_m": 3.0}}"#;
@@ -23,6 +25,7 @@ impl EveryStage {
         let folder = area();
         let path = folder.path();
         write(path, "study.toml", STUDY);
+        write(path, "flavours.toml", FLAVOURS);
         for dem in [jacksboro(), pozo_blanca(), otira()] {
             std::fs::copy(&dem, path.join(dem.file_name().unwrap())).unwrap();
         }
@@ -35,8 +38,17 @@ impl EveryStage {
 
     /// The checksums of the release that `program`, perhaps within an emulator, makes of the study in a folder of this name.
     pub fn release(&self, name: &str, program: &mut Command) -> BTreeMap<String, String> {
+        self.run("study.toml", name, program)
+    }
+
+    /// The same of the study of other flavours.
+    pub fn flavours(&self, name: &str, program: &mut Command) -> BTreeMap<String, String> {
+        self.run("flavours.toml", &format!("flavours-{name}"), program)
+    }
+
+    fn run(&self, study: &str, name: &str, program: &mut Command) -> BTreeMap<String, String> {
         let path = self.folder.path();
-        let call = called(program.args(["run", "study.toml", "-o", name, "--quiet"]).current_dir(path));
+        let call = called(program.args(["run", study, "-o", name, "--quiet"]).current_dir(path));
         assert_eq!(call.code, 0, "{name}: {}", call.stderr);
         sums(&path.join(name))
     }
