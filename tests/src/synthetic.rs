@@ -270,7 +270,7 @@ fn fit_row(table: &Table) -> Vec<Cell> {
         "trim_level" => Some(Cell::F64(0.05)),
         "interval_level" => Some(Cell::F64(0.95)),
         name if name.ends_with("_p") => Some(Cell::F64(0.5)),
-        "block_sigma_low_m" | "block_range_low_m" | "increment_1m_m" | "hurst" => Some(Cell::F64(f64::NAN)),
+        "block_sigma_low_m" | "block_range_low_m" | "increment_1m_m" | "hurst" => Some(Cell::Null),
         "warnings" | "replicates" | "block_replicates" => None,
         _ => Some(Cell::F64(1.0)),
     })
@@ -284,7 +284,7 @@ fn covariance_row(table: &Table, bin: i64) -> Vec<Cell> {
         "azimuth_deg" => Some(Cell::Null),
         "pairs" => Some(Cell::I64(4000)),
         "lag_m" => Some(Cell::F64(lag_m)),
-        "covariance_low_m2" | "covariance_high_m2" => Some(Cell::F64(f64::NAN)),
+        "covariance_low_m2" | "covariance_high_m2" => Some(Cell::Null),
         _ => Some(Cell::F64(0.01 * libm::exp(-lag_m))),
     })
 }
