@@ -49,7 +49,7 @@ fn qemu() -> Option<PathBuf> {
     installed("engines/qemu/usr/bin/qemu-x86_64", "tests/engines/set_up qemu")
 }
 
-/// Prints the table of `docs/release.md`, with the first half of the SHA-256 of `SHA256SUMS`. Bags of ROS 2 and cloud-optimised GeoTIFFs, which are
+/// Prints the table of `docs/release.md`, with the first 16 digits of the SHA-256 of `SHA256SUMS`. Bags of ROS 2 and cloud-optimised GeoTIFFs, which are
 /// not in that study, are compared too. The emulated processors run side by side: each is busy with one core for most of its time.
 #[test]
 #[ignore = "slow: ./test --full"]
