@@ -56,7 +56,7 @@ pub mod ground;
 pub mod ops;
 pub mod patch;
 pub mod resample;
-mod simd;
+pub mod simd;
 pub mod streams;
 pub mod sums;
 pub mod surface;

@@ -1,12 +1,12 @@
 //! Wide vectors on CPUs that have them, with the same bits as the baseline.
 //!
-//! An operation is compiled twice, for AVX2 and for any CPU, and the best version for the present CPU is run. It consists only of `+ - *`,
-//! each rounded separately (the compiler never fuses a product and a sum), so the choice changes no bit; tests run both versions and
-//! compare them.
+//! An operation is compiled twice, for AVX2 and for any CPU, and the best version for the present CPU is run. It consists only of
+//! `+ - * /` and comparisons, each rounded separately (the compiler never fuses a product and a sum), so the choice changes no bit; tests
+//! run both versions and compare them.
 
 use pulp::{Scalar256b, Simd, WithSimd};
 
-/// Whether transforms and phases use wide vectors on this CPU; their bits are the same either way.
+/// Whether transforms, phases and contacts with the ground use wide vectors on this CPU; their bits are the same either way.
 pub fn uses_wide_vectors() -> bool {
     !matches!(Vectors::best(), Vectors::Baseline)
 }

@@ -9,13 +9,16 @@
 //!
 //! along and perpendicular to the normal `n`. Each point has its own bristle with deflection `s` in the tangent plane
 //! (`ds/dt = v_t`), so a hung-up vehicle does not slide. Points are grouped in rectangular tiles no wider than a wheel; a tile
-//! above the ceiling of the ground is skipped, and so is one that cannot have reached the ground since it was last checked.
+//! above the ceiling of the ground is skipped, and so is one that cannot have reached the ground since it was last checked. Heights
+//! below the points of a tile are computed four at a time; the forces of those that touch are summed in the order of the points.
 
 use super::clearance::Clearance;
 use super::contact::CULLING_MARGIN_M;
 use super::ground::Ground;
+use super::lanes::{LANES, Quad, all_clear};
 use super::params::{BellyParameters, VehicleParameters};
 use super::vector::{Axes, Vec3, add, add_scaled, cross, dot, norm, scale, sub};
+use pulp::{Simd, WithSimd, cast};
 use std::ops::Range;
 
 /// Points on each bumper.
@@ -26,6 +29,8 @@ const BUMPER_POINTS: u32 = 3;
 pub(crate) struct Belly {
     /// Points relative to the centre of mass, m, tile by tile.
     points: Vec<Vec3>,
+    /// The same points, four by four within each tile.
+    quads: Vec<Quad>,
     tiles: Vec<Tile>,
     /// Largest distance of a point from the centre of its tile, m.
     pub reach_m: f64,
@@ -37,13 +42,15 @@ pub(crate) struct Belly {
 #[derive(Clone, Debug)]
 struct Tile {
     points: Range<usize>,
+    quads: Range<usize>,
     centre: Vec3,
     half_size: Vec3,
 }
 
 impl Belly {
     pub(crate) fn new(parameters: &VehicleParameters, centre_of_mass: Vec3, tile_reach_m: f64) -> Self {
-        let mut belly = Self { points: Vec::new(), tiles: Vec::new(), reach_m: 0.0, extent_m: 0.0 };
+        let (points, quads, tiles) = (Vec::new(), Vec::new(), Vec::new());
+        let mut belly = Self { points, quads, tiles, reach_m: 0.0, extent_m: 0.0 };
         let (chassis, grid) = (&parameters.chassis, &parameters.belly);
         let at = |axis: usize, i: u32, n: u32| chassis.size_m[axis] * (f64::from(i) / f64::from(n - 1) - 0.5);
         let from_centre = |x: f64, y: f64, z: f64| sub([x, y, z], centre_of_mass);
@@ -76,7 +83,9 @@ impl Belly {
         let (centre, half_size) = (scale(add(low, high), 0.5), scale(sub(high, low), 0.5));
         self.reach_m = self.reach_m.max(norm(half_size));
         self.extent_m = self.points[range.clone()].iter().map(|&p| norm(p)).fold(self.extent_m, f64::max);
-        self.tiles.push(Tile { points: range, centre, half_size });
+        let first = self.quads.len();
+        self.quads.extend(Quad::of(&self.points[range.clone()]));
+        self.tiles.push(Tile { points: range, quads: first..self.quads.len(), centre, half_size });
     }
 
     /// Points relative to the centre of mass, m.
@@ -143,10 +152,31 @@ impl Belly {
         step_s: f64,
         bristles: &mut Bristles,
     ) -> Load {
+        bristles.clearance.moved(ground, motion.position, &motion.axes);
+        ground.vectors().run(Press { belly: self, ground, motion, parameters, friction, step_s, bristles })
+    }
+}
+
+/// The points of the chassis on the ground, over a time step.
+struct Press<'a> {
+    belly: &'a Belly,
+    ground: &'a Ground,
+    motion: &'a Motion,
+    parameters: &'a BellyParameters,
+    friction: f64,
+    step_s: f64,
+    bristles: &'a mut Bristles,
+}
+
+impl WithSimd for Press<'_> {
+    type Output = Load;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Load {
+        let Self { belly, ground, motion, parameters, friction, step_s, bristles } = self;
         let mut load = Load::default();
         let Bristles { deflections, bent, clearance } = bristles;
-        clearance.moved(ground, motion.position, &motion.axes);
-        for (index, (tile, bent)) in self.tiles.iter().zip(bent).enumerate() {
+        for (index, (tile, bent)) in belly.tiles.iter().zip(bent).enumerate() {
             if clearance.is_clear(index) {
                 continue;
             }
@@ -162,28 +192,64 @@ impl Belly {
             }
             // Near the edge of the ground, a small move may leave it.
             let mut least_m = if above_m == f64::NEG_INFINITY { above_m } else { f64::INFINITY };
-            for (&point, deflection) in self.points[tile.points.clone()].iter().zip(deflections) {
-                let arm = motion.axes.to_map(point);
-                let at = add(motion.position, arm);
-                let overlap = ground.height(at[0], at[1]) - at[2];
-                if overlap > 0.0 {
-                    let spot = Spot::new(overlap, ground.gradient(at[0], at[1]));
-                    let velocity = add(motion.velocity, cross(motion.rate, arm));
-                    let force = spot.push(velocity, parameters, friction, step_s, deflection);
-                    load.force = add(load.force, force);
-                    load.moment = add(load.moment, cross(arm, force));
-                    *bent = true;
-                    least_m = f64::NEG_INFINITY;
-                } else {
-                    *deflection = [0.0; 3];
-                    load.undefined |= overlap.is_nan();
-                    least_m = least_m.min(-overlap);
+            // Overlap of the point nearest to the ground, lane by lane, of those clear of it.
+            let mut nearest = simd.splat_f64s(f64::NEG_INFINITY);
+            for (quad, deflections) in belly.quads[tile.quads.clone()].iter().zip(deflections.chunks_mut(LANES)) {
+                let [arm_x, arm_y, arm_z] = to_map(simd, &motion.axes, quad);
+                let x = simd.add_f64s(simd.splat_f64s(motion.position[0]), arm_x);
+                let y = simd.add_f64s(simd.splat_f64s(motion.position[1]), arm_y);
+                let z = simd.add_f64s(simd.splat_f64s(motion.position[2]), arm_z);
+                let cells = ground.cells(simd, x, y);
+                let overlap = simd.sub_f64s(cells.heights(), z);
+                let overlaps: [f64; LANES] = cast(overlap);
+                if all_clear(&overlaps) {
+                    nearest = simd.max_f64s(nearest, overlap);
+                    if *bent {
+                        deflections.fill([0.0; 3]);
+                    }
+                    continue;
+                }
+                let [arm_x, arm_y, arm_z]: [[f64; LANES]; 3] = [cast(arm_x), cast(arm_y), cast(arm_z)];
+                let [hx, hy] = cells.gradients();
+                for (lane, deflection) in deflections.iter_mut().enumerate() {
+                    let overlap = overlaps[lane];
+                    if overlap > 0.0 {
+                        let arm = [arm_x[lane], arm_y[lane], arm_z[lane]];
+                        let spot = Spot::new(overlap, (hx[lane], hy[lane]));
+                        let velocity = add(motion.velocity, cross(motion.rate, arm));
+                        let force = spot.push(velocity, parameters, friction, step_s, deflection);
+                        load.force = add(load.force, force);
+                        load.moment = add(load.moment, cross(arm, force));
+                        *bent = true;
+                        least_m = f64::NEG_INFINITY;
+                    } else {
+                        *deflection = [0.0; 3];
+                        load.undefined |= overlap.is_nan();
+                        least_m = least_m.min(-overlap);
+                    }
                 }
             }
+            let nearest: [f64; LANES] = cast(nearest);
+            least_m = nearest.into_iter().fold(least_m, |least, overlap| least.min(-overlap));
             clearance.found(index, least_m);
         }
         load
     }
+}
+
+/// Points of the body in the map frame, as [`Axes::to_map`] turns each of them.
+#[inline(always)]
+fn to_map<S: Simd>(simd: S, axes: &Axes, points: &Quad) -> [S::f64s; 3] {
+    [turned(simd, axes, points, 0), turned(simd, axes, points, 1), turned(simd, axes, points, 2)]
+}
+
+/// One coordinate of points of the body in the map frame.
+#[inline(always)]
+fn turned<S: Simd>(simd: S, axes: &Axes, points: &Quad, axis: usize) -> S::f64s {
+    let forward = simd.mul_f64s(simd.splat_f64s(axes.x[axis]), cast(points.x));
+    let left = simd.mul_f64s(simd.splat_f64s(axes.y[axis]), cast(points.y));
+    let up = simd.mul_f64s(simd.splat_f64s(axes.z[axis]), cast(points.z));
+    simd.add_f64s(simd.add_f64s(forward, left), up)
 }
 
 impl Tile {
@@ -242,7 +308,11 @@ impl Spot {
 
 #[cfg(test)]
 mod tests {
+    use super::super::TraverseParameters;
+    use super::super::vector::normalised;
     use super::*;
+    use sastrugi_numeric::simd::Vectors;
+    use sastrugi_numeric::{Geometry, Grid};
 
     /// Contact of the equations below: k = 20 kN/m, a = 3 s/m, c = 40 N s/m.
     const CONTACT: BellyParameters = BellyParameters {
@@ -298,6 +368,69 @@ mod tests {
         // 20 kN/m x 0.8 mm x (1 + 3 s/m x 0.1 m/s).
         assert!(near(force, [-12.48, 0.0, 16.64], 1e-12), "{force:?}");
         assert!(near(bent, [0.0; 3], 1e-18), "{bent:?}");
+    }
+
+    /// Forces and bristles of all points, one after the other and without culling.
+    fn pressed_one_by_one(belly: &Belly, ground: &Ground, motion: &Motion, deflections: &mut [Vec3]) -> Load {
+        let mut load = Load::default();
+        for (&point, deflection) in belly.points.iter().zip(deflections) {
+            let arm = motion.axes.to_map(point);
+            let at = add(motion.position, arm);
+            let overlap = ground.height(at[0], at[1]) - at[2];
+            if overlap > 0.0 {
+                let spot = Spot::new(overlap, ground.gradient(at[0], at[1]));
+                let velocity = add(motion.velocity, cross(motion.rate, arm));
+                let force = spot.push(velocity, &CONTACT, 0.5, 0.002, deflection);
+                load.force = add(load.force, force);
+                load.moment = add(load.moment, cross(arm, force));
+            } else {
+                *deflection = [0.0; 3];
+                load.undefined |= overlap.is_nan();
+            }
+        }
+        load
+    }
+
+    /// Points in groups of four, with culling, give the bits of one point after the other: forces, moments and bristles of a chassis that
+    /// heaves and rolls over rough ground, with and without a hole in it.
+    #[test]
+    fn prop_groups_of_points_change_no_bit() {
+        let (vehicle, _) = TraverseParameters::default().prepare().unwrap();
+        let g = Geometry::square(120, 120, 0.05);
+        let height = |x: f64, y: f64| 0.04 * libm::sin(9.0 * x + 4.0 * y) + 0.02 * libm::cos(23.0 * y - 7.0 * x);
+        let whole = Grid::new(g, (0..g.len()).map(|k| height(g.x(k % g.cols), g.y(k / g.cols))).collect());
+        let mut holed = whole.clone();
+        (0..64).for_each(|k| holed.values[(56 + k / 8) * 120 + 56 + k % 8] = f64::NAN);
+        for (dem, has_hole) in [(whole, false), (holed, true)] {
+            let ground = Ground::new(&dem, &vehicle).unwrap();
+            let grounds = [Vectors::best(), Vectors::Baseline].map(|vectors| ground.clone().with_vectors(vectors));
+            let mut bristles = [vehicle.belly.at_rest(), vehicle.belly.at_rest()];
+            let mut reference = vec![[0.0; 3]; vehicle.belly.points.len()];
+            let (mut touching, mut clear, mut undefined) = (0, 0, 0);
+            for step in 0..1000 {
+                let t = 0.002 * f64::from(step);
+                let (sin, cos) = libm::sincos(7.0 * t);
+                let axes = Axes::of(normalised([0.1 * sin, 0.08 * cos, 0.3 * t, 1.0]));
+                let motion = Motion {
+                    position: [2.0 + t, 2.5 + 0.4 * t, 0.16 + 0.14 * libm::sin(5.0 * t)],
+                    velocity: [1.0, 0.4, 0.7 * libm::cos(5.0 * t)],
+                    rate: [1.4 * cos, -1.1 * sin, 0.6],
+                    axes,
+                };
+                let load = pressed_one_by_one(&vehicle.belly, &ground, &motion, &mut reference);
+                let bits = |load: &Load| [load.force, load.moment].map(|v| v.map(f64::to_bits));
+                for (ground, bristles) in grounds.iter().zip(&mut bristles) {
+                    let found = vehicle.belly.press(ground, &motion, &CONTACT, 0.5, 0.002, bristles);
+                    assert_eq!((bits(&found), found.undefined), (bits(&load), load.undefined), "step {step}");
+                    assert_eq!(bristles.deflections, reference, "step {step}");
+                }
+                touching += usize::from(load.force[2] > 0.0);
+                clear += usize::from(load.force[2] == 0.0);
+                undefined += usize::from(load.undefined);
+            }
+            assert!(touching > 100 && clear > 100, "{touching} {clear}");
+            assert_eq!(undefined > 0, has_hole, "{undefined}");
+        }
     }
 
     /// Every point belongs to exactly one run, in order, and no run is longer than stated.

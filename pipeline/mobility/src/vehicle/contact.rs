@@ -17,20 +17,24 @@
 //! Stiffness of a ray: on level ground, the static load `W` must make the wheel sag by `W / stiffness`, so `k` is `W` divided
 //! by the summed depths of all tips at that sag, whatever their number.
 //!
-//! Symbols: `x`, `y`, `z` body axes; `r` wheel radius, m. Cost: one height lookup per ray that reaches below the ceiling of the
-//! ground around the wheel.
+//! Symbols: `x`, `y`, `z` body axes; `r` wheel radius, m. Cost: one height lookup per four neighbouring rays, unless all of them end
+//! above the ceiling of the ground around the wheel.
 
 use super::ground::Ground;
+use super::lanes::{LANES, Quad, all_clear};
 use super::params::VehicleParameters;
 use super::vector::{Axes, Vec3, add, add_scaled, cross, norm, scale};
+use pulp::{Simd, WithSimd, cast};
 use sastrugi_schemas::ParameterError;
 
 /// The contact geometry of one wheel.
 #[derive(Clone, Debug)]
 pub(crate) struct Tyre {
     pub radius_m: f64,
-    /// Sine and cosine of the rays' angles, times the radius, m.
-    rays: Vec<[f64; 2]>,
+    /// The rays of a disc, from behind to ahead.
+    rays: Vec<Rays>,
+    /// Number of rays of a disc.
+    rays_per_disc: usize,
     /// Lateral offsets of the discs, left positive, m.
     discs: Vec<f64>,
     ray_stiffness_n_m: f64,
@@ -63,44 +67,124 @@ impl Tyre {
         let ray_stiffness_n_m = static_load_n / (depths * discs.len() as f64);
         let half_width = discs.iter().fold(0.0, |widest: f64, d| widest.max(d.abs()));
         let reach_m = (radius_m * radius_m + half_width * half_width).sqrt();
-        Ok(Self { radius_m, rays, discs, ray_stiffness_n_m, reach_m })
+        let (rays_per_disc, rays) = (rays.len(), Rays::of(&rays).collect());
+        Ok(Self { radius_m, rays, rays_per_disc, discs, ray_stiffness_n_m, reach_m })
     }
 
     /// Stiffness of a wheel with all rays in the ground, N/m: the largest for which the time step must be stable.
     pub(crate) fn stiffness_max_n_m(&self) -> f64 {
-        self.ray_stiffness_n_m * (self.rays.len() * self.discs.len()) as f64
+        self.ray_stiffness_n_m * (self.rays_per_disc * self.discs.len()) as f64
     }
 
     /// Ray tips from the hub in the middle plane of a wheel, in the map frame.
-    pub(crate) fn rim(&self, axes: &Axes, rim: &mut Vec<Vec3>) {
+    pub(crate) fn rim(&self, axes: &Axes, rim: &mut Vec<Tips>) {
         rim.clear();
-        rim.extend(self.rays.iter().map(|&[forward, down]| add_scaled(scale(axes.x, forward), axes.z, -down)));
+        rim.extend(self.rays.iter().map(|rays| rays.tips(axes)));
     }
 
     /// All ray tips of a wheel with its hub at `hub`.
-    pub(crate) fn tips<'a>(&'a self, hub: Vec3, left: Vec3, rim: &'a [Vec3]) -> impl Iterator<Item = Vec3> + 'a {
-        self.discs.iter().flat_map(move |&offset| rim.iter().map(move |&ray| add(add_scaled(hub, left, offset), ray)))
+    pub(crate) fn tips<'a>(&'a self, hub: Vec3, left: Vec3, rim: &'a [Tips]) -> impl Iterator<Item = Vec3> + 'a {
+        self.discs.iter().flat_map(move |&offset| {
+            let centre = add_scaled(hub, left, offset);
+            rim.iter().flat_map(|tips| tips.points.points()).map(move |ray| add(centre, ray))
+        })
     }
 
     /// Normal force of the ground on a wheel with its hub at `hub`; `rim` comes from [`Self::rim`] for the same axes.
-    pub(crate) fn press(&self, ground: &Ground, hub: Vec3, axes: &Axes, rim: &[Vec3]) -> Pressing {
+    pub(crate) fn press(&self, ground: &Ground, hub: Vec3, axes: &Axes, rim: &[Tips]) -> Pressing {
         let ceiling = ground.ceiling(hub[0], hub[1]);
-        let mut total = Pressing::default();
         if hub[2] - self.reach_m - CULLING_MARGIN_M > ceiling {
-            return total;
+            return Pressing::default();
         }
-        for &offset in &self.discs {
-            let centre = add_scaled(hub, axes.y, offset);
-            for &ray in rim {
-                let tip = add(centre, ray);
-                if tip[2] > ceiling {
+        ground.vectors().run(Press { tyre: self, ground, hub, left: axes.y, rim, ceiling })
+    }
+}
+
+/// Up to four neighbouring rays: sine and cosine of their angles times the radius, m. Vacant lanes repeat the last ray.
+#[derive(Clone, Copy, Debug)]
+struct Rays {
+    forward: [f64; LANES],
+    down: [f64; LANES],
+    len: usize,
+}
+
+impl Rays {
+    fn of(rays: &[[f64; 2]]) -> impl Iterator<Item = Self> + '_ {
+        rays.chunks(LANES).map(|rays| {
+            let part = |part: usize| std::array::from_fn(|lane| rays[lane.min(rays.len() - 1)][part]);
+            Self { forward: part(0), down: part(1), len: rays.len() }
+        })
+    }
+
+    /// Their tips relative to the hub.
+    #[inline(always)]
+    fn tips(&self, axes: &Axes) -> Tips {
+        // For each ray `add_scaled(scale(axes.x, forward), axes.z, -down)`.
+        let mut points = Quad { x: [0.0; LANES], y: [0.0; LANES], z: [0.0; LANES], len: self.len };
+        for lane in 0..LANES {
+            let (forward, down) = (self.forward[lane], self.down[lane]);
+            points.x[lane] = axes.x[0] * forward + axes.z[0] * -down;
+            points.y[lane] = axes.x[1] * forward + axes.z[1] * -down;
+            points.z[lane] = axes.x[2] * forward + axes.z[2] * -down;
+        }
+        // NaN, which no comparison excludes, counts as the lowest.
+        let lower = |low: f64, z: f64| if z < low || z.is_nan() { z } else { low };
+        Tips { points, low_m: points.z.into_iter().fold(f64::INFINITY, lower) }
+    }
+}
+
+/// Tips of up to four neighbouring rays in the middle plane of a wheel, relative to its hub, in the map frame.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Tips {
+    points: Quad,
+    /// Height of the lowest, m.
+    low_m: f64,
+}
+
+/// The rays of one wheel on the ground.
+struct Press<'a> {
+    tyre: &'a Tyre,
+    ground: &'a Ground,
+    hub: Vec3,
+    left: Vec3,
+    rim: &'a [Tips],
+    ceiling: f64,
+}
+
+impl WithSimd for Press<'_> {
+    type Output = Pressing;
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Pressing {
+        let Self { tyre, ground, hub, left, rim, ceiling } = self;
+        let mut total = Pressing::default();
+        for &offset in &tyre.discs {
+            let centre = add_scaled(hub, left, offset);
+            for tips in rim {
+                // Rounding is monotonic: if the lowest tip lies above the ceiling, so do all.
+                if centre[2] + tips.low_m > ceiling {
                     continue;
                 }
-                let overlap = ground.height(tip[0], tip[1]) - tip[2];
-                if overlap > 0.0 {
-                    total.add(self.ray_stiffness_n_m * overlap, ground.gradient(tip[0], tip[1]), offset);
-                } else if overlap.is_nan() {
-                    total.undefined = true;
+                let x = simd.add_f64s(simd.splat_f64s(centre[0]), cast(tips.points.x));
+                let y = simd.add_f64s(simd.splat_f64s(centre[1]), cast(tips.points.y));
+                let z = simd.add_f64s(simd.splat_f64s(centre[2]), cast(tips.points.z));
+                let cells = ground.cells(simd, x, y);
+                let overlaps: [f64; LANES] = cast(simd.sub_f64s(cells.heights(), z));
+                if all_clear(&overlaps) {
+                    continue;
+                }
+                let heights: [f64; LANES] = cast(z);
+                let [hx, hy] = cells.gradients();
+                for lane in 0..tips.points.len {
+                    if heights[lane] > ceiling {
+                        continue;
+                    }
+                    let overlap = overlaps[lane];
+                    if overlap > 0.0 {
+                        total.add(tyre.ray_stiffness_n_m * overlap, (hx[lane], hy[lane]), offset);
+                    } else if overlap.is_nan() {
+                        total.undefined = true;
+                    }
                 }
             }
         }
@@ -111,7 +195,7 @@ impl Tyre {
 #[cfg(test)]
 impl Tyre {
     /// Elastic energy of a wheel's rays, J.
-    pub(crate) fn stored_j(&self, ground: &Ground, hub: Vec3, left: Vec3, rim: &[Vec3]) -> f64 {
+    pub(crate) fn stored_j(&self, ground: &Ground, hub: Vec3, left: Vec3, rim: &[Tips]) -> f64 {
         let stored = |tip: Vec3| {
             let (hx, hy) = ground.gradient(tip[0], tip[1]);
             let overlap = (ground.height(tip[0], tip[1]) - tip[2]).max(0.0);
@@ -187,8 +271,10 @@ pub(crate) struct Touch {
 #[cfg(test)]
 mod tests {
     use super::super::TraverseParameters;
+    use super::super::vector::normalised;
     use super::*;
-    use sastrugi_numeric::{Geometry, Grid};
+    use sastrugi_numeric::simd::Vectors;
+    use sastrugi_numeric::{Geometry, Grid, Streams};
 
     /// The Husky and a plane of gradient `(p, q)`, 6 m square.
     fn plane(p: f64, q: f64) -> (super::super::Vehicle, Ground) {
@@ -205,6 +291,67 @@ mod tests {
         let mut rim = Vec::new();
         tyre.rim(&LEVEL, &mut rim);
         tyre.press(ground, hub, &LEVEL, &rim)
+    }
+
+    /// The force on a wheel, one ray after the other.
+    fn pressed_one_by_one(tyre: &Tyre, ground: &Ground, hub: Vec3, axes: &Axes) -> Pressing {
+        let mut total = Pressing::default();
+        let ceiling = ground.ceiling(hub[0], hub[1]);
+        let of_group = |rays: &Rays| -> Vec<Vec3> {
+            let ray = |lane: usize| add_scaled(scale(axes.x, rays.forward[lane]), axes.z, -rays.down[lane]);
+            (0..rays.len).map(ray).collect()
+        };
+        let rays: Vec<Vec3> = tyre.rays.iter().flat_map(of_group).collect();
+        for &offset in &tyre.discs {
+            for &ray in &rays {
+                let tip = add(add_scaled(hub, axes.y, offset), ray);
+                let overlap = ground.height(tip[0], tip[1]) - tip[2];
+                if tip[2] > ceiling {
+                    assert!(overlap <= 0.0, "{tip:?}: {overlap}");
+                } else if overlap > 0.0 {
+                    total.add(tyre.ray_stiffness_n_m * overlap, ground.gradient(tip[0], tip[1]), offset);
+                } else if overlap.is_nan() {
+                    total.undefined = true;
+                }
+            }
+        }
+        total
+    }
+
+    /// Rays in groups of four give the bits of one ray after the other, for any number of them: wheels tilted at random on rough ground with a
+    /// hole, from clear of it to 8 cm deep.
+    #[test]
+    fn prop_groups_of_rays_change_no_bit() {
+        let g = Geometry::square(120, 120, 0.05);
+        let height = |x: f64, y: f64| 0.05 * libm::sin(9.0 * x + 4.0 * y) + 0.03 * libm::cos(23.0 * y - 7.0 * x);
+        let mut dem = Grid::new(g, (0..g.len()).map(|k| height(g.x(k % g.cols), g.y(k / g.cols))).collect());
+        (0..64).for_each(|k| dem.values[(56 + k / 8) * 120 + 36 + k % 8] = f64::NAN);
+        let mut stream = Streams::for_seed(6, "test").stream("wheels");
+        for (discs, rays) in [(3, 13), (1, 3), (2, 8), (5, 25)] {
+            let tyre = serde_json::json!({"tyre": {"discs": discs, "rays": rays, "stiffness_n_m": 5e3}});
+            let changes = tyre.as_object().unwrap().clone();
+            let parameters = TraverseParameters { vehicle_changes: changes, ..TraverseParameters::default() };
+            let (vehicle, _) = parameters.prepare().unwrap();
+            let ground = Ground::new(&dem, &vehicle).unwrap();
+            let grounds = [Vectors::best(), Vectors::Baseline].map(|vectors| ground.clone().with_vectors(vectors));
+            let (mut touching, mut undefined) = (0, 0);
+            for _ in 0..500 {
+                let axes = Axes::of(normalised([0.0, 1.0, 2.0, 3.0].map(|w| w + stream.uniform_in(-1.0, 1.0))));
+                let [x, y] = [0, 1].map(|_| stream.uniform_in(1.5, 4.5));
+                let hub = [x, y, height(x, y) + 0.1651 - stream.uniform_in(-0.04, 0.08)];
+                let mut rim = Vec::new();
+                vehicle.tyre.rim(&axes, &mut rim);
+                let reference = pressed_one_by_one(&vehicle.tyre, &ground, hub, &axes);
+                let bits = |p: &Pressing| (p.force.map(f64::to_bits), p.offset_moment.to_bits(), p.undefined);
+                for ground in &grounds {
+                    let found = vehicle.tyre.press(ground, hub, &axes, &rim);
+                    assert_eq!(bits(&found), bits(&reference), "{discs} {rays} {hub:?} {axes:?}");
+                }
+                touching += usize::from(reference.force[2] > 0.0);
+                undefined += usize::from(reference.undefined);
+            }
+            assert!(touching > 50 && undefined > 0, "{discs} {rays}: {touching} {undefined}");
+        }
     }
 
     /// At the static sag of 3.468 mm on level ground a wheel carries a quarter of the vehicle, straight up, on the point below its hub.

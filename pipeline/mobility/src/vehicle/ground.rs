@@ -6,11 +6,16 @@
 //! and can be skipped; the result is bit for bit the same. Where a centre within reach has no data, or lies beyond the
 //! terrain, the ceiling is infinite and nothing is skipped.
 //!
+//! Heights of four points are computed side by side ([`Ground::cells`]), with the bits of one at a time.
+//!
 //! Memory: eight bytes per cell and a rim of one vehicle length. Cost of building: two running maxima over the grid.
 
 use super::Vehicle;
+use super::lanes::LANES;
 use super::surface::{Friction, SurfaceMap};
+use pulp::{Simd, cast};
 use sastrugi_numeric::Grid;
+use sastrugi_numeric::simd::Vectors;
 
 /// Why a vehicle cannot drive on a terrain.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -70,6 +75,7 @@ pub struct Ground {
     extent_m: f64,
     surface: Option<SurfaceMap>,
     warnings: Vec<String>,
+    vectors: Vectors,
 }
 
 /// Rejects cells, m, that are larger than the vehicle: they do not resolve the relief that excites it.
@@ -139,6 +145,7 @@ impl Ground {
             extent_m: vehicle.extent_m(),
             surface: None,
             warnings: cell_warning(coarse_m, vehicle).into_iter().collect(),
+            vectors: Vectors::best(),
         })
     }
 
@@ -184,8 +191,37 @@ impl Ground {
         low + (high - low) * fy
     }
 
-    /// Derivatives `(dz/dx, dz/dy)` of the height at a point; NaN where undefined.
+    /// The vectors in which contact points are computed.
     #[inline(always)]
+    pub(crate) fn vectors(&self) -> Vectors {
+        self.vectors
+    }
+
+    /// The bilinear cells of four points.
+    #[inline(always)]
+    pub(crate) fn cells<S: Simd>(&self, simd: S, x: S::f64s, y: S::f64s) -> Cells<S> {
+        let ([x0, y0], [per_x, per_y]) = (self.origin, self.inverse_cell);
+        let u = simd.mul_f64s(simd.sub_f64s(x, simd.splat_f64s(x0)), simd.splat_f64s(per_x));
+        let v = simd.mul_f64s(simd.sub_f64s(y, simd.splat_f64s(y0)), simd.splat_f64s(per_y));
+        let ((i, west), (j, south)) = (floors(simd, u), floors(simd, v));
+        let a = self.corners(self.index(i[0], j[0]));
+        let b = self.corners(self.index(i[1], j[1]));
+        let c = self.corners(self.index(i[2], j[2]));
+        let d = self.corners(self.index(i[3], j[3]));
+        Cells {
+            simd,
+            south_west: cast([a[0], b[0], c[0], d[0]]),
+            south_east: cast([a[1], b[1], c[1], d[1]]),
+            north_west: cast([a[2], b[2], c[2], d[2]]),
+            north_east: cast([a[3], b[3], c[3], d[3]]),
+            fx: simd.sub_f64s(u, west),
+            fy: simd.sub_f64s(v, south),
+            per_cell: [simd.splat_f64s(per_x), simd.splat_f64s(per_y)],
+        }
+    }
+
+    /// Derivatives `(dz/dx, dz/dy)` of the height at a point; NaN where undefined.
+    #[cfg(test)]
     pub(crate) fn gradient(&self, x: f64, y: f64) -> (f64, f64) {
         let (k, fx, fy) = self.locate(x, y);
         let [sw, se, nw, ne] = self.corners(k);
@@ -216,13 +252,25 @@ impl Ground {
         self
     }
 
+    /// The same ground, its contacts computed with other vectors.
+    #[cfg(test)]
+    pub(crate) fn with_vectors(self, vectors: Vectors) -> Self {
+        Self { vectors, ..self }
+    }
+
     /// Index of the south-west corner of the bilinear cell that contains a point, and the position within the cell (0 to 1).
     #[inline(always)]
     fn locate(&self, x: f64, y: f64) -> (usize, f64, f64) {
         let u = (x - self.origin[0]) * self.inverse_cell[0];
         let v = (y - self.origin[1]) * self.inverse_cell[1];
         let ((i, west), (j, south)) = (floor(u), floor(v));
-        (j.wrapping_mul(self.cols).wrapping_add(i), u - west, v - south)
+        (self.index(i, j), u - west, v - south)
+    }
+
+    /// Index of the cell centre whose column and row are the low bits of two shifted positions ([`SHIFT`]).
+    #[inline(always)]
+    fn index(&self, col: u64, row: u64) -> usize {
+        (row as u32 as usize).wrapping_mul(self.cols).wrapping_add(col as u32 as usize)
     }
 
     /// Heights south-west, south-east, north-west, north-east of a bilinear cell; NaN beyond the rim.
@@ -236,14 +284,65 @@ impl Ground {
     }
 }
 
-/// Floor of a position in cells, as index and as number. Adding 3 x 2^51 leaves an integer in the low bits of the sum, for
-/// positions up to 2^31 (the rim keeps them positive near the terrain). A position half a rounding error below a cell is
-/// assigned to that cell or to its neighbour; the bilinear surface is the same there.
+/// The bilinear cells that contain four points, and the positions (0 to 1) within them.
+pub(crate) struct Cells<S: Simd> {
+    simd: S,
+    south_west: S::f64s,
+    south_east: S::f64s,
+    north_west: S::f64s,
+    north_east: S::f64s,
+    fx: S::f64s,
+    fy: S::f64s,
+    /// Cells per metre along x and along y.
+    per_cell: [S::f64s; 2],
+}
+
+impl<S: Simd> Cells<S> {
+    /// Heights of the points, m; NaN where undefined.
+    #[inline(always)]
+    pub(crate) fn heights(&self) -> S::f64s {
+        let low = between(self.simd, self.south_west, self.south_east, self.fx);
+        let high = between(self.simd, self.north_west, self.north_east, self.fx);
+        between(self.simd, low, high, self.fy)
+    }
+
+    /// Derivatives of the heights along x and along y; NaN where undefined.
+    #[inline(always)]
+    pub(crate) fn gradients(&self) -> [[f64; LANES]; 2] {
+        let simd = self.simd;
+        let low = simd.sub_f64s(self.south_east, self.south_west);
+        let high = simd.sub_f64s(self.north_east, self.north_west);
+        let rise_x = simd.add_f64s(low, simd.mul_f64s(simd.sub_f64s(high, low), self.fy));
+        let north = simd.add_f64s(self.north_west, simd.mul_f64s(high, self.fx));
+        let south = simd.add_f64s(self.south_west, simd.mul_f64s(low, self.fx));
+        let rise_y = simd.sub_f64s(north, south);
+        [cast(simd.mul_f64s(rise_x, self.per_cell[0])), cast(simd.mul_f64s(rise_y, self.per_cell[1]))]
+    }
+}
+
+/// `from + (to - from) share`
 #[inline(always)]
-fn floor(position: f64) -> (usize, f64) {
-    const SHIFT: f64 = 6_755_399_441_055_744.0;
+fn between<S: Simd>(simd: S, from: S::f64s, to: S::f64s, share: S::f64s) -> S::f64s {
+    simd.add_f64s(from, simd.mul_f64s(simd.sub_f64s(to, from), share))
+}
+
+/// Adding 3 x 2^51 leaves an integer in the low bits of the sum, for positions up to 2^31.
+const SHIFT: f64 = 6_755_399_441_055_744.0;
+
+/// Floor of a position in cells, as low bits and as number (the rim keeps positions positive near the terrain). A position half a
+/// rounding error below a cell is assigned to that cell or to its neighbour; the bilinear surface is the same there.
+#[inline(always)]
+fn floor(position: f64) -> (u64, f64) {
     let shifted = (position - 0.5) + SHIFT;
-    (shifted.to_bits() as u32 as usize, shifted - SHIFT)
+    (shifted.to_bits(), shifted - SHIFT)
+}
+
+/// [`floor`] of four positions.
+#[inline(always)]
+fn floors<S: Simd>(simd: S, positions: S::f64s) -> ([u64; LANES], S::f64s) {
+    let shift = simd.splat_f64s(SHIFT);
+    let shifted = simd.add_f64s(simd.sub_f64s(positions, simd.splat_f64s(0.5)), shift);
+    (cast(shifted), simd.sub_f64s(shifted, shift))
 }
 
 fn cell_warning(cell_m: f64, vehicle: &Vehicle) -> Option<String> {

@@ -31,6 +31,7 @@ mod controller;
 mod doubts;
 mod drive;
 mod ground;
+mod lanes;
 mod linkage;
 mod mechanism;
 mod model;

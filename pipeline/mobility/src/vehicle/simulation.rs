@@ -3,7 +3,7 @@
 use super::articulated;
 use super::belly::{Bristles, Load, Motion};
 use super::body::Body;
-use super::contact::Touch;
+use super::contact::{Tips, Touch};
 use super::drive::{Channel, Grip, Servo, Tread};
 use super::ground::Ground;
 use super::linkage::{Carrier, Joints};
@@ -43,8 +43,8 @@ pub(crate) struct Simulation<'a> {
     rolls: Vec<Roll>,
     /// The wheels of one channel that touch the ground.
     grips: Vec<Grip>,
-    rim: Vec<Vec3>,
-    steered_rim: Vec<Vec3>,
+    rim: Vec<Tips>,
+    steered_rim: Vec<Tips>,
     joint_forces: Vec<f64>,
     /// Force of the ground on the chassis in the last step, N.
     chassis_force: Vec3,

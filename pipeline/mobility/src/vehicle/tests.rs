@@ -9,6 +9,7 @@ use super::*;
 use crate::metrics::{Differentiator, EulerAngles, Metrics};
 use crate::missions::Mission;
 use proptest::prelude::*;
+use sastrugi_numeric::simd::Vectors;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
 use sastrugi_schemas::topics::{Event, EventKind, Recording};
 use serde_json::{Value, json};
@@ -533,6 +534,20 @@ fn prop_culling_changes_no_bit() {
         for index in 0..missions {
             let [with, without] = [&ground, &plain].map(|g| drive(g, &vehicle, &settings, &crossing(index)).unwrap());
             assert_eq!(with, without);
+        }
+    }
+}
+
+/// Contacts computed with vectors that every CPU has are, bit for bit, those of this CPU's widest.
+#[test]
+fn prop_vectors_change_no_bit() {
+    for (name, missions) in [("husky_a200", 4), (OTHERS[0], 1), (OTHERS[1], 1)] {
+        let (vehicle, settings) = prepared(|p| (p.vehicle, p.timeout_s) = (name.to_owned(), 8.0));
+        let ground = Ground::new(&ROUGH, &vehicle).unwrap();
+        let baseline = ground.clone().with_vectors(Vectors::Baseline);
+        for index in 0..missions {
+            let [wide, narrow] = [&ground, &baseline].map(|g| drive(g, &vehicle, &settings, &crossing(index)).unwrap());
+            assert_eq!(wide, narrow, "{name} {index}");
         }
     }
 }

@@ -2,7 +2,10 @@
 
 use super::actuation::{self, Command, Limits};
 use super::controller::{Controller, PlanPose, wrapped};
+use super::lanes::LANES;
 use super::*;
+use pulp::{Simd, WithSimd, cast};
+use sastrugi_numeric::simd::Vectors;
 use std::f64::consts::{FRAC_PI_4, PI};
 
 fn of(name: &str) -> Vehicle {
@@ -87,6 +90,55 @@ fn val_the_ceiling_is_the_highest_cell_within_reach() {
     let ground = Ground::new(&holed, &vehicle).unwrap();
     assert_eq!(ground.ceiling(3.1, 2.5), f64::INFINITY);
     assert!(ground.ceiling(4.5, 2.5).is_finite());
+}
+
+/// Heights and gradients of four points.
+struct FourPoints<'a> {
+    ground: &'a Ground,
+    x: [f64; LANES],
+    y: [f64; LANES],
+}
+
+impl WithSimd for FourPoints<'_> {
+    type Output = [[f64; LANES]; 3];
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
+        let cells = self.ground.cells(simd, cast(self.x), cast(self.y));
+        let [dx, dy] = cells.gradients();
+        [cast(cells.heights()), dx, dy]
+    }
+}
+
+/// Four points side by side have the bits of one at a time, with the vectors of this CPU and with those of every CPU: on the terrain,
+/// next to a hole, in the rim, beyond it, and at no finite place.
+#[test]
+fn prop_four_points_have_the_bits_of_one() {
+    let vehicle = of("husky_a200");
+    let mut dem = terrain([6.0, 5.0], |x, y| 0.3 * libm::sin(5.0 * x + 2.0 * y) + 0.1 * libm::cos(17.0 * y - 3.0 * x));
+    dem.values[50 * 120 + 60] = f64::NAN;
+    let ground = Ground::new(&dem, &vehicle).unwrap();
+    let same = |a: f64, b: f64| a.to_bits() == b.to_bits() || (a.is_nan() && b.is_nan());
+    let mut stream = Streams::for_seed(5, "test").stream("four-points");
+    let mut defined = 0;
+    for round in 0..2000 {
+        let mut x: [f64; LANES] = std::array::from_fn(|_| stream.uniform_in(-2.0, 8.0));
+        let y: [f64; LANES] = std::array::from_fn(|_| stream.uniform_in(-2.0, 7.0));
+        if round % 8 == 0 {
+            x[round / 8 % LANES] = [f64::NAN, f64::INFINITY, -1e300, 1e12, 3.0e9][round / 8 % 5];
+        }
+        for vectors in [Vectors::best(), Vectors::Baseline] {
+            let [heights, dx, dy] = vectors.run(FourPoints { ground: &ground, x, y });
+            for lane in 0..LANES {
+                let (z, (gx, gy)) = (ground.height(x[lane], y[lane]), ground.gradient(x[lane], y[lane]));
+                let at = (x[lane], y[lane]);
+                assert!(same(heights[lane], z), "{at:?}: {} {z}", heights[lane]);
+                assert!(same(dx[lane], gx) && same(dy[lane], gy), "{at:?}: {} {gx} {} {gy}", dx[lane], dy[lane]);
+                defined += usize::from(z.is_finite());
+            }
+        }
+    }
+    assert!((3000..15_000).contains(&defined), "{defined}");
 }
 
 /// On a plane of gradient (0.3, -0.4) a point loses at most `sqrt(1 + 0.25)` of its height per metre; heights are rounded to single
