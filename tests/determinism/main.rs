@@ -105,7 +105,7 @@ fn gold_the_traversal_study_is_the_same_everywhere() {
 }
 
 /// glibc is told that the CPU has neither FMA nor AVX2: its mathematical functions then change bits, ours must not.
-/// Transforms and phases query the CPU directly, which this does not reach; `emulated.rs` compares whole releases without wide vectors.
+/// Transforms, phases and contacts query the CPU directly, which this does not reach; `emulated.rs` compares whole releases without wide vectors.
 #[test]
 fn gold_the_cpu_changes_nothing() {
     let study = EveryStage::new();
