@@ -552,7 +552,7 @@ impl TextureJob {
             }
         };
         let filled = filled.map_err(JobError::new)?;
-        notes.extend([filled.to_string()].into_iter().chain(fill_note(fit)));
+        notes.extend([filled.to_string()].into_iter().chain(fill_note(fit, &self.method)));
         self.released(work, &filled.grid, &dem.info.crs, notes)
     }
 

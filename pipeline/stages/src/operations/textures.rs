@@ -21,34 +21,19 @@ pub fn on_site_cells(method: &str, parameters: &mut Value, cell_m: Option<[f64; 
     parameters["cell_m"] = if x == y { json!(x) } else { json!([x, y]) };
 }
 
-/// Refuses an FFT-MA texture of a measured covariance or of a residual for which memory is lacking, before it is bound to its fit: binding
-/// transforms such a covariance on the complete torus.
-///
-/// # Errors
-/// Parameters that the method refuses, too little memory.
-pub fn check_memory(method: &str, parameters: &Value, fit: &FitFile) -> Result<(), Error> {
-    let is_transformed = fit.map.is_some() || parameters["covariance"] == json!(CovarianceOf::Residual);
-    if method != fft_ma::kind().kind || !is_transformed {
-        return Ok(());
-    }
-    let prospect = Prospect {
-        torus_m: 0.0,
-        cell_m: fit.cell_m,
-        cells: None,
-        window_m: fit.window_m.map_or(0.0, |[x, y]| x.max(y)),
-        is_measured: fit.map.is_some(),
-        has_statistics: fit.statistics.is_some(),
-    };
-    let method = sastrugi_texture::method(method, parameters)?;
-    method.check_prospect(&prospect)?;
-    memory::check("the texture", method.cost_of(&prospect).memory_bytes)
-}
-
-/// A note on holes filled with an empirical fit.
-pub fn fill_note(fit: &FitFile) -> Option<String> {
+/// A note on holes filled by `method` with an empirical fit.
+pub fn fill_note(fit: &FitFile, method: &str) -> Option<String> {
     let model = &fit.map.as_ref()?.model;
-    let text = "the fit is empirical; holes are filled with the fitted model";
-    Some(format!("{text} ({model}), not with the measured covariance"))
+    Some(match sastrugi_texture::needs(method) {
+        Some(Needs::Statistics | Needs::Residual) => {
+            format!(
+                "the fit is empirical; the fitted model ({model}) weighs the measured cells around a hole, and is not the texture in it"
+            )
+        }
+        _ => format!(
+            "the fit is empirical; holes are filled with the fitted model ({model}), not with the measured covariance"
+        ),
+    })
 }
 
 /// A note on a texture added to the DEM to which its model was fitted; `background` states where to find that DEM without its
@@ -77,4 +62,24 @@ pub fn lay_onto(base: &Grid, texture: &Grid, periodic: bool, factors: Option<&Gr
         )));
     }
     sastrugi_texture::modulated_onto(base, texture, factors).map_err(JobError::new)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_schemas::fit::CovarianceMap;
+
+    /// Only a normal texture is that of the fitted model; without a measured covariance there is nothing to note.
+    #[test]
+    fn val_notes_on_filled_holes_name_what_the_model_is_for() {
+        let map = CovarianceMap { model: "exponential".to_owned(), ..CovarianceMap::default() };
+        let fit = FitFile { map: Some(map), ..FitFile::default() };
+        let said = |method: &str| fill_note(&fit, method).unwrap();
+        assert!(said("fft_ma").contains("holes are filled with the fitted model (exponential)"), "{}", said("fft_ma"));
+        for method in ["modulated", "wavelet_statistics", "quilting", "exemplar"] {
+            assert!(!said(method).contains("holes are filled with the fitted model"), "{}", said(method));
+            assert!(said(method).contains("the fitted model (exponential) weighs"), "{}", said(method));
+        }
+        assert_eq!(fill_note(&FitFile::default(), "quilting"), None);
+    }
 }

@@ -263,7 +263,7 @@ fn fill(request: &Request<'_>, path: &Path, fit: &FitFile) -> Result<Value, Erro
     };
     let filled = filled.map_err(|e| Error::Input(format!("{}: {e}", path.display())))?;
     notes.push(filled.to_string());
-    notes.extend(fill_note(fit));
+    notes.extend(fill_note(fit, request.method));
     let lost = dem::write(request.output, &filled.grid, &dem.info.crs, &request.options);
     notes.extend(lost.map_err(super::write_error)?);
     Ok(json!({
