@@ -95,6 +95,9 @@ const ERROR_MAX: f64 = 0.1;
 const ERROR_NOTE: f64 = 0.25;
 /// Log variance that matters.
 const NOTED_MIN: f64 = 0.1;
+/// Log variance below which patches of any width raise the flatness of increments by less than 5 %: a normal site has a few thousandths, with
+/// any range.
+const UNFELT: f64 = 0.01;
 /// Bytes per torus cell at the peak.
 const BYTES_PER_CELL: u64 = 44;
 /// Square root of the smallest eigenvalue of W, relative to the largest, that is synthesised.
@@ -244,8 +247,8 @@ impl Modulated {
     ///
     /// # Errors
     /// Statistics that are damaged; parameters out of range; a range of the amplitude shorter than 1.5 cells, or longer than a quarter of
-    /// a periodic texture's shorter side; a stated variance or range with which the covariance cannot be kept within 10 % of the variance; a
-    /// residual that is flat.
+    /// a periodic texture's shorter side (a fitted range is shortened to that where the amplitude hardly varies); a stated variance or range with
+    /// which the covariance cannot be kept within 10 % of the variance; a residual that is flat.
     pub fn new(
         statistics: &Statistics,
         shape: [usize; 2],
@@ -261,8 +264,15 @@ impl Modulated {
                 "has only one distinct height; the texture would be flat",
             ));
         }
-        let range_m = parameters.range_m.unwrap_or(statistics.modulation.range_m);
         let [dx, dy] = statistics.cell_m;
+        let range_m = parameters.range_m.unwrap_or_else(|| {
+            let fitted_m = statistics.modulation.range_m;
+            match parameters.periodic && log_variance < UNFELT {
+                // Just below the widest, which rounding might exceed.
+                true => fitted_m.min((1.0 - 1e-9) * widest_m(shape, statistics.cell_m)),
+                false => fitted_m,
+            }
+        });
         let range_cells = [range_m / dy, range_m / dx];
         let torus = torus(lags::reach(&statistics.covariance), shape, range_cells, parameters.periodic);
         check_range(range_m, range_cells, torus, statistics.cell_m)?;
@@ -398,10 +408,15 @@ fn check_range(range_m: f64, range_cells: [f64; 2], torus: [usize; 2], cell_m: [
         return refuse(format!("is {range_m}; it must be at least {RANGE_CELLS_MIN} cells, {needed_m} m"));
     }
     if [0, 1].iter().any(|&axis| range_cells[axis] > RANGE_SHARE_MAX * torus[axis] as f64) {
-        let most_m = RANGE_SHARE_MAX * (torus[0] as f64 * cell_m[1]).min(torus[1] as f64 * cell_m[0]);
+        let most_m = widest_m(torus, cell_m);
         return refuse(format!("is {range_m}; a texture of this size holds patches of at most {most_m} m: enlarge it"));
     }
     Ok(())
+}
+
+/// Longest range of the amplitude that a torus holds, m.
+fn widest_m([rows, cols]: [usize; 2], [dx, dy]: [f64; 2]) -> f64 {
+    RANGE_SHARE_MAX * (rows as f64 * dy).min(cols as f64 * dx)
 }
 
 /// Magnitudes of the modes of G, the negative share of its spectrum, and the largest change of its correlation when that is set to 0.

@@ -329,6 +329,23 @@ fn val_fits_without_patches() {
     );
 }
 
+/// A normal site has a log variance of some thousandths, of any range: its textures may be of any size. A range that is stated, or that of patches
+/// that are felt, must fit on a periodic texture.
+#[test]
+fn val_patches_that_are_not_felt_fit_on_any_tile() {
+    let refused = |log_variance: f64, range_m: Option<f64>, shape: [usize; 2]| {
+        // Patches of 60 cells, 30 m.
+        let wide = statistics(3.0, log_variance, 60.0);
+        let parameters = ModulatedParameters { range_m, ..ModulatedParameters::default() };
+        Modulated::new(&wide, shape, &parameters).err().map(|e| e.key)
+    };
+    for shape in [[64, 64], [33, 70], [71, 31]] {
+        assert_eq!((refused(0.004, None, shape), refused(0.0, None, shape)), (None, None), "{shape:?}");
+        assert_eq!(refused(0.004, Some(30.0), shape).as_deref(), Some("range_m"));
+        assert_eq!(refused(0.3, None, shape).as_deref(), Some("range_m"));
+    }
+}
+
 /// The same bytes on one and three threads; a periodic texture is its torus, any other is cut from a larger one; streams by name.
 #[test]
 fn prop_threads_change_no_bit() {
