@@ -44,8 +44,9 @@ fn south(heights: &[f64], cols: usize) -> impl Iterator<Item = f64> {
     heights.iter().zip(&heights[cols..]).map(|(a, b)| b - a)
 }
 
-/// Standard deviation and increments are the site's to 20 %, and their flatness, about 5 rather than the 3 of any Gaussian field, to a
-/// factor of 1.8.
+/// Standard deviation and increments are the site's to 20 %, and their flatness, about 5, to a factor of 1.8. A Gaussian field, whose flatness is
+/// 3, meets that factor, so there is a limit of its own: ten textures of seven such sites drawn with numpy had 3.79 with a standard deviation of
+/// 0.10, and Gaussian fields of this size 3.01 with 0.05. 3.4 is 3.8 of the first and 8 of the second away.
 #[test]
 fn val_statistics_of_an_intermittent_site() {
     let site = intermittent(256, 256);
@@ -59,6 +60,7 @@ fn val_statistics_of_an_intermittent_site() {
     };
     assert!((rms - 1.0).abs() < 0.2 && (increment - 1.0).abs() < 0.2, "{rms} {increment}");
     assert!(flatness(&site.values) > 4.0 && (0.55..1.8).contains(&ratio(&flatness)), "{}", ratio(&flatness));
+    assert!(flatness(&heights) > 3.4, "{} {}", flatness(&heights), flatness(&site.values));
 }
 
 /// Across the border of a periodic tile, heights differ no more than within it, also where a side is just above a multiple of the spacing, 16;
