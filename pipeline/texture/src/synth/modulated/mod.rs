@@ -168,7 +168,11 @@ impl ResidualKernel for Modulated {
     }
 
     fn make(&self, streams: &Streams) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
-        Ok((Modulated::make(self, streams), Vec::new()))
+        let heights_m = Modulated::make(self, streams);
+        match heights_m.iter().all(|z| z.is_finite()) {
+            true => Ok((heights_m, Vec::new())),
+            false => Err(SynthesisError::NotFinite { method: NAME }),
+        }
     }
 }
 

@@ -329,6 +329,18 @@ fn val_fits_without_patches() {
     );
 }
 
+/// Heights whose squares overflow, or vanish, do not become a texture without data.
+#[test]
+fn val_heights_that_are_not_finite_are_refused() {
+    for heights_m in [vec![-1e308, 0.0, 1e308], vec![0.0, 0.0, 1e-300]] {
+        let damaged = Statistics { probabilities: vec![0.0, 0.5, 1.0], heights_m, ..statistics(3.0, 0.3, 5.0) };
+        assert!(damaged.check().is_ok());
+        let made = Modulated::new(&damaged, [64, 64], &ModulatedParameters::default()).unwrap();
+        let error = ResidualKernel::make(&made, &Streams::for_seed(1, "texture")).unwrap_err();
+        assert_eq!(error, SynthesisError::NotFinite { method: NAME });
+    }
+}
+
 /// A normal site has a log variance of some thousandths, of any range: its textures may be of any size. A range that is stated, or that of patches
 /// that are felt, must fit on a periodic texture.
 #[test]
