@@ -252,8 +252,8 @@ fn response(window: BoxWindow, [rows, cols]: [usize; 2], k: usize) -> f64 {
     mean_of_cosine(down, k % rows, rows) * mean_of_cosine(across, k / rows, cols)
 }
 
-/// Mean of a cosine of k waves over n cells, in `width` cells around its crest.
-fn mean_of_cosine(width: usize, k: usize, n: usize) -> f64 {
+/// Mean of a cosine of k waves over n cells, in `width` cells around its crest: the response of a moving average along one axis.
+pub fn mean_of_cosine(width: usize, k: usize, n: usize) -> f64 {
     if k == 0 {
         return 1.0;
     }

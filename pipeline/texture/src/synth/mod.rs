@@ -20,6 +20,7 @@ pub mod measured;
 pub mod modulated;
 pub mod quasi_wavelets;
 pub mod quilting;
+pub mod raised;
 pub mod reach;
 pub mod residual;
 pub mod scoreboard;
@@ -31,6 +32,7 @@ use crate::covariance::Covariance;
 use marginal::Marginal;
 use measured::Measured;
 use sastrugi_numeric::{Geometry, Grid, Streams};
+use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::{CovarianceMap, FitFile};
 use schemars::JsonSchema;
@@ -345,6 +347,19 @@ pub struct Made {
 /// A length rounded to a micrometre, to remove rounding errors.
 fn tidy(length_m: f64) -> f64 {
     (length_m * 1e6).round() / 1e6
+}
+
+/// The window of a fit's background, on cells of `cell_m`, both east-west and north-south, m.
+///
+/// # Errors
+/// A fit without a window.
+fn window_on(window_m: Option<[f64; 2]>, cell_m: [f64; 2]) -> Result<BoxWindow, ParameterError> {
+    let [x_m, y_m] = window_m.ok_or_else(|| {
+        let message = "is `residual`, but the fit file has no `window_m`, the background's window";
+        ParameterError::new("covariance", message)
+    })?;
+    let [across, down] = [(x_m, cell_m[0]), (y_m, cell_m[1])].map(|(m, cell)| BoxWindow::nearest(m, [cell; 2]));
+    Ok(BoxWindow { half: [down.half[0], across.half[1]] })
 }
 
 /// Model name of fits with a measured covariance.

@@ -7,14 +7,17 @@
 //!
 //! * the cells are those of the site;
 //! * directions, heights and long waves are the site's: a tile has no `ratio`, `azimuth_deg`, `outer_m`, `marginal` and `marginal_m`;
-//! * waves longer than the window of the fit are missing, and belong to the base that the texture is added to;
+//! * waves longer than the window of the fit are missing, and belong to the base that the texture is added to; on the background of the fit
+//!   (`covariance = "residual"`), waves of about the window are raised ([`super::raised`]);
 //! * noise and blur of the DEM, which a fit takes out of its covariance where they are stated, are in the residual and in the texture;
 //! * the mean covariance of an ensemble is not known beforehand: [`Synthesis::covariance`] states the residual's along rows, with NaN as
 //!   `achieved_m2`, and [`Synthesis::ratio`] is NaN. A scoreboard measures both on realisations.
 //!
 //! Size, cells, repetition and seams are those of [`Tile`].
 
+use super::fft_ma::CovarianceOf;
 use super::measured::Measured;
+use super::raised::Raised;
 use super::statistics::lags;
 use super::tile::{self, OF_COVARIANCE, Tile};
 use super::{Cost, LagCovariance, Method, Prospect, Synthesis, SynthesisError, TextureOutcome};
@@ -24,7 +27,7 @@ use crate::fit::FitSettings;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_schemas::statistics::Statistics;
+use sastrugi_schemas::statistics::{LagCovariances, Statistics};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -64,6 +67,9 @@ pub trait Source: Send + Sync + Sized + 'static {
     /// Covariance of the residual at lags of 0, 1, 2 ... cells along rows, m2: `most` lags beyond 0, or as many as are known.
     fn along_rows_m2(&self, most: usize) -> Vec<f64>;
 
+    /// Covariance of the residual at lags in all directions, m2, as far as it is known.
+    fn covariances_m2(&self) -> LagCovariances;
+
     /// Notes for the user.
     fn notes(&self) -> Vec<String>;
 }
@@ -83,6 +89,10 @@ impl Source for Statistics {
 
     fn along_rows_m2(&self, most: usize) -> Vec<f64> {
         lags::along_rows(&self.covariance, most)
+    }
+
+    fn covariances_m2(&self) -> LagCovariances {
+        self.covariance.clone()
     }
 
     fn notes(&self) -> Vec<String> {
@@ -114,6 +124,11 @@ impl Source for Measured {
         (0..=most as isize).map_while(|lag| found.covariance(0, lag)).collect()
     }
 
+    fn covariances_m2(&self) -> LagCovariances {
+        let z = &self.residual;
+        lags::measure(z, [z.rows(), z.cols()].map(|side| side / LAG_SHARE))
+    }
+
     fn notes(&self) -> Vec<String> {
         vec!["made of cells of the site: licence and attribution of its DEM extend to the texture".to_owned()]
     }
@@ -138,6 +153,9 @@ pub trait ResidualParameters: DeserializeOwned + Serialize + JsonSchema + Clone 
 
     /// Whether the tile repeats without seams.
     fn is_periodic(&self) -> bool;
+
+    /// Whether the texture is the residual as measured, or what a measured background lacks.
+    fn covariance(&self) -> CovarianceOf;
 
     /// Refuses parameters that are invalid whatever the site.
     ///
@@ -234,7 +252,24 @@ pub(crate) fn check_keys(method: &str, raw: &Value) -> Result<(), ParameterError
 
 impl<P: ResidualParameters> Checked<P> {
     fn cost(&self, prospect: Option<&Prospect>) -> Cost {
-        self.tile.repeated_cost(self.own.cost_of(&self.tile, &Site::of(&self.tile, prospect)))
+        // What is refused for its size is refused when the fit is known.
+        let made = self.raised(prospect.map(|fit| [fit.window_m; 2])).unwrap_or_default();
+        let tile = made.as_ref().map_or(&self.tile, |(_, widened)| widened);
+        let cost = self.own.cost_of(tile, &Site::of(tile, prospect));
+        self.tile.repeated_cost(if made.is_some() { Raised::cost(cost, tile) } else { cost })
+    }
+
+    /// What raises the waves of a texture for a background over a window, and the tile to be made for that; `None` for a residual as measured.
+    ///
+    /// # Errors
+    /// An unknown window; too many cells.
+    fn raised(&self, window_m: Option<[f64; 2]>) -> Result<Option<(Raised, Tile)>, ParameterError> {
+        if self.own.covariance() == CovarianceOf::Surface {
+            return Ok(None);
+        }
+        let raised = Raised::new(window_m, self.tile.geometry.cell)?;
+        let widened = raised.widened(&self.tile)?;
+        Ok(Some((raised, widened)))
     }
 
     /// Refuses cells that are not those of the site, east-west and north-south, m.
@@ -280,17 +315,30 @@ impl<P: ResidualParameters> Method for Checked<P> {
     fn bind(&self, fit: &FitFile, measured: Option<&Arc<Measured>>) -> Result<Box<dyn Synthesis>, ParameterError> {
         let source = P::Source::of(P::NAME, fit, measured)?;
         self.check_cells(source.cell_m())?;
-        let kernel = self.own.kernel(&self.tile, &source)?;
+        let raised = self.raised(fit.window_m)?;
+        let kernel = self.own.kernel(raised.as_ref().map_or(&self.tile, |(_, widened)| widened), &source)?;
         let window = fit.window_m.map(|[x, y]| {
-            format!(
-                "the texture has no waves longer than the window of the fit, {} m; add it to a base that has them",
-                super::to_micrometres(0.5 * (x + y))
-            )
+            let window_m = super::to_micrometres(0.5 * (x + y));
+            match &raised {
+                None => format!(
+                    "the texture has no waves longer than the window of the fit, {window_m} m; add it to a base that has them"
+                ),
+                Some(_) => raised_note(window_m, P::Source::NEEDS == Needs::Residual),
+            }
         });
         let of_fit = window.into_iter().chain(measurement_notes(fit));
         let notes = self.tile.note().into_iter().chain(source.notes()).chain(of_fit).chain(kernel.notes()).collect();
-        Ok(Box::new(Repeated { tile: self.tile.clone(), parameters: self.parameters(), source, kernel, notes }))
+        Ok(Box::new(Repeated { tile: self.tile.clone(), parameters: self.parameters(), source, raised, kernel, notes }))
     }
+}
+
+/// A note on a texture for the background of a fit; `copied` if it is made of copied cells.
+fn raised_note(window_m: f64, copied: bool) -> String {
+    let heights = if copied { "; the heights of copied cells change by that" } else { "" };
+    format!(
+        "covariance = residual: waves of about the window of the fit, {window_m} m, are raised, so that a measured background and the texture together \
+         have the covariance of the site{heights}"
+    )
 }
 
 /// What a fit takes out of its covariance and the residual keeps.
@@ -316,6 +364,8 @@ struct Repeated<S, K> {
     tile: Tile,
     parameters: Value,
     source: Arc<S>,
+    /// What raises its waves, and the tile that the kernel makes for that.
+    raised: Option<(Raised, Tile)>,
     kernel: K,
     notes: Vec<String>,
 }
@@ -330,7 +380,11 @@ impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
     }
 
     fn cost(&self) -> Cost {
-        self.tile.repeated_cost(self.kernel.cost())
+        let cost = self.kernel.cost();
+        self.tile.repeated_cost(match &self.raised {
+            None => cost,
+            Some((_, widened)) => Raised::cost(cost, widened),
+        })
     }
 
     fn notes(&self) -> Vec<String> {
@@ -345,7 +399,11 @@ impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
             wanted_m2,
             achieved_m2: f64::NAN,
         };
-        self.source.along_rows_m2(most).into_iter().enumerate().map(at).collect()
+        let wanted_m2 = match &self.raised {
+            None => self.source.along_rows_m2(most),
+            Some((raised, _)) => raised.along_rows_m2(&self.source.covariances_m2(), most),
+        };
+        wanted_m2.into_iter().enumerate().map(at).collect()
     }
 
     fn ratio(&self) -> f64 {
@@ -357,7 +415,10 @@ impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
     }
 
     fn generate(&self, streams: &Streams) -> Result<TextureOutcome, SynthesisError> {
-        let (heights_m, notes) = self.kernel.make(streams)?;
+        let (heights_m, notes) = match &self.raised {
+            None => self.kernel.make(streams)?,
+            Some((raised, widened)) => raised.make(&self.kernel, [&self.tile, widened], streams)?,
+        };
         Ok(TextureOutcome {
             grid: self.tile.repeated(Grid::new(self.tile.geometry, heights_m)),
             covariance_error_max_m2: f64::NAN,

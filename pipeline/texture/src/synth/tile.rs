@@ -225,6 +225,11 @@ impl Tile {
         all
     }
 
+    /// The same tile with other numbers of rows and columns.
+    pub(super) fn of_shape(&self, [rows, cols]: [usize; 2]) -> Self {
+        Self { geometry: Geometry { rows, cols, ..self.geometry }, ..self.clone() }
+    }
+
     /// A note if the size was rounded down.
     pub(super) fn note(&self) -> Option<String> {
         self.note.clone()

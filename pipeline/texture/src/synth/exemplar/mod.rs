@@ -45,6 +45,7 @@
 
 pub mod sampling;
 
+use super::fft_ma::CovarianceOf;
 use super::measured::{self, Collage, Measured};
 use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
@@ -82,11 +83,15 @@ pub struct ExemplarParameters {
     pub scan: u32,
     /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
+    /// What the texture is for: `surface` (level or synthetic ground: the residual as it was measured) or `residual` (a measured background: its waves
+    /// of about the fit's window are raised, so that the background and the texture together have the covariance of the site). Default: `residual`
+    /// on a measured DEM, otherwise `surface`.
+    pub covariance: CovarianceOf,
 }
 
 impl Default for ExemplarParameters {
     fn default() -> Self {
-        Self { spacing_m: None, neighbours: 12, scan: 2000, periodic: true }
+        Self { spacing_m: None, neighbours: 12, scan: 2000, periodic: true, covariance: CovarianceOf::Surface }
     }
 }
 
@@ -97,6 +102,10 @@ impl ResidualParameters for ExemplarParameters {
 
     fn is_periodic(&self) -> bool {
         self.periodic
+    }
+
+    fn covariance(&self) -> CovarianceOf {
+        self.covariance
     }
 
     fn check(&self) -> Result<(), ParameterError> {

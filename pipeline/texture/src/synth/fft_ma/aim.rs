@@ -3,7 +3,7 @@
 use super::spectrum::Spectrum;
 use crate::covariance::Covariance;
 use crate::covariance::empirical::{self, Composition, Purpose};
-use crate::synth::{Wanted, tidy};
+use crate::synth::{Wanted, tidy, window_on};
 use sastrugi_numeric::Geometry;
 use sastrugi_numeric::fft::HalfSpectrum;
 use sastrugi_roughness::background::BoxWindow;
@@ -29,14 +29,7 @@ impl Aim {
     /// # Errors
     /// A fit without a window; cells that are not multiples of the measured ones.
     pub fn of(wanted: &Wanted, purpose: Purpose, cell_m: [f64; 2]) -> Result<Option<Self>, ParameterError> {
-        let window_at = |cell_m: [f64; 2]| {
-            let [x_m, y_m] = wanted.window_m.ok_or_else(|| {
-                let message = "is `residual`, but the fit file has no `window_m`, the background's window";
-                ParameterError::new("covariance", message)
-            })?;
-            let [across, down] = [(x_m, cell_m[0]), (y_m, cell_m[1])].map(|(m, cell)| BoxWindow::nearest(m, [cell; 2]));
-            Ok::<_, ParameterError>(BoxWindow { half: [down.half[0], across.half[1]] })
-        };
+        let window_at = |cell_m: [f64; 2]| window_on(wanted.window_m, cell_m);
         let Some(map) = &wanted.map else {
             return match purpose {
                 Purpose::Surface => Ok(None),

@@ -64,7 +64,7 @@ use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::statistics::{lags, spectrum};
 use super::tile::{self, Tile};
 use super::{Cost, SynthesisError};
-use crate::synth::fft_ma::{Phase, random_column};
+use crate::synth::fft_ma::{CovarianceOf, Phase, random_column};
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Streams, sums};
@@ -115,11 +115,15 @@ pub struct ModulatedParameters {
     /// Distance over which the correlation of the logarithm of the amplitude falls to 1/e, m; replaces the fit's.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub range_m: Option<f64>,
+    /// What the texture is for: `surface` (level or synthetic ground: the residual as it was measured) or `residual` (a measured background: its waves
+    /// of about the fit's window are raised, so that the background and the texture together have the covariance of the site). Default: `residual`
+    /// on a measured DEM, otherwise `surface`.
+    pub covariance: CovarianceOf,
 }
 
 impl Default for ModulatedParameters {
     fn default() -> Self {
-        Self { periodic: true, log_variance: None, range_m: None }
+        Self { periodic: true, log_variance: None, range_m: None, covariance: CovarianceOf::Surface }
     }
 }
 
@@ -130,6 +134,10 @@ impl ResidualParameters for ModulatedParameters {
 
     fn is_periodic(&self) -> bool {
         self.periodic
+    }
+
+    fn covariance(&self) -> CovarianceOf {
+        self.covariance
     }
 
     fn check(&self) -> Result<(), ParameterError> {

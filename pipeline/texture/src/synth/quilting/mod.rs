@@ -58,6 +58,7 @@ pub mod cut;
 mod search;
 
 use super::exemplar::sampling::{self, Field};
+use super::fft_ma::CovarianceOf;
 use super::measured::{self, Collage, Holes, Measured};
 use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
@@ -107,11 +108,22 @@ pub struct QuiltingParameters {
     pub evenness: f64,
     /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
+    /// What the texture is for: `surface` (level or synthetic ground: the residual as it was measured) or `residual` (a measured background: its waves
+    /// of about the fit's window are raised, so that the background and the texture together have the covariance of the site). Default: `residual`
+    /// on a measured DEM, otherwise `surface`.
+    pub covariance: CovarianceOf,
 }
 
 impl Default for QuiltingParameters {
     fn default() -> Self {
-        Self { patch_m: None, overlap: 0.25, tolerance: 0.1, evenness: 4.0, periodic: true }
+        Self {
+            patch_m: None,
+            overlap: 0.25,
+            tolerance: 0.1,
+            evenness: 4.0,
+            periodic: true,
+            covariance: CovarianceOf::Surface,
+        }
     }
 }
 
@@ -122,6 +134,10 @@ impl ResidualParameters for QuiltingParameters {
 
     fn is_periodic(&self) -> bool {
         self.periodic
+    }
+
+    fn covariance(&self) -> CovarianceOf {
+        self.covariance
     }
 
     fn check(&self) -> Result<(), ParameterError> {

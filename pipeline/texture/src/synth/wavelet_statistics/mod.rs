@@ -57,7 +57,7 @@ mod target;
 
 pub use measure::measure;
 
-use super::fft_ma::{Phase, random_spectrum};
+use super::fft_ma::{CovarianceOf, Phase, random_spectrum};
 use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::statistics::lags;
 use super::statistics::spectrum::{self, Modes};
@@ -103,11 +103,15 @@ pub struct WaveletStatisticsParameters {
     pub periodic: bool,
     /// Number of rounds, 1 to 200. Default 10.
     pub rounds: u32,
+    /// What the texture is for: `surface` (level or synthetic ground: the residual as it was measured) or `residual` (a measured background: its waves
+    /// of about the fit's window are raised, so that the background and the texture together have the covariance of the site). Default: `residual`
+    /// on a measured DEM, otherwise `surface`.
+    pub covariance: CovarianceOf,
 }
 
 impl Default for WaveletStatisticsParameters {
     fn default() -> Self {
-        Self { periodic: true, rounds: ROUNDS }
+        Self { periodic: true, rounds: ROUNDS, covariance: CovarianceOf::Surface }
     }
 }
 
@@ -118,6 +122,10 @@ impl ResidualParameters for WaveletStatisticsParameters {
 
     fn is_periodic(&self) -> bool {
         self.periodic
+    }
+
+    fn covariance(&self) -> CovarianceOf {
+        self.covariance
     }
 
     fn check(&self) -> Result<(), ParameterError> {

@@ -168,7 +168,7 @@ fn prop_threads_change_no_bit() {
             wavelets.covariance_log.clear();
             wavelets.patches = None;
         }
-        let parameters = WaveletStatisticsParameters { periodic, rounds: 2 };
+        let parameters = WaveletStatisticsParameters { periodic, rounds: 2, ..WaveletStatisticsParameters::default() };
         let on = |threads: usize| {
             let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
             pool.install(|| synthesise(&statistics, [50, 66], &parameters, &streams).unwrap())
@@ -186,7 +186,7 @@ fn val_refusals() {
     let statistics = measure_statistics(&ridged(130, 130, 8), [12, 12]).unwrap();
     let streams = Streams::for_seed(1, "texture");
     let key = |statistics: &Statistics, rounds: u32, shape: [usize; 2]| {
-        let parameters = WaveletStatisticsParameters { periodic: true, rounds };
+        let parameters = WaveletStatisticsParameters { rounds, ..WaveletStatisticsParameters::default() };
         synthesise(statistics, shape, &parameters, &streams).err().map(|e| e.key)
     };
     assert_eq!(key(&statistics, 1, [32, 32]), None);
@@ -195,7 +195,7 @@ fn val_refusals() {
     assert_eq!(key(&statistics, 1, [1 << 15, 1 << 15]).as_deref(), Some("size_px"));
     // Three octaves need 32 cells, on a torus.
     assert_eq!((statistics.wavelets.octaves, key(&statistics, 1, [31, 40]).as_deref()), (3, Some("size_px")));
-    let cropped = WaveletStatisticsParameters { periodic: false, rounds: 1 };
+    let cropped = WaveletStatisticsParameters { periodic: false, rounds: 1, ..WaveletStatisticsParameters::default() };
     assert!(synthesise(&statistics, [31, 40], &cropped, &streams).is_ok());
     let mut huge = statistics.clone();
     huge.wavelets.covariance_log.iter_mut().for_each(|v| *v *= 1e308);
