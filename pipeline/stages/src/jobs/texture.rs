@@ -9,7 +9,7 @@ use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
-use crate::operations::textures::{fill_note, has_its_texture, lay_onto, on_site_cells, scaled};
+use crate::operations::textures::{fill_note, has_its_texture, lacks_background, lay_onto, on_site_cells, scaled};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::{Entry, Expanded, StudyError};
@@ -293,7 +293,7 @@ fn check_before_run(
 /// On a measured DEM or the background of a fit, a texture defaults to the covariance of the residual, which such a base lacks.
 fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item: &TextureItem) -> Expanded {
     let measured = base.as_ref().is_some_and(|base| [dem_job::STAGE, fit::STAGE].contains(&base.item.stage.as_str()));
-    let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && item.method == fft_ma::kind().kind;
+    let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && lacks_background(&item.method);
     if measured && fitted && one.params["covariance"].is_null() {
         Arc::make_mut(&mut one.params)["covariance"] = json!(fft_ma::CovarianceOf::Residual);
     }

@@ -5,13 +5,18 @@ use crate::job::JobError;
 use crate::memory;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_texture::synth::fft_ma::{self, CovarianceOf};
-use sastrugi_texture::{Needs, Prospect};
+use sastrugi_texture::Needs;
+use sastrugi_texture::synth::fft_ma;
 use serde_json::{Value, json};
 
 /// A texture with its heights multiplied by a factor.
 pub fn scaled(texture: Grid, factor: f64) -> Grid {
     if factor == 1.0 { texture } else { texture.map(|height| factor * height) }
+}
+
+/// Whether a method can make what a measured background lacks, `covariance = "residual"`: FFT-MA and those that repeat a site.
+pub fn lacks_background(method: &str) -> bool {
+    method == fft_ma::kind().kind || sastrugi_texture::needs(method).is_some_and(|needs| needs != Needs::Covariance)
 }
 
 /// Sets the cells of a texture that repeats a site to those of the site, unless they are given.

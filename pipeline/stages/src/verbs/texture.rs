@@ -5,7 +5,7 @@ use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds};
 use crate::memory;
 use crate::operations::fits::of_json;
-use crate::operations::textures::{check_memory, fill_note, has_its_texture, lay_onto, on_site_cells, scaled};
+use crate::operations::textures::{fill_note, has_its_texture, lacks_background, lay_onto, on_site_cells, scaled};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::ParameterError;
@@ -98,7 +98,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         return Err(Error::Usage(message.to_owned()));
     }
     let mut parameters = request.parameters.clone();
-    let on_background = request.onto.is_some() && fit.window_m.is_some() && request.method == fft_ma::kind().kind;
+    let on_background = request.onto.is_some() && fit.window_m.is_some() && lacks_background(request.method);
     let chosen = on_background && parameters["covariance"].is_null();
     if chosen {
         parameters["covariance"] = json!(fft_ma::CovarianceOf::Residual);
