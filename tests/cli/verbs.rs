@@ -436,7 +436,10 @@ fn val_textures_repeat_a_site() {
         assert_eq!(bytes("one.tif"), bytes("two.tif"), "{method}");
     }
     let laid = ["texture", "fit.json", "--method", "quilting", "--exemplar", "site.tif", "--size", "8x8"];
-    ok(path, &[&laid[..], &["--onto", "background.tif", "-o", "laid.tif"]].concat());
+    let made = ok_json(path, &[&laid[..], &["--onto", "background.tif", "-o", "laid.tif"]].concat());
+    assert_eq!(made["parameters"]["covariance"], "residual");
+    let notes = made["notes"].to_string();
+    assert!(notes.contains("are raised") && notes.contains("assumed to be a measured background"), "{notes}");
     let (base, sum) = (heights(path, "background.tif"), heights(path, "laid.tif"));
     assert!(base.len() == sum.len() && base.iter().zip(&sum).any(|(a, b)| a != b));
 }

@@ -36,6 +36,13 @@ fn val_a_study_of_textures_that_repeat_a_site() {
     }
     let page = fs::read_to_string(release.join("report/index.html")).unwrap();
     assert!(page.contains("mean covariance not known beforehand"));
+    // On the background of the fit it holds what that lacks; alone, the residual as it was measured.
+    let terrains = rows(&release, "terrains");
+    for (id, covariance) in [("laid", "residual"), ("loose", "surface")] {
+        let row = terrains.iter().find(|row| row["terrain_id"] == id).unwrap();
+        let params = row["params"].as_str().unwrap_or_default();
+        assert!(params.contains(&format!("\"covariance\":\"{covariance}\"")), "{id}: {params}");
+    }
     let verify = sastrugi_in(folder.path(), &["verify", "release", "--recompute", "all", "--quiet"]);
     assert_eq!(verify.code, 0, "{}{}", verify.stdout, verify.stderr);
     // Without the statistics, the methods that need them are refused before anything runs.
