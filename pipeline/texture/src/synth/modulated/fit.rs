@@ -20,7 +20,9 @@
 //! `sqrt(2 / n) (v + pi^2 / 8 / cells of a patch) / (1 - s)`, s the slope of the iteration.
 
 use super::transform::{self, Transform};
-use super::{ERROR_MAX, LOG_VARIANCE_MAX, Modulated, NOTED_MIN, RANGE_CELLS_FITTED, RANGE_CELLS_MIN};
+use super::{
+    ERROR_MAX, INCREMENT_RATIO_MAX, LOG_VARIANCE_MAX, Modulated, NOTED_MIN, RANGE_CELLS_FITTED, RANGE_CELLS_MIN,
+};
 use crate::covariance::masked_covariance;
 use crate::synth::statistics::{lags, spectrum, tails};
 use rayon::prelude::*;
@@ -52,8 +54,6 @@ const TOLERANCES: [f64; 2] = [2e-3, 5e-3];
 const FLOOR: f64 = 1e-3;
 /// Rows and columns of the torus on which the error of the covariance is foreseen.
 const SIDE: usize = 320;
-/// Largest variance of the one-cell increments of a texture, over the measured one.
-const INCREMENT_RATIO_MAX: f64 = 1.1;
 /// Bisections of the log variance that keeps the covariance.
 const BISECTIONS: usize = 6;
 

@@ -5,9 +5,9 @@
 //!
 //! `C_z(h) = C_z(r(h), rho(h))`, without T simply `sigma^2 r(h) exp(-s^2 (1 - rho(h)))`
 //!
-//! (`transform.rs`). r is solved for at every lag, so that the covariance of z, with its anisotropy, is that of the residual. Negative
-//! eigenvalues of r are set to 0 and the others scaled to unit variance, which changes the covariance of z by about the same share of its variance as r
-//! ([`Modulated::covariance_error`], the largest change at any lag). That change is largest on smooth ground whose waves are longer than the patches.
+//! (`transform.rs`). r is solved for at every lag, so that the covariance of z, with its anisotropy, is that of the residual, as far as r may be 1 and
+//! its spectrum is not negative: negative eigenvalues of r are set to 0 and the others scaled to unit variance. [`Modulated::covariance_error`] is the
+//! largest difference that remains at any lag, from C_z at the r that is made. Smooth ground has the least room, where patches are narrower than its waves.
 //!
 //! | parameter | unit, range | meaning |
 //! |---|---|---|
@@ -74,7 +74,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
 use std::sync::Arc;
-use transform::{NormalCorrelation, Transform, amplitude};
+use transform::{Correlations, Transform, amplitude};
 
 /// Name in the registry.
 pub const NAME: &str = "modulated";
@@ -91,6 +91,10 @@ const MARGIN_RANGES: f64 = 3.0;
 const RANGE_CELLS_FITTED: f64 = 40.0;
 /// Largest error of the covariance, as a share of the variance, to which parameters may lead.
 const ERROR_MAX: f64 = 0.1;
+/// Largest variance of the one-cell increments of a texture, over the measured one.
+const INCREMENT_RATIO_MAX: f64 = 1.1;
+/// Error of the covariance, as a share of the variance, above which it is noted: the tables have up to 1 %.
+const COVARIANCE_NOTE: f64 = 0.02;
 /// Standard error of a fitted log variance, as a share of it, above which it is noted.
 const ERROR_NOTE: f64 = 0.25;
 /// Log variance that matters.
@@ -165,10 +169,11 @@ impl ResidualKernel for Modulated {
 
     fn notes(&self) -> Vec<String> {
         let (share, error) = (self.clip_share, 100.0 * self.covariance_error());
-        let clipped = format!(
-            "{share:.1e} of the spectrum was negative and set to 0: the covariance is off by up to about {error:.2} % of the variance"
+        let off = format!(
+            "the covariance is off by up to {error:.1} % of the variance ({share:.1e} of the spectrum of the normal field was negative and set to 0)"
         );
-        self.doubts.iter().cloned().chain((share > 0.0).then_some(clipped)).collect()
+        let is_off = share > 0.0 || self.covariance_error() > COVARIANCE_NOTE;
+        self.doubts.iter().cloned().chain(is_off.then_some(off)).collect()
     }
 
     fn clip_share(&self) -> f64 {
@@ -185,21 +190,28 @@ impl ResidualKernel for Modulated {
 }
 
 impl ModulatedParameters {
-    /// Refuses stated parameters that lead to an error of the covariance, as a share of the variance.
-    fn check_error(&self, error: f64) -> Result<(), ParameterError> {
+    /// Refuses stated parameters with which a texture would not have the covariance on its torus, m2, or the increments over one cell.
+    fn check_effect(&self, made: &Modulated, covariance_m2: &[f64]) -> Result<(), ParameterError> {
         let stated = [("log_variance", self.log_variance), ("range_m", self.range_m)];
-        match stated.into_iter().find_map(|(key, value)| Some((key, value?))) {
-            Some((key, value)) if error > ERROR_MAX => {
-                let message = format!(
-                    "is {value}, with which the covariance of the site would be off by up to {:.0} % of the variance, more than {:.0} %: \
-                     patches are too strong or too narrow for so smooth a site; lower `log_variance` or widen `range_m`",
-                    100.0 * error,
-                    100.0 * ERROR_MAX
-                );
-                Err(ParameterError::new(key, message))
-            }
-            _ => Ok(()),
-        }
+        let Some((key, value)) = stated.into_iter().find_map(|(key, value)| Some((key, value?))) else { return Ok(()) };
+        let (error, ratio) = (made.covariance_error(), made.increment_ratio(covariance_m2));
+        let effect = if error > ERROR_MAX {
+            let [off, most] = [error, ERROR_MAX].map(|share| 100.0 * share);
+            format!(
+                "the covariance of the site would be off by up to {off:.0} % of the variance, more than {most:.0} %"
+            )
+        } else if ratio > INCREMENT_RATIO_MAX {
+            let [more, most] = [ratio, INCREMENT_RATIO_MAX].map(|ratio| 100.0 * (ratio - 1.0));
+            format!(
+                "increments over one cell would have {more:.0} % more variance than those of the site, above the limit of {most:.0} %"
+            )
+        } else {
+            return Ok(());
+        };
+        let message = format!(
+            "is {value}, with which {effect}: patches are too strong or too narrow for so smooth a site; lower `log_variance` or widen `range_m`"
+        );
+        Err(ParameterError::new(key, message))
     }
 }
 
@@ -260,7 +272,7 @@ impl Modulated {
     /// # Errors
     /// Statistics that are damaged; parameters out of range; a range of the amplitude shorter than 1.5 cells, or longer than a quarter of
     /// a periodic texture's shorter side (a fitted range is shortened to that where the amplitude hardly varies); a stated variance or range with
-    /// which the covariance cannot be kept within 10 % of the variance; a residual that is flat.
+    /// which the covariance cannot be kept within 10 % of the variance, or one-cell increments not within 10 % of theirs; a residual that is flat.
     pub fn new(
         statistics: &Statistics,
         shape: [usize; 2],
@@ -294,7 +306,7 @@ impl Modulated {
         let table = transform.normal_correlation();
         let covariance_m2 = spectrum::covariance_on_torus(statistics, torus);
         let made = Self::of_transform(&covariance_m2, [shape, torus], transform, &table, log_variance, range_cells);
-        parameters.check_error(made.covariance_error())?;
+        parameters.check_effect(&made, &covariance_m2)?;
         let doubts = parameters.log_variance.map_or_else(|| doubts(&statistics.modulation), |_| Vec::new());
         Ok(Self { doubts, ..made })
     }
@@ -304,11 +316,13 @@ impl Modulated {
         covariance_m2: &[f64],
         [shape, torus]: [[usize; 2]; 2],
         transform: Transform,
-        table: &NormalCorrelation,
+        table: &Correlations,
         log_variance: f64,
         range_cells: [f64; 2],
     ) -> Self {
-        let (magnitudes, [clip_share, covariance_error]) = magnitudes(covariance_m2, torus, table, range_cells);
+        let of_heights = transform.height_correlation();
+        let (magnitudes, [clip_share, covariance_error]) =
+            magnitudes(covariance_m2, torus, [table, &of_heights], range_cells);
         let doubts = Vec::new();
         Self { shape, torus, transform, log_variance, magnitudes, range_cells, clip_share, covariance_error, doubts }
     }
@@ -318,7 +332,7 @@ impl Modulated {
         self.clip_share
     }
 
-    /// Largest change of the correlation of G by that; about the error of the covariance, as a share of the variance.
+    /// Largest error of the covariance at any lag, as a share of the variance.
     pub fn covariance_error(&self) -> f64 {
         self.covariance_error
     }
@@ -431,22 +445,24 @@ fn widest_m([rows, cols]: [usize; 2], [dx, dy]: [f64; 2]) -> f64 {
     RANGE_SHARE_MAX * (rows as f64 * dy).min(cols as f64 * dx)
 }
 
-/// Magnitudes of the modes of G, the negative share of its spectrum, and the largest change of its correlation when that is set to 0.
+/// Magnitudes of the modes of G, the negative share of its spectrum, which is set to 0, and the largest error of the covariance of the heights, as a
+/// share of their variance. The tables give the correlation of G by that of the heights, and that of the heights by that of G.
 fn magnitudes(
     covariance_m2: &[f64],
     [rows, cols]: [usize; 2],
-    table: &NormalCorrelation,
+    [of_normal, of_heights]: [&Correlations; 2],
     range_cells: [f64; 2],
 ) -> (Vec<f64>, [f64; 2]) {
     let mut correlation = covariance_m2.to_vec();
     let variance_m2 = correlation[0];
     let [down, across] = [(rows, range_cells[0]), (cols, range_cells[1])].map(|(n, range)| line_correlation(n, range));
     correlation.par_chunks_mut(cols).enumerate().for_each(|(r, line)| {
-        line.iter_mut().zip(&across).for_each(|(c, east)| *c = table.at(*c / variance_m2, down[r] * east));
+        line.iter_mut().zip(&across).for_each(|(c, east)| *c = of_normal.at(*c / variance_m2, down[r] * east));
     });
     correlation[0] = 1.0;
     let fft = RealFft2::new(rows, cols);
     let mut half = fft.forward(&correlation);
+    drop(correlation);
     let weight = |k: usize| half.multiplicity(k / rows);
     let part = |sign: f64| -> f64 {
         sums::sum(&half.values.iter().enumerate().map(|(k, v)| weight(k) * (sign * v.re).max(0.0)).collect::<Vec<_>>())
@@ -457,9 +473,15 @@ fn magnitudes(
     let scale = cells / positive;
     half.values.iter_mut().for_each(|v| *v = Complex64::new(v.re.max(0.0) * scale, 0.0));
     let magnitudes = half.values.iter().map(|v| (v.re * cells).sqrt()).collect();
-    let kept = fft.inverse(half);
-    let change = correlation.iter().zip(&kept).map(|(wanted, r)| (r - wanted).abs()).fold(0.0, f64::max);
-    (magnitudes, [negative / (positive + negative), change])
+    let made = fft.inverse(half);
+    let lines = made.par_chunks(cols).zip(covariance_m2.par_chunks(cols)).enumerate();
+    let errors: Vec<f64> = lines
+        .map(|(r, (line, wanted))| {
+            let found = line.iter().zip(&across).map(|(made, east)| of_heights.at(*made, down[r] * east));
+            found.zip(wanted).map(|(c, wanted)| (c - wanted / variance_m2).abs()).fold(0.0, f64::max)
+        })
+        .collect();
+    (magnitudes, [negative / (positive + negative), errors.into_iter().fold(0.0, f64::max)])
 }
 
 /// `exp(-(d / range)^2)` along a line of `n` cells, every distance the shorter way around.

@@ -7,7 +7,8 @@
 //!
 //! `C_z(r, rho) = sum over (k, j) != (0, 0) of d_kj^2 r^k rho^j`
 //!
-//! at a correlation r of G and rho of W (Mehler 1866, twice). [`Transform::normal_correlation`] solves it for r.
+//! at a correlation r of G and rho of W (Mehler 1866, twice). [`Transform::normal_correlation`] solves it for r, and
+//! [`Transform::height_correlation`] tabulates it.
 
 use crate::synth::statistics::tails;
 use sastrugi_statistics::normal;
@@ -22,7 +23,7 @@ const HALF_NODES: usize = 2048;
 const PRODUCT_MAX: f64 = 40.0;
 /// Bisections of a quantile of the product, to 1e-9.
 const QUANTILE_BISECTIONS: usize = 36;
-/// Tabulated correlations of the heights, and of W, denser towards 1, where those of neighbouring cells lie.
+/// Tabulated correlations of the heights or of G, and of W, denser towards 1, where those of neighbouring cells lie.
 const CORRELATIONS: [usize; 2] = [257, 33];
 /// Range of these correlations: from -1, and from 0, to 1.
 const SPANS: [f64; 2] = [2.0, 1.0];
@@ -84,15 +85,24 @@ impl Transform {
         (0..DEGREES[0]).map(|k| self.squares.iter().rev().fold(0.0, |sum, of_j| sum * rho + of_j[k])).collect()
     }
 
-    /// The inverse as a table: the correlation of G that gives the heights a correlation.
-    pub fn normal_correlation(&self) -> NormalCorrelation {
+    /// The correlation of G that gives the heights a correlation, as a table; 1 where none gives it.
+    pub fn normal_correlation(&self) -> Correlations {
+        self.tabulated(|coefficients, c| solve(coefficients, c * self.variance_m2))
+    }
+
+    /// The correlation of the heights by that of G, as a table.
+    pub fn height_correlation(&self) -> Correlations {
+        self.tabulated(|coefficients, r| polynomial(coefficients, r) / self.variance_m2)
+    }
+
+    /// A function of the coefficients at a correlation of W, and of another correlation.
+    fn tabulated(&self, value: impl Fn(&[f64], f64) -> f64) -> Correlations {
         let [nodes, rows] = CORRELATIONS;
         let row = |i: usize| {
             let coefficients = self.at_amplitude_correlation(node(i, rows, SPANS[1]));
-            let solved = |k: usize| solve(&coefficients, node(k, nodes, SPANS[0]) * self.variance_m2);
-            (0..nodes).map(solved).collect::<Vec<f64>>()
+            (0..nodes).map(|k| value(&coefficients, node(k, nodes, SPANS[0]))).collect::<Vec<f64>>()
         };
-        NormalCorrelation { rows: (0..rows).map(row).collect() }
+        Correlations { rows: (0..rows).map(row).collect() }
     }
 
     /// Mean and variance of the heights.
@@ -209,14 +219,14 @@ pub fn split(correlation: f64, count: usize, span: f64) -> (usize, f64) {
     (low, ((correlation - below) / (above - below)).clamp(0.0, 1.0))
 }
 
-/// The correlation of G by the correlation of the heights and that of W.
-pub struct NormalCorrelation {
-    /// For correlations of W from 0 to 1 ([`node`]), values at correlations of the heights from -1 to 1.
+/// A correlation of G or of the heights, by that of the other and that of W.
+pub struct Correlations {
+    /// For correlations of W from 0 to 1 ([`node`]), values at correlations of the other from -1 to 1.
     rows: Vec<Vec<f64>>,
 }
 
-impl NormalCorrelation {
-    /// The correlation of G at a correlation `c` of the heights and `rho` of W, bilinear in the table.
+impl Correlations {
+    /// The value at a correlation `c` of the other and `rho` of W, bilinear in the table.
     pub fn at(&self, c: f64, rho: f64) -> f64 {
         let [nodes, rows] = CORRELATIONS;
         let (k, along) = split(c, nodes, SPANS[0]);
