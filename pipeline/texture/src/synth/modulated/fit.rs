@@ -11,13 +11,22 @@
 //! at the range with the least misfit. The mean that is subtracted is that of a finite site: rho~ is taken less its mean over all pairs of cells.
 //! This v must be the one that y was made with, which a secant iteration finds.
 //!
-//! On smooth ground the map to products is seen itself: d holds `f'' z_x z_y` beside `f' z_xy`, f the map, so that about any v finds itself (the iteration
-//! has a slope of 1). A v of which normal products (v = 0) show less than a quarter is therefore not believed: theirs is taken, and the difference
-//! counts as error. With numpy, 256 x 256 cells, 6 normal fields for each low-pass of 4, 6 and 8 cells: 0.3 to 2.0 by the iteration, 0.00 to 0.32 by
-//! normal products, and one of 18 believed; rough ground (exponential, 4 cells) with v of 0.1, 0.3 and 0.8 shows 0.72, 0.57 and 0.40 of it.
+//! On smooth ground the map to products is seen itself: d holds `f'' z_x z_y` beside `f' z_xy`, f the map, so that about any v finds itself. What normal
+//! products (v = 0) show of it, v_0, tells: v_0 / v is 1 less the mean slope of the iteration between 0 and v. A v of which they show less than a quarter, or
+//! that lies at the largest allowed, is not believed: v_0 is taken, and the difference counts as error. With numpy, 256 x 256 cells, patches of 8 cells:
+//!
+//! | ground | truth | v by the iteration | v_0 | v_0 / v |
+//! |---|---|---|---|---|
+//! | exponential, 4 cells | 0.1, 0.3, 0.8 | 0.09 to 0.11, 0.27 to 0.35, 0.72 to 0.90 | 0.06 to 0.08, 0.15 to 0.17, 0.29 to 0.33 | 0.72 to 0.76, 0.48 to 0.59, 0.35 to 0.43 |
+//! | normal field low-passed over 2 cells | 0, 0.3 | 0.00 to 0.01, 0.33 to 0.37 | 0.00 to 0.01, 0.17 to 0.19 | , 0.49 to 0.54 |
+//! | over 4 cells | 0, 0.3, 0.8 | 0.30 to 0.98, 1.42 to 2.00, 2.00 | 0.02 to 0.08, 0.35 to 0.43, 0.65 to 0.79 | 0.02 to 0.22, 0.18 to 0.26, 0.32 to 0.39 |
+//! | over 6 cells | 0, 0.3 | 0.83 to 1.66, 2.00 | 0.07 to 0.23, 0.25 to 0.34 | 0.04 to 0.25, 0.12 to 0.17 |
+//!
+//! (4 fields each.) On smooth ground v_0 itself is near the truth; normal ground low-passed over 6 cells and more has up to 0.3 of its own.
 //!
 //! The standard error counts patches: n = the site's cells over those of `rho^2`, and of the squared correlation of y, whose quantiles are as uncertain;
-//! `sqrt(2 / n) (v + pi^2 / 8 / cells of a patch) / (1 - s)`, s the slope of the iteration.
+//! `sqrt(2 / n) (v + pi^2 / 8 / cells of a patch) / (1 - s)`, s the slope of the iteration: the last one where v hardly matters, otherwise the mean, for which
+//! 1 - s is v_0 / v. Where that is below a third, the error is at least v - v_0.
 
 use super::transform::{self, Transform};
 use super::{
@@ -44,10 +53,11 @@ const SUPPORT: usize = 4;
 const START: [f64; 2] = [0.3, 8.0];
 /// Most steps of the iteration.
 const STEPS: usize = 8;
-/// Slopes of the iteration that are believed.
+/// Slopes of the iteration are clamped to this range.
 const SLOPES: [f64; 2] = [-0.5, 0.75];
-/// Least share of a log variance that matters which normal products must show.
-const SHOWN_SHARE: f64 = 0.25;
+/// Least share of a log variance that normal products must show if patches are visible: below the first it is not believed, below the second not well
+/// known.
+const SHOWN_SHARES: [f64; 2] = [0.25, 1.0 / 3.0];
 /// Change of the log variance at which the iteration ends: absolute, and relative.
 const TOLERANCES: [f64; 2] = [2e-3, 5e-3];
 /// Smallest magnitude of a difference whose logarithm is told apart, over the mean magnitude.
@@ -128,6 +138,8 @@ struct Found {
     range: f64,
     /// Standard error of the log variance.
     error: f64,
+    /// Standard deviation of the log variance at a given map to products.
+    spread: f64,
     /// Number of independent patches that the site holds.
     patches: f64,
 }
@@ -184,21 +196,28 @@ impl Site<'_> {
     fn solved(&self) -> Found {
         match self.iterated() {
             Some(found) => self.believed(found),
-            None => Found { log_variance: 0.0, range: RANGE_CELLS_MIN, error: 0.0, patches: 0.0 },
+            None => Found { log_variance: 0.0, range: RANGE_CELLS_MIN, error: 0.0, spread: 0.0, patches: 0.0 },
         }
     }
 
-    /// What was found, unless the map to products alone may have put it there.
+    /// What was found, unless the map to products alone may have put it there; with the error that such a map leaves.
     fn believed(&self, found: Found) -> Found {
         let normal = (found.log_variance >= NOTED_MIN).then(|| self.step(0.0, found.range)).flatten();
-        match normal.filter(|step| step.log_variance < SHOWN_SHARE * found.log_variance) {
-            None => found,
-            Some(step) => Found {
-                log_variance: step.log_variance,
-                range: step.range,
-                error: found.error.max(found.log_variance - step.log_variance),
-                patches: 1.0 / step.patch_share,
-            },
+        let Some(normal) = normal else { return found };
+        let shown = normal.log_variance / found.log_variance;
+        let apart = if shown < SHOWN_SHARES[1] { found.log_variance - normal.log_variance } else { 0.0 };
+        // No more than what a log variance can be.
+        let error = (found.spread / shown).max(apart).min(LOG_VARIANCE_MAX);
+        if shown >= SHOWN_SHARES[0] && found.log_variance < LOG_VARIANCE_MAX {
+            return Found { error, ..found };
+        }
+        let error = error.max(found.log_variance - normal.log_variance);
+        Found {
+            log_variance: normal.log_variance,
+            range: normal.range,
+            error,
+            patches: 1.0 / normal.patch_share,
+            ..found
         }
     }
 
@@ -223,10 +242,12 @@ impl Site<'_> {
         let shares = step.patch_share + share_of_heights(&self.products(now), self.reach());
         let [down, across] = self.range_cells(step.range);
         let own_noise = PI * PI / 8.0 / (0.5 * PI * down * across);
+        let spread = (2.0 * shares).sqrt() * (now + own_noise);
         Some(Found {
             log_variance: now,
             range: step.range,
-            error: (2.0 * shares).sqrt() * (now + own_noise) / (1.0 - slope),
+            error: spread / (1.0 - slope),
+            spread,
             patches: 1.0 / step.patch_share,
         })
     }

@@ -97,7 +97,7 @@ const INCREMENT_RATIO_MAX: f64 = 1.1;
 const COVARIANCE_NOTE: f64 = 0.02;
 /// Standard error of a fitted log variance, as a share of it, above which it is noted.
 const ERROR_NOTE: f64 = 0.25;
-/// Log variance that matters.
+/// Log variance above which patches are visible.
 const NOTED_MIN: f64 = 0.1;
 /// Log variance below which patches of any width raise the flatness of increments by less than 5 %: a normal site has a few thousandths, with
 /// any range.
@@ -219,12 +219,19 @@ impl ModulatedParameters {
 fn doubts(fitted: &Modulation) -> Vec<String> {
     let Modulation { log_variance, measured_log_variance: measured, log_variance_error: error, patches, .. } = *fitted;
     let lowered = format!(
-        "the log variance of the amplitude is {log_variance:.2}, less than the measured {measured:.2}: with that the covariance of so smooth a site could not be kept"
+        "the log variance of the amplitude was reduced from the measured {measured:.2} to {log_variance:.2}: a larger value would change the covariance of \
+         so smooth a site, or its increments, by more than 10 %"
     );
-    let uncertain = format!(
-        "the log variance of the amplitude, {measured:.2}, has a standard error of {error:.2}: the site holds {patches:.0} independent patches; state \
-         `log_variance` if you know better"
-    );
+    let uncertain = match error > measured.max(NOTED_MIN) {
+        true => format!(
+            "the log variance of the amplitude is not identified ({measured:.2}, with a standard error of {error:.2}): on smooth ground a curved map of the \
+             heights looks like patches; set `log_variance` to override it"
+        ),
+        false => format!(
+            "the log variance of the amplitude, {measured:.2}, has a standard error of {error:.2}: the site holds {patches:.0} independent patches; set \
+             `log_variance` to override it"
+        ),
+    };
     let lowered = (log_variance < measured && measured > NOTED_MIN).then_some(lowered);
     let uncertain = (error > ERROR_NOTE * measured.max(NOTED_MIN)).then_some(uncertain);
     lowered.into_iter().chain(uncertain).collect()
