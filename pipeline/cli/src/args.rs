@@ -1041,7 +1041,8 @@ pub struct Compare {
     /// Cell size for files that state none, m: one number, or east-west,north-south.
     #[arg(long, value_name = "M", allow_hyphen_values = true)]
     pub cell: Option<String>,
-    /// Set any other parameter: trim, alpha, equivalence_shape, equivalence_agreement, equivalence_covariance; `name=value`.
+    /// Set any other parameter: trim, alpha, find_objects, equivalence_shape, equivalence_agreement, equivalence_covariance;
+    /// `name=value`.
     #[arg(long = "set", value_name = "K=V")]
     pub set: Vec<String>,
 }

@@ -1,7 +1,8 @@
 //! Judges a texture of any origin against its site; the reference is how far blocks of the site differ from each other.
 //!
 //! # What
-//! Both rasters go through the same moving average, the texture with the site's holes, and are cut into blocks of one shape, at least two windows
+//! Both rasters go through the same moving average, the texture with the site's holes, and without the objects of either (unless `find_objects` is
+//! false), and are cut into blocks of one shape, at least two windows
 //! wide. Each block has the statistics of [`sastrugi_roughness::surface_statistics`], and the logarithms of its root mean square height, slope and
 //! curvature. A statistic of a set of blocks is the mean over them; `spread_of_blocks` is the logarithm of the standard deviation of those three
 //! over them, which reveals a texture that repeats itself, or is uniform where the site is not. Blocks far apart in one large texture count
@@ -275,7 +276,12 @@ impl<'a> Judge<'a> {
         let reference = values(&self.site, k);
         let all: Vec<&Block> = self.site.iter().chain(&self.texture).copied().collect();
         let split = |blocks: &[&'a Block], order: &[usize], first: usize| {
-            let picked = |order: &[usize]| order.iter().map(|&i| blocks[i]).collect::<Vec<&Block>>();
+            let picked = |order: &[usize]| {
+                let mut order = order.to_vec();
+                // Sums do not depend on the order of the draw, so that a draw of the observed arrangement ties with it.
+                order.sort_unstable();
+                order.into_iter().map(|i| blocks[i]).collect::<Vec<&Block>>()
+            };
             let (one, other) = order.split_at(first);
             distance([&picked(one), &picked(other)], k, &reference)
         };

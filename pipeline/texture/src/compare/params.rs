@@ -19,6 +19,9 @@ pub struct CompareParameters {
     pub outer_scale_m: f64,
     /// Significance level at which residuals are trimmed. Default 0.05.
     pub trim: f64,
+    /// Whether objects (trees, rocks, structures) of both sides are found and left out. Default true. Set it to false where a texture should have the
+    /// objects of its site, which are then judged with the rest.
+    pub find_objects: bool,
     /// Covariance model of both sides: a single term, optionally with `+nugget`. Default `exponential`.
     pub model: String,
     /// Relative difference of sigma that still counts as the same. Default 0.1.
@@ -50,6 +53,7 @@ impl Default for CompareParameters {
         Self {
             outer_scale_m: fit.outer_scale_m,
             trim: fit.trim,
+            find_objects: fit.find_objects,
             model: fit.model,
             equivalence_sigma: 0.1,
             equivalence_range: 0.25,
@@ -94,6 +98,7 @@ impl TryFrom<CompareParameters> for CompareSettings {
             mode: Mode::Corrected,
             outer_scale_m: p.outer_scale_m,
             trim: p.trim,
+            find_objects: p.find_objects,
             model: form.name().to_owned(),
             bootstrap: 0,
             ..FitParameters::default()
