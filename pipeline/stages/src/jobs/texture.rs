@@ -9,7 +9,9 @@ use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
-use crate::operations::textures::{fill_note, has_its_texture, lacks_background, lay_onto, on_site_cells, scaled};
+use crate::operations::textures::{
+    fill_note, has_its_texture, lacks_background, lay_onto, notes_on_filling, on_site_cells, scaled,
+};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::{Entry, Expanded, StudyError};
@@ -547,7 +549,7 @@ impl TextureJob {
             Some(Needs::Covariance) => (conditional::fill(&dem.grid, &covariance, &self.streams), Vec::new()),
             _ => {
                 let (synthesis, made) = self.made(work, fit)?;
-                let notes = synthesis.notes().into_iter().chain(made.notes).collect();
+                let notes = notes_on_filling(synthesis.notes()).chain(made.notes).collect();
                 (conditional::fill_with(&dem.grid, &covariance, &made.grid), notes)
             }
         };

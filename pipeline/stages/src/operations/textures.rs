@@ -7,6 +7,7 @@ use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_texture::Needs;
 use sastrugi_texture::synth::fft_ma;
+use sastrugi_texture::synth::residual::NO_LONG_WAVES;
 use serde_json::{Value, json};
 
 /// A texture with its heights multiplied by a factor.
@@ -24,6 +25,11 @@ pub fn on_site_cells(method: &str, parameters: &mut Value, cell_m: Option<[f64; 
     let repeats = sastrugi_texture::needs(method).is_some_and(|needs| needs != Needs::Covariance);
     let (Some([x, y]), true, true) = (cell_m, repeats, parameters["cell_m"].is_null()) else { return };
     parameters["cell_m"] = if x == y { json!(x) } else { json!([x, y]) };
+}
+
+/// Notes on a texture that fills holes, whose surroundings give it the long waves that it lacks.
+pub fn notes_on_filling(notes: Vec<String>) -> impl Iterator<Item = String> {
+    notes.into_iter().filter(|note| !note.starts_with(NO_LONG_WAVES))
 }
 
 /// A note on holes filled by `method` with an empirical fit.
@@ -73,6 +79,13 @@ pub fn lay_onto(base: &Grid, texture: &Grid, periodic: bool, factors: Option<&Gr
 mod tests {
     use super::*;
     use sastrugi_schemas::fit::CovarianceMap;
+
+    /// A base for long waves is not asked for where there is one.
+    #[test]
+    fn val_a_filled_hole_needs_no_base() {
+        let notes = [format!("{NO_LONG_WAVES}, 2 m; add it to a base that has them"), "made of cells".to_owned()];
+        assert_eq!(notes_on_filling(notes.to_vec()).collect::<Vec<_>>(), ["made of cells"]);
+    }
 
     /// Only a normal texture is that of the fitted model; without a measured covariance there is nothing to note.
     #[test]

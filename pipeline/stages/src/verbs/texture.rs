@@ -5,7 +5,9 @@ use crate::error::Error;
 use crate::jobs::texture::{STAGE, kinds};
 use crate::memory;
 use crate::operations::fits::of_json;
-use crate::operations::textures::{fill_note, has_its_texture, lacks_background, lay_onto, on_site_cells, scaled};
+use crate::operations::textures::{
+    fill_note, has_its_texture, lacks_background, lay_onto, notes_on_filling, on_site_cells, scaled,
+};
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::ParameterError;
@@ -237,7 +239,7 @@ fn texture_for(
     let parameters = json!({ "size_px": [dem.cols(), dem.rows()], "cell_m": dem.geometry.cell, "periodic": false });
     let (synthesis, mut notes) = prepared(request, &parameters, fit)?;
     let outcome = synthesis.generate(streams).map_err(|e| Error::Usage(e.to_string()))?;
-    notes.extend(synthesis.notes().into_iter().chain(outcome.notes));
+    notes.extend(notes_on_filling(synthesis.notes()).chain(outcome.notes));
     Ok((outcome.grid, notes))
 }
 

@@ -38,6 +38,8 @@ use std::sync::Arc;
 const CELL_TOLERANCE: f64 = 1e-6;
 /// Lags of a measured residual reach this share of a side of the site.
 const LAG_SHARE: usize = 4;
+/// How the note begins on what a texture lacks without a base; where holes are filled, their surroundings give it.
+pub const NO_LONG_WAVES: &str = "the texture has no waves longer than the window of the fit";
 
 /// What a method needs of the measured ground.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -320,9 +322,7 @@ impl<P: ResidualParameters> Method for Checked<P> {
         let window = fit.window_m.map(|[x, y]| {
             let window_m = super::to_micrometres(0.5 * (x + y));
             match &raised {
-                None => format!(
-                    "the texture has no waves longer than the window of the fit, {window_m} m; add it to a base that has them"
-                ),
+                None => format!("{NO_LONG_WAVES}, {window_m} m; add it to a base that has them"),
                 Some(_) => raised_note(window_m, P::Source::NEEDS == Needs::Residual),
             }
         });
