@@ -5,8 +5,8 @@
 //! false), and are cut into blocks of one shape, at least two windows
 //! wide. Each block has the statistics of [`sastrugi_roughness::surface_statistics`], and the logarithms of its root mean square height, slope and
 //! curvature. A statistic of a set of blocks is the mean over them; `spread_of_blocks` is the logarithm of the standard deviation of those three
-//! over them, which reveals a texture that repeats itself, or is uniform where the site is not. Blocks far apart in one large texture count
-//! as its realisations. Also reported, without a verdict, are verbatim copies ([`sastrugi_roughness::copies()`]).
+//! over them, so that a texture that repeats itself, or is alike everywhere where the site is not, is detected. Blocks far apart in one large
+//! texture count as its realisations. Also reported, without a verdict, are verbatim copies ([`sastrugi_roughness::copies()`]).
 //!
 //! # Null hypothesis and error rates
 //! No generator is known, so nothing can be simulated. The null hypothesis is that the texture is more ground of the same kind: its blocks and the

@@ -26,7 +26,7 @@
 //! | 0.3 | 0.302, 0.051 | 0.301, 0.045 | 0.308, 0.061 | 0.292, 0.040 |
 //! | 0.8 | 0.840, 0.198 | 0.826, 0.197 | 0.857, 0.247 | 0.763, 0.143 |
 //!
-//! L within 8 %. With a heavy-tailed T 0.304 and 0.856; on smooth ground (Matern 3/2) 0.340 and 1.00. White noise fills quiet places: with 20 % of the standard deviation 0.3
+//! L within 8 %. With a heavy-tailed T 0.304 and 0.856; on smooth ground (Matern 3/2) 0.340 and 1.00, and worse on smoother (`fit.rs`). White noise fills quiet places: with 20 % of the standard deviation 0.3
 //! becomes 0.15, and the texture has the noise in patches too. L of 2 or 3 cells are found as 4.3 and 3.7. The standard error that is stated covers
 //! the spread within a third to a half, not noise. Where the covariance of a texture would be off by more than 10 % of the variance, or its one-cell increments
 //! by more than 10 % of theirs, s^2 is lowered until it is not.
@@ -37,7 +37,9 @@
 //! The flatness of increments, `F(l) = <d^4> / <d^2>^2`, is not fitted; without T it is known in closed form ([`flatness`]): `3 exp(4 s^2)` for one cell where L
 //! is many cells, falling with lag as far as L.
 //!
-//! Not identified: L beyond 40 cells or a sixth of the site, where the fit ends; one scale of patches is fitted, so L is a compromise where
+//! Patches are isotropic in metres, whatever the anisotropy of the site.
+//!
+//! Not identified: s^2 of smooth ground (`fit.rs`); L beyond 40 cells or a sixth of the site, where the fit ends; one scale of patches is fitted, so L is a compromise where
 //! patches have patches. Not reached: a flatness far above that of the heights, since T cuts the tails of the product to those of the heights. Flatness over 1, 2, 4,
 //! 8, 16 and 32 cells of the unseen half of three sites, of textures of the other half, and of T alone (s^2 = 0):
 //!
@@ -47,12 +49,12 @@
 //! | gullies, 50 cm | 0.10 (0.01), 24 | 131, 99, 55, 25, 14, 8.7 | 9.9, 9.4, 8.7, 7.6, 6.5, 5.6 | 8.7, 8.4, 7.8, 6.9, 5.9, 5.8 |
 //! | volcanic cone, 1 m | 0.70 (0.34), 32 | 6.7, 6.7, 6.9, 7.5, 8.3, 6.4 | 19, 16, 13, 9.3, 6.6, 4.7 | 3.7, 3.7, 3.6, 3.5, 3.5, 3.6 |
 //!
-//! The flatness is thus right where roughness comes in patches, too low where it comes from rims and steps on smooth ground, and too high where quiet
-//! ground is far quieter than log-normal. Not reproduced either: third-order structure (the field looks the same with its axes reversed), ridges, and
+//! (From an earlier version of the fit, which believed any v.) So: right where roughness comes in patches; too low where rims and steps on smooth ground make
+//! it, which are not patches. Too high on the cone: on ground so smooth s^2 is not identified. Not reproduced either: third-order structure (the field looks the same with its axes reversed), ridges, and
 //! whatever else needs aligned phases: use `wavelet_statistics`.
 //!
 //! Cost: for 1024 x 1024 cells some 1.7 times FFT-MA's: one forward and three inverse half transforms, an exponential and two table look-ups
-//! per cell (an estimate); once per texture some 60 ms of tables. Memory: 44 bytes per torus cell. The fit: about five
+//! per cell (an estimate), and a third look-up for the error of the covariance; once per texture some 60 ms of tables. Memory: 44 bytes per torus cell. The fit: about five
 //! rounds of two masked covariances with lags of up to 40 cells.
 
 mod fit;
@@ -250,7 +252,7 @@ pub fn kind() -> Kind {
     Kind {
         family: "texture",
         kind: NAME,
-        summary: "normal field times a log-normal amplitude, with the residual's covariance and heights: rough in patches",
+        summary: "normal field times a log-normal amplitude, with the residual's covariance and heights: intermittent roughness",
         source: "Castaing, Gagne and Hopfinger 1990; Mehler 1866",
         parameters: tile::schema_of_site::<ModulatedParameters>(),
     }

@@ -14,9 +14,9 @@
 //! A periodic tile is a torus: the last patches of a row or column are also cut against the first.
 //!
 //! # Statistics
-//! The least sum of squared differences, the rule of the source, prefers calm patches. It took 17 to 40 % of the standard deviation, and 19 to
-//! 49 % of the increments, from five sites; cut and blend take 1 to 2 %, and 3 % of the increments. Dividing by the squares removes the preference,
-//! but the roughest or the calmest part of a site may then take over (0.85 to 1.26 of the standard deviation); the cost prevents that. An independent
+//! The least sum of squared differences, the rule of the source, prefers calm patches. It lowers the standard deviation by 17 to 40 %, and
+//! increments by 19 to 49 %, on five sites; cut and blend take 1 to 2 %, and 3 % of the increments. Dividing by the squares removes the preference,
+//! but the roughest or the calmest part of a site may then dominate the texture (0.85 to 1.26 of the standard deviation); the cost prevents that. An independent
 //! program made textures of 256 x 256 cells (gravel: 128 x 128; its gaps were not closed), of which two to four gave, as ratios to the site (mean
 //! and spread between textures) and as the difference of `ln` of the flatness at a lag of one cell:
 //!

@@ -20,9 +20,11 @@
 //! * the covariance at all stored lags instead of 7 x 7 in each octave;
 //! * differences with their distributions, because moments up to the fourth do not hold the tails of rough ground (flatness of one-cell
 //!   increments 30 to 350);
-//! * no relative phase between octaves: the skewness of increments by direction, to which it leads, is in their quantiles.
+//! * no relative phase between octaves: the skewness of increments by direction, to which it leads, is in their quantiles. Phase harmonics describe it
+//!   as covariances (Zhang and Mallat 2021, Maximum entropy models from phase harmonic covariances, Applied and Computational Harmonic Analysis 53,
+//!   199-230), reached by descent along their gradient, which a fixed number of projections does not give.
 //!
-//! Measured with a prototype of the same steps on halves of sites (window 25 cells, four octaves, lags of differences to 8 cells): distance of
+//! Measured with a prototype of the same steps, which is not part of this repository (`benches/measure_textures` judges the shipped kernel), on halves of sites (window 25 cells, four octaves, lags of differences to 8 cells): distance of
 //! the texture of one half from the other half, and of the two halves from each other in brackets; slopes and curvatures relative. The
 //! last columns are the one-cell flatness (fitted, other half) and the largest error of the covariance to 12 lags.
 //!
