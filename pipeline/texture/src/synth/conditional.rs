@@ -363,9 +363,10 @@ mod tests {
     }
 
     /// A texture far from normal, the magnitude of an independent field scaled to its variance, joins the surface without a step at the rim, and
-    /// is what lies in the hole. Limits lie 5 standard deviations from the mean over 30 draws of the same formulas in numpy: mean square steps
-    /// across the rim 1.65 +- 0.48 times those of the surface (steps of the texture are 2.8 times as large, and without conditioning those
-    /// across the rim 5.4 +- 2.1 times), correlation of curvatures inside 0.90 +- 0.05.
+    /// is what lies in the hole. Null: the same formulas in numpy, 30 draws: mean square steps across the rim 1.65 +- 0.48 times those of the
+    /// surface (steps of the texture are 2.8 times as large, and without conditioning those across the rim 5.4 +- 2.1 times), correlation of
+    /// curvatures inside 0.90 +- 0.05. A gamma variable of that mean and spread exceeds 4 with probability 1.3e-4, and Fisher's transform of the
+    /// correlation lies below that of 0.4 with 3e-5; of a hole without texture it is about 0.
     #[test]
     fn stat_a_texture_that_is_not_normal_joins_at_the_rim() {
         let (truth, texture) = (surface(4), surface(5).map(|z| (z.abs() - 0.08) / 0.6));
@@ -384,7 +385,7 @@ mod tests {
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
         let (made, wanted) = (bends(&filled), bends(&texture));
         let correlation = product(&made, &wanted) / (product(&made, &made) * product(&wanted, &wanted)).sqrt();
-        assert!(correlation > 0.6, "{correlation}");
+        assert!(correlation > 0.4, "{correlation}");
     }
 
     /// Kriging by hand, without an unconditional field. A hole of one cell in the middle of level ground gets its height, and of a plane the
