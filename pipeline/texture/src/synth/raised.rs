@@ -174,13 +174,13 @@ mod tests {
         assert_eq!(gain(1.0 + 1e-15), GAIN_MAX);
     }
 
-    /// Three waves eastwards over 60 cells, and five southwards over 50, are multiplied by the gain of their responses; the mean is removed.
+    /// Two waves eastwards over 60 cells, and three southwards over 50, are multiplied by the gain of their responses; the mean is removed.
     #[test]
     fn val_waves_are_raised() {
         let wave = |at: usize, count: f64, cells: f64| libm::cos(TAU * count * at as f64 / cells);
-        let [east, south] = [(3, 60), (5, 50)].map(|(k, n)| gain(mean_of_cosine(21, k, n)));
+        let [east, south] = [(2, 60), (3, 50)].map(|(k, n)| gain(mean_of_cosine(21, k, n)));
         let field = |gains: [f64; 2], mean: f64| -> Vec<f64> {
-            let at = |k: usize| gains[0] * wave(k % 60, 3.0, 60.0) + gains[1] * wave(k / 60, 5.0, 50.0) + mean;
+            let at = |k: usize| gains[0] * wave(k % 60, 2.0, 60.0) + gains[1] * wave(k / 60, 3.0, 50.0) + mean;
             (0..50 * 60).map(at).collect()
         };
         let found = raised().filtered(field([1.0, 0.5], 7.0), [50, 60], gain);
