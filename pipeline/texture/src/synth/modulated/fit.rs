@@ -11,22 +11,26 @@
 //! at the range with the least misfit. The mean that is subtracted is that of a finite site: rho~ is taken less its mean over all pairs of cells.
 //! This v must be the one that y was made with, which a secant iteration finds.
 //!
-//! On smooth ground the map to products is seen itself: d holds `f'' z_x z_y` beside `f' z_xy`, f the map, so that about any v finds itself. What normal
-//! products (v = 0) show of it, v_0, tells: v_0 / v is 1 less the mean slope of the iteration between 0 and v. A v of which they show less than a quarter, or
-//! that lies at the largest allowed, is not believed: v_0 is taken, and the difference counts as error. With numpy, 256 x 256 cells, patches of 8 cells:
+//! On smooth ground the map to products is seen itself: d holds `f'' z_x z_y` beside `f' z_xy`, f the map, so that about any v finds itself. Of normal products
+//! (v = 0), `Q = <d_x^2> <d_y^2> / (256 <d^2> <y^2>)` says how smooth the ground is, d_x and d_y the differences of the same blocks along rows and
+//! along columns: 1 for waves much longer than the blocks, 1/16 for independent cells. Where Q is above 0.5, what normal products show of v tells, v_0:
+//! v_0 / v is 1 less the mean slope of the iteration between 0 and v. A v of which they show less than a quarter, or that lies at the largest allowed, is not
+//! believed there: v_0 is taken, and the difference counts as error. On rough ground the share is as small where patches are strong, and v is right. With
+//! numpy, 256 x 256 cells, patches of 8 cells:
 //!
-//! | ground | truth | v by the iteration | v_0 | v_0 / v |
-//! |---|---|---|---|---|
-//! | exponential, 4 cells | 0.1, 0.3, 0.8 | 0.09 to 0.11, 0.27 to 0.35, 0.72 to 0.90 | 0.06 to 0.08, 0.15 to 0.17, 0.29 to 0.33 | 0.72 to 0.76, 0.48 to 0.59, 0.35 to 0.43 |
-//! | normal field low-passed over 2 cells | 0, 0.3 | 0.00 to 0.01, 0.33 to 0.37 | 0.00 to 0.01, 0.17 to 0.19 | , 0.49 to 0.54 |
-//! | over 4 cells | 0, 0.3, 0.8 | 0.30 to 0.98, 1.42 to 2.00, 2.00 | 0.02 to 0.08, 0.35 to 0.43, 0.65 to 0.79 | 0.02 to 0.22, 0.18 to 0.26, 0.32 to 0.39 |
-//! | over 6 cells | 0, 0.3 | 0.83 to 1.66, 2.00 | 0.07 to 0.23, 0.25 to 0.34 | 0.04 to 0.25, 0.12 to 0.17 |
+//! | ground | truth | Q | v by the iteration | v_0 | v_0 / v |
+//! |---|---|---|---|---|---|
+//! | exponential, 4 cells | 0.1, 0.3, 0.8, 1.6 | 0.23 to 0.24 | 0.09 to 0.11, 0.27 to 0.35, 0.72 to 0.90, 1.3 to 1.9 | 0.06 to 0.08, 0.15 to 0.17, 0.29 to 0.33, 0.41 to 0.47 | 0.72 to 0.76, 0.48 to 0.59, 0.35 to 0.43, 0.24 to 0.32 |
+//! | Matern 3/2, 4 cells | 0.3, 0.8, 1.6 | 0.37 to 0.41 | 0.29 to 0.32, 0.75 to 1.08, 1.5 to 2.0 | 0.17, 0.30 to 0.34, 0.45 to 0.50 | 0.52 to 0.60, 0.32 to 0.44, 0.25 to 0.33 |
+//! | normal field low-passed over 2 cells | 0, 0.3 | 0.69 to 0.75 | 0.00 to 0.01, 0.33 to 0.40 | 0.00 to 0.01, 0.17 to 0.19 | , 0.41 to 0.54 |
+//! | over 4 cells | 0, 0.3, 0.8 | 0.87 to 0.93, 0.70 to 0.72, 0.53 to 0.56 | 0.30 to 0.98, 1.24 to 2.00, 2.00 | 0.02 to 0.10, 0.29 to 0.43, 0.55 to 0.79 | 0.02 to 0.22, 0.15 to 0.27, 0.28 to 0.39 |
+//! | over 6 cells | 0, 0.3 | 0.88 to 1.01, 0.65 to 0.70 | 0.62 to 1.66, 1.64 to 2.00 | 0.05 to 0.23, 0.25 to 0.45 | 0.04 to 0.25, 0.12 to 0.28 |
 //!
-//! (4 fields each.) On smooth ground v_0 itself is near the truth; normal ground low-passed over 6 cells and more has up to 0.3 of its own.
+//! (3 to 8 fields each.) On smooth ground v_0 itself is near the truth; normal ground low-passed over 6 cells and more has up to 0.3 of its own.
 //!
 //! The standard error counts patches: n = the site's cells over those of `rho^2`, and of the squared correlation of y, whose quantiles are as uncertain;
 //! `sqrt(2 / n) (v + pi^2 / 8 / cells of a patch) / (1 - s)`, s the slope of the iteration: the last one where v hardly matters, otherwise the mean, for which
-//! 1 - s is v_0 / v. Where that is below a third, the error is at least v - v_0.
+//! 1 - s is v_0 / v. On smooth ground where that is below a third, the error is at least v - v_0.
 
 use super::transform::{self, Transform};
 use super::{
@@ -55,8 +59,10 @@ const START: [f64; 2] = [0.3, 8.0];
 const STEPS: usize = 8;
 /// Slopes of the iteration are clamped to this range.
 const SLOPES: [f64; 2] = [-0.5, 0.75];
-/// Least share of a log variance that normal products must show if patches are visible: below the first it is not believed, below the second not well
-/// known.
+/// Ground is smooth where [`smoothness`] is above this.
+const SMOOTH: f64 = 0.5;
+/// Least share of a log variance that normal products must show on smooth ground if patches are visible: below the first it is not believed, below the
+/// second not well known.
 const SHOWN_SHARES: [f64; 2] = [0.25, 1.0 / 3.0];
 /// Change of the log variance at which the iteration ends: absolute, and relative.
 const TOLERANCES: [f64; 2] = [2e-3, 5e-3];
@@ -205,13 +211,16 @@ impl Site<'_> {
         let normal = (found.log_variance >= NOTED_MIN).then(|| self.step(0.0, found.range)).flatten();
         let Some(normal) = normal else { return found };
         let shown = normal.log_variance / found.log_variance;
-        let apart = if shown < SHOWN_SHARES[1] { found.log_variance - normal.log_variance } else { 0.0 };
         // No more than what a log variance can be.
-        let error = (found.spread / shown).max(apart).min(LOG_VARIANCE_MAX);
-        if shown >= SHOWN_SHARES[0] && found.log_variance < LOG_VARIANCE_MAX {
+        let error = (found.spread / shown).min(LOG_VARIANCE_MAX);
+        let is_smooth = smoothness(&self.products(0.0)) > SMOOTH;
+        if !is_smooth || (shown >= SHOWN_SHARES[1] && found.log_variance < LOG_VARIANCE_MAX) {
             return Found { error, ..found };
         }
         let error = error.max(found.log_variance - normal.log_variance);
+        if shown >= SHOWN_SHARES[0] && found.log_variance < LOG_VARIANCE_MAX {
+            return Found { error, ..found };
+        }
         Found {
             log_variance: normal.log_variance,
             range: normal.range,
@@ -337,13 +346,28 @@ fn distinct(heights_m: &[f64], products: &[f64]) -> (Vec<f64>, Vec<f64>) {
 
 /// Haar's diagonal wavelet of 4 x 4 cells: the mixed difference of four blocks of 2 x 2 cells; NaN around cells without data. At least 4 x 4 cells.
 pub(super) fn mixed_differences(y: &Grid) -> Grid {
+    signed_sums(y, [-1.0; 2])
+}
+
+/// Sums over 4 x 4 cells, the two southern rows and the two eastern columns with these signs; NaN around cells without data. At least 4 x 4 cells.
+fn signed_sums(y: &Grid, [south, east]: [f64; 2]) -> Grid {
     let geometry = Geometry { rows: y.rows() + 1 - SUPPORT, cols: y.cols() + 1 - SUPPORT, ..y.geometry };
     let line = |r: usize| {
         let [a, b, c, d] = [0, 1, 2, 3].map(|k| y.row(r + k));
-        let down: Vec<f64> = (0..y.cols()).map(|k| (a[k] + b[k]) - (c[k] + d[k])).collect();
-        (0..geometry.cols).map(move |k| (down[k] + down[k + 1]) - (down[k + 2] + down[k + 3]))
+        let down: Vec<f64> = (0..y.cols()).map(|k| (a[k] + b[k]) + south * (c[k] + d[k])).collect();
+        (0..geometry.cols).map(move |k| (down[k] + down[k + 1]) + east * (down[k + 2] + down[k + 3]))
     };
     Grid::new(geometry, (0..geometry.rows).into_par_iter().flat_map_iter(line).collect())
+}
+
+/// How smooth a surface about 0 is: what the product of its two slopes weighs beside its mixed difference, from 1/16 for independent cells to 1 for
+/// waves much longer than four cells.
+pub(super) fn smoothness(y: &Grid) -> f64 {
+    let mean_square = |z: &Grid| sums::mean(&sums::finite(&z.map(|v| v * v).values));
+    let [southwards, eastwards, mixed] =
+        [[-1.0, 1.0], [1.0, -1.0], [-1.0, -1.0]].map(|signs| mean_square(&signed_sums(y, signs)));
+    let cells = (SUPPORT * SUPPORT) as f64;
+    southwards * eastwards / (cells * cells * mixed * mean_square(y))
 }
 
 /// Logarithms of magnitudes about their mean; `None` if all are 0 or there are none.

@@ -26,7 +26,7 @@
 //! | 0.3 | 0.302, 0.051 | 0.301, 0.045 | 0.308, 0.061 | 0.292, 0.040 |
 //! | 0.8 | 0.840, 0.198 | 0.826, 0.197 | 0.857, 0.247 | 0.763, 0.143 |
 //!
-//! L within 8 %. With a heavy-tailed T 0.304 and 0.856; on smooth ground (Matern 3/2) 0.340 and 1.00, and worse on smoother (`fit.rs`). White noise fills quiet places: with 20 % of the standard deviation 0.3
+//! L within 8 %. With a heavy-tailed T 0.304 and 0.856; with a Matern 3/2 covariance 0.340 and 1.00, and worse on smoother ground (`fit.rs`). White noise fills quiet places: with 20 % of the standard deviation 0.3
 //! becomes 0.15, and the texture has the noise in patches too. L of 2 or 3 cells are found as 4.3 and 3.7. The standard error that is stated covers
 //! the spread within a third to a half, not noise. Where the covariance of a texture would be off by more than 10 % of the variance, or its one-cell increments
 //! by more than 10 % of theirs, s^2 is lowered until it is not.
@@ -50,8 +50,8 @@
 //! | volcanic cone, 1 m | 0.70 (0.34), 32 | 6.7, 6.7, 6.9, 7.5, 8.3, 6.4 | 19, 16, 13, 9.3, 6.6, 4.7 | 3.7, 3.7, 3.6, 3.5, 3.5, 3.6 |
 //!
 //! (From an earlier version of the fit, which believed any v.) So: right where roughness comes in patches; too low where rims and steps on smooth ground make
-//! it, which are not patches. Too high on the cone: on ground so smooth s^2 is not identified. Not reproduced either: third-order structure (the field looks the same with its axes reversed), ridges, and
-//! whatever else needs aligned phases: use `wavelet_statistics`.
+//! it, which are not patches. Too high on the cone, where a curved map may have been taken for patches, as on smooth ground. Not reproduced either: third-order
+//! structure (the field looks the same with its axes reversed), ridges, and whatever else needs aligned phases: use `wavelet_statistics`.
 //!
 //! Cost: for 1024 x 1024 cells some 1.7 times FFT-MA's: one forward and three inverse half transforms, an exponential and two table look-ups
 //! per cell (an estimate), and a third look-up for the error of the covariance; once per texture some 60 ms of tables. Memory: 44 bytes per torus cell. The fit: about five
@@ -226,8 +226,8 @@ fn doubts(fitted: &Modulation) -> Vec<String> {
     );
     let uncertain = match error > measured.max(NOTED_MIN) {
         true => format!(
-            "the log variance of the amplitude is not identified ({measured:.2}, with a standard error of {error:.2}): on smooth ground a curved map of the \
-             heights looks like patches; set `log_variance` to override it"
+            "the log variance of the amplitude is not identified ({measured:.2}, with a standard error of {error:.2}): the site holds {patches:.0} independent \
+             patches, and on smooth ground a curved map of the heights looks like patches; set `log_variance` to override it"
         ),
         false => format!(
             "the log variance of the amplitude, {measured:.2}, has a standard error of {error:.2}: the site holds {patches:.0} independent patches; set \
