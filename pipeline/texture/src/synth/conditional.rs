@@ -363,29 +363,35 @@ mod tests {
     }
 
     /// A texture far from normal, the magnitude of an independent field scaled to its variance, joins the surface without a step at the rim, and
-    /// is what lies in the hole. Null: the same formulas in numpy, 30 draws: mean square steps across the rim 1.65 +- 0.48 times those of the
-    /// surface (steps of the texture are 2.8 times as large, and without conditioning those across the rim 5.4 +- 2.1 times), correlation of
-    /// curvatures inside 0.90 +- 0.05. A gamma variable of that mean and spread exceeds 4 with probability 1.3e-4, and Fisher's transform of the
-    /// correlation lies below that of 0.4 with 3e-5; of a hole without texture it is about 0.
+    /// is what lies in the hole. Means over four surfaces and textures. Null: the same formulas in numpy, 30 draws: mean square steps across the rim
+    /// 1.65 +- 0.48 times those of the surface (steps of the texture are 2.8 times as large, and without conditioning those across the rim 5.4 +- 2.1
+    /// times), correlation of curvatures inside 0.90 +- 0.05. The mean of four gamma variables of that mean and spread exceeds 3 with probability
+    /// 2e-6, and that of four correlations, normal after Fisher's transform, is below 0.7 with 6e-6; of holes without texture it is about 0.
     #[test]
     fn stat_a_texture_that_is_not_normal_joins_at_the_rim() {
-        let (truth, texture) = (surface(4), surface(5).map(|z| (z.abs() - 0.08) / 0.6));
-        let filled = fill_with(&with_hole(&truth), &exponential(), &texture).unwrap().grid;
         let square = |a: f64, b: f64| (a - b) * (a - b);
-        let of_rows = (12..26).flat_map(|c| [[13, c, 14, c], [24, c, 23, c]]);
-        let of_cols = (14..24).flat_map(|r| [[r, 11, r, 12], [r, 26, r, 25]]);
-        let across = of_rows.chain(of_cols).map(|[r, c, in_r, in_c]| square(filled.at(r, c), filled.at(in_r, in_c)));
-        let own = truth.values.chunks(40).flat_map(|row| row.windows(2)).map(|pair| square(pair[0], pair[1]));
-        let ratio = sums::mean(&across.collect::<Vec<_>>()) / sums::mean(&own.collect::<Vec<_>>());
-        assert!(ratio < 4.0, "{ratio}");
         let bends = |z: &Grid| -> Vec<f64> {
             let bend = |r: usize, c: usize| z.at(r, c - 1) + z.at(r, c + 1) - 2.0 * z.at(r, c);
             (16..22).flat_map(|r| (14..25).map(move |c| (r, c))).map(|(r, c)| bend(r, c)).collect()
         };
         let product = |a: &[f64], b: &[f64]| a.iter().zip(b).map(|(x, y)| x * y).sum::<f64>();
-        let (made, wanted) = (bends(&filled), bends(&texture));
-        let correlation = product(&made, &wanted) / (product(&made, &made) * product(&wanted, &wanted)).sqrt();
-        assert!(correlation > 0.4, "{correlation}");
+        let ratio_and_correlation = |seed: u64| {
+            let (truth, texture) = (surface(seed), surface(seed + 1).map(|z| (z.abs() - 0.08) / 0.6));
+            let filled = fill_with(&with_hole(&truth), &exponential(), &texture).unwrap().grid;
+            let of_rows = (12..26).flat_map(|c| [[13, c, 14, c], [24, c, 23, c]]);
+            let of_cols = (14..24).flat_map(|r| [[r, 11, r, 12], [r, 26, r, 25]]);
+            let across =
+                of_rows.chain(of_cols).map(|[r, c, in_r, in_c]| square(filled.at(r, c), filled.at(in_r, in_c)));
+            let own = truth.values.chunks(40).flat_map(|row| row.windows(2)).map(|pair| square(pair[0], pair[1]));
+            let (made, wanted) = (bends(&filled), bends(&texture));
+            [
+                sums::mean(&across.collect::<Vec<_>>()) / sums::mean(&own.collect::<Vec<_>>()),
+                product(&made, &wanted) / (product(&made, &made) * product(&wanted, &wanted)).sqrt(),
+            ]
+        };
+        let found = [4, 6, 8, 10].map(ratio_and_correlation);
+        let [ratio, correlation] = [0, 1].map(|k| sums::mean(&found.map(|of_one| of_one[k])));
+        assert!(ratio < 3.0 && correlation > 0.7, "{found:?}");
     }
 
     /// Kriging by hand, without an unconditional field. A hole of one cell in the middle of level ground gets its height, and of a plane the

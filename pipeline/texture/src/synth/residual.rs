@@ -454,8 +454,9 @@ mod tests {
         fit(z, &settings, &Streams::for_seed(1, "fit")).unwrap().fit
     }
 
-    /// Every method makes a texture of the size and cells asked for, with the residual's spread within a half (14 m hold some 130
-    /// independent pieces, so the spread of a standard deviation is 10 %: five of them, 2e-6 for four methods); repeated tiles are equal.
+    /// Every method makes a texture of the size and cells asked for, with the residual's spread within a third in the mean of four textures (14 m hold some
+    /// 130 independent pieces, so the spread of a standard deviation is 10 %, and of its mean 5 %: six of them, 1e-8 for four methods without a bias);
+    /// repeated tiles are equal.
     #[test]
     fn val_every_method_makes_textures_of_a_fit() {
         let z = site();
@@ -476,7 +477,10 @@ mod tests {
             let made = texture.generate(&Streams::for_seed(2, "texture")).unwrap();
             assert_eq!(made.grid.geometry, Geometry { rows: 160, ..Geometry::square(80, 96, 0.1) }, "{name}");
             assert_eq!(made.grid.row(0), made.grid.row(80), "{name}");
-            assert!((rms(&made.grid) / wanted_m - 1.0).abs() < 0.5, "{name}: {} {wanted_m}", rms(&made.grid));
+            let others = (3..6).map(|seed| texture.generate(&Streams::for_seed(seed, "texture")).unwrap().grid);
+            let found_m: Vec<f64> = std::iter::once(made.grid).chain(others).map(|z| rms(&z)).collect();
+            let mean_m = sastrugi_numeric::sums::mean(&found_m);
+            assert!((mean_m / wanted_m - 1.0).abs() < 0.33, "{name}: {found_m:?} {wanted_m}");
             assert!(made.covariance_error_max_m2.is_nan() && texture.ratio().is_nan());
             let lags = texture.covariance();
             assert!((lags[0].wanted_m2.sqrt() / wanted_m - 1.0).abs() < 0.05 && lags[0].achieved_m2.is_nan(), "{name}");
