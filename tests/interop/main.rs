@@ -541,8 +541,8 @@ fn val_gstools_blocks_are_the_fitted_models() {
 /// 0.9, beyond what halves of the site give), and cannot tell two of them from each other.
 ///
 /// Null of the second: both rasters are draws of one field. Some 200 patches of each give the mean of five AUCs a standard error below 0.04, so
-/// that 0.2 from 0.5 is beyond 5 of them (1e-6). `compare --statistics` agrees in both; its wrong `different` has a probability of at most 0.05, so
-/// that all three pairs of normal textures are told apart with 1.3e-4.
+/// that 0.2 from 0.5 is beyond 5 of them (1e-6). `compare --statistics` agrees in both; its wrong `different` has a probability of at most 0.05,
+/// once for the seeds written here.
 #[test]
 fn stat_a_classifier_tells_normal_textures_from_measured_ground() {
     let Some(python) = python() else { return };
@@ -556,8 +556,7 @@ fn stat_a_classifier_tells_normal_textures_from_measured_ground() {
         call.stdout
     };
     run(&["fit", dem, "--outer-scale", "25", "--bootstrap", "0", "-o", "fit.json"]);
-    let pairs = [["a.tif", "b.tif"], ["c.tif", "d.tif"], ["e.tif", "f.tif"]];
-    for (name, seed) in pairs.concat().into_iter().zip(["1", "2", "3", "4", "5", "6"]) {
+    for (name, seed) in [("a.tif", "1"), ("b.tif", "2")] {
         let shape = ["texture", "fit.json", "--size", "271x281", "--cell", "1", "--set", "periodic=false"];
         run(&[&shape[..], &["--phase", "gaussian", "--seed", seed, "-o", name]].concat());
     }
@@ -572,13 +571,14 @@ fn stat_a_classifier_tells_normal_textures_from_measured_ground() {
     let auc = |judged: &Value| judged["textures"][0]["auc"].as_f64().unwrap();
     assert!(auc(&told) > 0.9 && told["textures"][0]["passes"] == false, "{told}");
     assert!(told["textures"][0]["auc_halved"].as_f64() > told["site"]["band"][1].as_f64(), "{told}");
+    assert!(Some(auc(&told)) > told["site"]["halves"].as_f64(), "{told}");
     assert!((auc(&blind) - 0.5).abs() < 0.2, "{blind}");
     let answer = |one: &str, other: &str| -> Value {
         let text = run(&["compare", one, other, "--statistics", "--outer-scale", "25", "--json", "--quiet"]);
         serde_json::from_str::<Value>(&text).unwrap()["answer"].clone()
     };
     assert_eq!(answer(dem, "a.tif"), "different");
-    assert!(pairs.into_iter().any(|[one, other]| answer(one, other) != "different"));
+    assert_ne!(answer("a.tif", "b.tif"), "different");
 }
 
 /// Runs `check_fits.py` to the given extent and prints its table.
