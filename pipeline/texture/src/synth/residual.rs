@@ -334,7 +334,11 @@ impl<P: ResidualParameters> Method for Checked<P> {
 
 /// A note on a texture for the background of a fit; `copied` if it is made of copied cells.
 fn raised_note(window_m: f64, copied: bool) -> String {
-    let heights = if copied { "; the heights of copied cells change by that" } else { "" };
+    let heights = if copied {
+        "; the heights of copied cells change, and the share that has the height of its source is that before"
+    } else {
+        ""
+    };
     format!(
         "covariance = residual: waves of about the window of the fit, {window_m} m, are raised, so that a measured background and the texture together \
          have the covariance of the site{heights}"
