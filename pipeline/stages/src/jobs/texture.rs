@@ -10,7 +10,7 @@ use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
 use crate::operations::textures::{
-    fill_note, has_its_texture, lacks_background, lay_onto, notes_on_filling, on_site_cells, scaled,
+    completes_background, fill_note, has_its_texture, lay_onto, notes_on_filling, on_site_cells, scaled,
 };
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -295,7 +295,7 @@ fn check_before_run(
 /// On a measured DEM or the background of a fit, a texture defaults to the covariance of the residual, which such a base lacks.
 fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item: &TextureItem) -> Expanded {
     let measured = base.as_ref().is_some_and(|base| [dem_job::STAGE, fit::STAGE].contains(&base.item.stage.as_str()));
-    let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && lacks_background(&item.method);
+    let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && completes_background(&item.method);
     if measured && fitted && one.params["covariance"].is_null() {
         Arc::make_mut(&mut one.params)["covariance"] = json!(fft_ma::CovarianceOf::Residual);
     }

@@ -16,7 +16,7 @@ pub fn scaled(texture: Grid, factor: f64) -> Grid {
 }
 
 /// Whether a method can make what a measured background lacks, `covariance = "residual"`: FFT-MA and those that repeat a site.
-pub fn lacks_background(method: &str) -> bool {
+pub fn completes_background(method: &str) -> bool {
     method == fft_ma::kind().kind || sastrugi_texture::needs(method).is_some_and(|needs| needs != Needs::Covariance)
 }
 
@@ -38,7 +38,7 @@ pub fn fill_note(fit: &FitFile, method: &str) -> Option<String> {
     Some(match sastrugi_texture::needs(method) {
         Some(Needs::Statistics | Needs::Residual) => {
             format!(
-                "the fit is empirical; the fitted model ({model}) weighs the measured cells around a hole, and is not the texture in it"
+                "the fit is empirical; the fitted model ({model}) only weights the measured cells around a hole; the texture in it is that of the site"
             )
         }
         _ => format!(
@@ -96,7 +96,7 @@ mod tests {
         assert!(said("fft_ma").contains("holes are filled with the fitted model (exponential)"), "{}", said("fft_ma"));
         for method in ["modulated", "wavelet_statistics", "quilting", "exemplar"] {
             assert!(!said(method).contains("holes are filled with the fitted model"), "{}", said(method));
-            assert!(said(method).contains("the fitted model (exponential) weighs"), "{}", said(method));
+            assert!(said(method).contains("the fitted model (exponential) only weights"), "{}", said(method));
         }
         assert_eq!(fill_note(&FitFile::default(), "quilting"), None);
     }

@@ -6,7 +6,7 @@ use crate::jobs::texture::{STAGE, kinds};
 use crate::memory;
 use crate::operations::fits::of_json;
 use crate::operations::textures::{
-    fill_note, has_its_texture, lacks_background, lay_onto, notes_on_filling, on_site_cells, scaled,
+    completes_background, fill_note, has_its_texture, lay_onto, notes_on_filling, on_site_cells, scaled,
 };
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::{Grid, Streams};
@@ -100,7 +100,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         return Err(Error::Usage(message.to_owned()));
     }
     let mut parameters = request.parameters.clone();
-    let on_background = request.onto.is_some() && fit.window_m.is_some() && lacks_background(request.method);
+    let on_background = request.onto.is_some() && fit.window_m.is_some() && completes_background(request.method);
     let chosen = on_background && parameters["covariance"].is_null();
     if chosen {
         parameters["covariance"] = json!(fft_ma::CovarianceOf::Residual);
