@@ -471,6 +471,26 @@ mod tests {
         assert!(parts(&row.iter().collect::<Vec<_>>(), |[_, c]| c == 0).is_none());
     }
 
+    /// The observed arrangement drawn in another order, also with the sides exchanged, lies exactly as far apart, so that it counts as equal. The sums of
+    /// these values, 1/3 to 1/14, depend on their order.
+    #[test]
+    fn prop_equal_arrangements_tie() {
+        let side = |first: u32| -> Vec<Block> {
+            (0..6).map(|k| block([k / 3, k % 3], 1.0 / f64::from(first + k as u32))).collect()
+        };
+        let (site, texture) = (side(3), side(9));
+        let order = [0, 1, 2, 3, 5, 4];
+        let shuffled =
+            |sides: [usize; 2]| -> Vec<usize> { sides.into_iter().flat_map(|from| order.map(|k| from + k)).collect() };
+        let mut judge =
+            Judge::new(site.iter().collect(), texture.iter().collect(), &Streams::for_seed(1, "blocks-test"));
+        judge.arrangements = vec![shuffled([0, 6]), shuffled([6, 0])];
+        for k in 0..2 {
+            let (apart, null) = judge.finding(k, &CompareParameters::default()).0.known.unwrap();
+            assert!(null.draws.iter().all(|d| *d == apart * null.widened), "{k}: {apart} {:?}", null.draws);
+        }
+    }
+
     /// Null: blocks of both sides are independent draws of one distribution. 400 pairs of 16 and 12 blocks, p <= 0.1 in at most 66 of 400: beyond
     /// that with probability 5e-5 (binomial), as the test is exact without widening. A texture that repeats itself, with blocks of a tenth of the
     /// scatter, is detected by its spread in all of them.
