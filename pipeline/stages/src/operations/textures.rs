@@ -5,9 +5,9 @@ use crate::job::JobError;
 use crate::memory;
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::fit::FitFile;
-use sastrugi_texture::Needs;
-use sastrugi_texture::synth::fft_ma;
+use sastrugi_texture::synth::fft_ma::{self, CovarianceOf};
 use sastrugi_texture::synth::residual::NO_LONG_WAVES;
+use sastrugi_texture::{Needs, Prospect};
 use serde_json::{Value, json};
 
 /// A texture with its heights multiplied by a factor.
@@ -25,6 +25,29 @@ pub fn on_site_cells(method: &str, parameters: &mut Value, cell_m: Option<[f64; 
     let repeats = sastrugi_texture::needs(method).is_some_and(|needs| needs != Needs::Covariance);
     let (Some([x, y]), true, true) = (cell_m, repeats, parameters["cell_m"].is_null()) else { return };
     parameters["cell_m"] = if x == y { json!(x) } else { json!([x, y]) };
+}
+
+/// Refuses an FFT-MA texture of a measured covariance or of a residual for which memory is lacking, before it is bound to its fit: binding
+/// transforms such a covariance on the complete torus.
+///
+/// # Errors
+/// Parameters that the method refuses, too little memory.
+pub fn check_memory(method: &str, parameters: &Value, fit: &FitFile) -> Result<(), Error> {
+    let is_transformed = fit.map.is_some() || parameters["covariance"] == json!(CovarianceOf::Residual);
+    if method != fft_ma::kind().kind || !is_transformed {
+        return Ok(());
+    }
+    let prospect = Prospect {
+        torus_m: 0.0,
+        cell_m: fit.cell_m,
+        cells: None,
+        window_m: fit.window_m.map_or(0.0, |[x, y]| x.max(y)),
+        is_measured: fit.map.is_some(),
+        has_statistics: fit.statistics.is_some(),
+    };
+    let method = sastrugi_texture::method(method, parameters)?;
+    method.check_prospect(&prospect)?;
+    memory::check("the texture", method.cost_of(&prospect).memory_bytes)
 }
 
 /// Notes on a texture that fills holes, whose surroundings give it the long waves that it lacks.

@@ -6,7 +6,7 @@ use crate::jobs::texture::{STAGE, kinds};
 use crate::memory;
 use crate::operations::fits::of_json;
 use crate::operations::textures::{
-    completes_background, fill_note, has_its_texture, lay_onto, notes_on_filling, on_site_cells, scaled,
+    check_memory, completes_background, fill_note, has_its_texture, lay_onto, notes_on_filling, on_site_cells, scaled,
 };
 use crate::verbs::{Read, Reading, read};
 use sastrugi_numeric::{Grid, Streams};
