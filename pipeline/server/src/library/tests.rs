@@ -452,10 +452,12 @@ fn val_background_work_leaves_a_thread_to_answers() {
         let mut held = Vec::new();
         for number in 0..3 {
             let (go, wait) = mpsc::channel::<()>();
-            let library = Arc::clone(&library);
+            let shared = Arc::clone(&library);
             let make = move |_: &AtomicBool| wait.recv().ok().map(|()| tile_of(number, 8));
-            let ahead = async move { library.tile(key_of(number), Priority::Background, make).await };
+            let ahead = async move { shared.tile(key_of(number), Priority::Background, make).await };
             held.push((tokio::spawn(ahead), go));
+            // One after the other: the third has to be the one that is queued.
+            until(|| library.flights().len() as u64 == number + 1).await;
         }
         until(|| library.statistics().running == 2 && library.statistics().queued == 1).await;
         assert_eq!(*ask(&library, 7).await, tile_of(7, 8));
