@@ -363,19 +363,22 @@ impl FoundCopies {
 fn notes(evidence: &BlockEvidence, [site, texture]: &[Blocks; 2], widened: f64) -> Vec<String> {
     let [rows, cols] = evidence.shape_cells;
     let mut notes = vec![format!(
-        "A denotes the site ({} blocks of {rows} x {cols} cells), B the texture ({} blocks); no generator was simulated: the reference is what \
-         these blocks give in any other arrangement, and error rates hold if the site is alike throughout",
+        "A is the site ({} blocks of {rows} x {cols} cells), B the texture ({} blocks); the null distribution is that of random permutations of \
+         these blocks, so error rates hold if the site is homogeneous",
         evidence.site, evidence.texture
     )];
     for (name, side) in [("site", site), ("texture", texture)] {
         if side.left_out > 0 {
-            notes.push(format!("{} blocks of the {name} without enough data or relief were left out", side.left_out));
+            notes.push(format!(
+                "{} blocks of the {name} were left out, because they have too little data or no relief",
+                side.left_out
+            ));
         }
     }
     if widened > WIDENING_NOTED {
         notes.push(format!(
-            "halves of the site differ up to {widened:.1} times as much as its blocks at random: the null distributions were widened \
-             accordingly, and error rates are approximate"
+            "halves of the site differ by up to {widened:.1} times as much as random halves of its blocks: the null distributions were widened \
+             by that ratio, and error rates are approximate"
         ));
     }
     notes
@@ -415,7 +418,7 @@ mod tests {
         assert!(check_alpha([6, 6], 11, 0.05).is_ok());
         assert_eq!(
             check_alpha([6, 6], 11, 0.02).unwrap_err().to_string(),
-            "6 blocks of the site and 6 of the texture have no arrangement rarer than p = 0.0022: a difference in one of 11 quantities cannot be \
+            "with 6 blocks of the site and 6 of the texture, no p-value can be below 0.0022: a difference in one of 11 quantities cannot be \
              significant at alpha = 0.02; use a smaller outer scale, larger rasters or a larger alpha"
         );
     }

@@ -6,7 +6,7 @@
 //! ([`sastrugi_roughness::unfitted_statistics`]): the distance of the second half from the mean of all members, as the root mean square
 //! over a statistic's values, relative for those with a unit. Under the null the half is one more member of the ensemble, so that the
 //! share of members at least as far from the mean is an exact p-value whatever the statistic's distribution. Sigma and b are not
-//! reported, since the texture was given them.
+//! reported, since the texture was generated with them.
 //!
 //! Halves of a site differ from each other. Every distance is therefore shown beside the distance of the two halves, and beside the same
 //! test with the site split into interleaved blocks, black and white like a chessboard, each set of which contains what differs from half to
@@ -49,11 +49,11 @@ pub fn halves(site: &Grid, settings: &CompareSettings, streams: &Streams) -> Res
     });
     let (answer, sentence) = overall(&quantities);
     let mut notes = vec![format!(
-        "A denotes textures of the first half's {model} model, B the second half; sigma and b are not compared, since the textures were \
-         given them"
+        "A is a set of textures from the {model} model of the first half, B the second half; sigma and b are not compared, because the \
+         textures were generated with them"
     )];
     if examined.values.len() < site.values.len() {
-        notes.push(format!("only the middle {} x {} cells were compared", examined.rows(), examined.cols()));
+        notes.push(format!("only the central {} x {} cells were compared", examined.rows(), examined.cols()));
     }
     if let Err(reason) = &interleaved {
         notes.push(format!("interleaved blocks were not judged: {reason}"));

@@ -207,9 +207,9 @@ pub enum CompareError {
         /// Fewest of each.
         needed: usize,
     },
-    /// Too few arrangements of the blocks for an answer.
+    /// Too few blocks for a significant difference.
     #[error(
-        "{site} blocks of the site and {texture} of the texture have no arrangement rarer than p = {least:.4}: a difference in one of {quantities} quantities \
+        "with {site} blocks of the site and {texture} of the texture, no p-value can be below {least:.4}: a difference in one of {quantities} quantities \
          cannot be significant at alpha = {alpha}; use a smaller outer scale, larger rasters or a larger alpha"
     )]
     TooFewArrangements {

@@ -209,7 +209,7 @@ pub enum SynthesisError {
         method: &'static str,
     },
     /// Heights that overflow.
-    #[error("`{method}` does not lead to finite heights: the statistics of the fit are damaged; fit the DEM again")]
+    #[error("heights from `{method}` are not finite: the statistics in the fit file are damaged; fit the DEM again")]
     NotFinite {
         /// Name of the method.
         method: &'static str,

@@ -172,7 +172,8 @@ impl ResidualKernel for Modulated {
     fn notes(&self) -> Vec<String> {
         let (share, error) = (self.clip_share, 100.0 * self.covariance_error());
         let off = format!(
-            "the covariance is off by up to {error:.1} % of the variance ({share:.1e} of the spectrum of the normal field was negative and set to 0)"
+            "the covariance of the texture differs from the measured one by up to {error:.1} % of the variance ({share:.1e} of the spectrum of the normal field \
+             was negative and was set to 0)"
         );
         let is_off = share > 0.0 || self.covariance_error() > COVARIANCE_NOTE;
         self.doubts.iter().cloned().chain(is_off.then_some(off)).collect()
@@ -200,7 +201,7 @@ impl ModulatedParameters {
         let effect = if error > ERROR_MAX {
             let [off, most] = [error, ERROR_MAX].map(|share| 100.0 * share);
             format!(
-                "the covariance of the site would be off by up to {off:.0} % of the variance, more than {most:.0} %"
+                "the covariance would differ from that of the site by up to {off:.0} % of the variance, above the limit of {most:.0} %"
             )
         } else if ratio > INCREMENT_RATIO_MAX {
             let [more, most] = [ratio, INCREMENT_RATIO_MAX].map(|ratio| 100.0 * (ratio - 1.0));
@@ -211,7 +212,8 @@ impl ModulatedParameters {
             return Ok(());
         };
         let message = format!(
-            "is {value}, with which {effect}: patches are too strong or too narrow for so smooth a site; lower `log_variance` or widen `range_m`"
+            "is {value}, with which {effect}: the amplitude varies too much, or over too short a range, for a site this smooth; reduce `log_variance` or \
+             increase `range_m`"
         );
         Err(ParameterError::new(key, message))
     }
@@ -221,16 +223,16 @@ impl ModulatedParameters {
 fn doubts(fitted: &Modulation) -> Vec<String> {
     let Modulation { log_variance, measured_log_variance: measured, log_variance_error: error, patches, .. } = *fitted;
     let lowered = format!(
-        "the log variance of the amplitude was reduced from the measured {measured:.2} to {log_variance:.2}: a larger value would change the covariance of \
-         so smooth a site, or its increments, by more than 10 %"
+        "the log variance of the amplitude was reduced from the measured {measured:.2} to {log_variance:.2}: on a site this smooth, a larger value would \
+         change the covariance, or the variance of increments, by more than 10 %"
     );
     let uncertain = match error > measured.max(NOTED_MIN) {
         true => format!(
-            "the log variance of the amplitude is not identified ({measured:.2}, with a standard error of {error:.2}): the site holds {patches:.0} independent \
-             patches, and on smooth ground a curved map of the heights looks like patches; set `log_variance` to override it"
+            "the log variance of the amplitude is not identified ({measured:.2}, with a standard error of {error:.2}): the site has {patches:.0} independent \
+             patches, and on smooth ground a nonlinear map of the heights cannot be told from patches; set `log_variance` to override it"
         ),
         false => format!(
-            "the log variance of the amplitude, {measured:.2}, has a standard error of {error:.2}: the site holds {patches:.0} independent patches; set \
+            "the log variance of the amplitude, {measured:.2}, has a standard error of {error:.2}: the site has {patches:.0} independent patches; set \
              `log_variance` to override it"
         ),
     };

@@ -475,7 +475,7 @@ fn val_refusals() {
     assert_eq!(key(narrow.clone(), [64, 64]), None);
     let error = Modulated::new(&smooth, [64, 64], &narrow).err().map(|e| e.to_string()).unwrap_or_default();
     assert!(
-        error.starts_with("`range_m` is 0.8, with which the covariance of the site would be off by up to "),
+        error.starts_with("`range_m` is 0.8, with which the covariance would differ from that of the site by up to "),
         "{error}"
     );
     // The covariance is kept within 6 % here, but increments have 1.4 times their variance (an independent program).

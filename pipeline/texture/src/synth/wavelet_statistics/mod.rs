@@ -255,7 +255,10 @@ pub fn synthesise(
     parameters.check()?;
     let torus = parameters.checked_torus(statistics, shape)?;
     field(statistics, [shape, torus], parameters.rounds, streams).ok_or_else(|| {
-        ParameterError::new("statistics.wavelets", "do not lead to finite heights; fit the DEM again with --statistics")
+        ParameterError::new(
+            "statistics.wavelets",
+            "give heights that are not finite: they are damaged; fit the DEM again with --statistics",
+        )
     })
 }
 
