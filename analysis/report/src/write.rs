@@ -196,13 +196,13 @@ fn head(data: &Data) -> Head {
         title: title.clone(),
         description: study.description.clone(),
         facts: known.map(|(name, value)| (name.to_owned(), value)).collect(),
-        figures: key_figures(data),
+        numbers: key_numbers(data),
     }
 }
 
 /// Counts of what the release has; kinds that it lacks are left out. Only data files are counted: the report is not part of its own
 /// counts, and documents are added when the release is sealed.
-fn key_figures(data: &Data) -> Vec<(String, String)> {
+fn key_numbers(data: &Data) -> Vec<(String, String)> {
     let stage = |name: &str| data.of_stage(name).count();
     let counts = [
         (stage("terrain"), "terrain"),
@@ -217,11 +217,11 @@ fn key_figures(data: &Data) -> Vec<(String, String)> {
     ];
     let plural = |n: usize, what: &str| if n == 1 { what.to_owned() } else { format!("{what}s") };
     let named = |(n, what): (usize, &str)| (set::count(n), plural(n, what));
-    let mut figures: Vec<(String, String)> = counts.into_iter().filter(|(n, _)| *n > 0).map(named).collect();
+    let mut numbers: Vec<(String, String)> = counts.into_iter().filter(|(n, _)| *n > 0).map(named).collect();
     if data.stored.bytes > 0 {
-        figures.push((set::bytes(data.stored.bytes), "of data".into()));
+        numbers.push((set::bytes(data.stored.bytes), "of data".into()));
     }
-    figures
+    numbers
 }
 
 #[cfg(test)]
@@ -253,13 +253,13 @@ mod tests {
     #[test]
     fn val_the_head_counts_what_there_is() {
         let mut data = crate::tests::made_up::empty();
-        assert!(key_figures(&data).is_empty());
+        assert!(key_numbers(&data).is_empty());
         let full = crate::tests::made_up::full(1, 24);
         data.missions = full.missions[..2].to_vec();
         data.fits = full.fits[..1].to_vec();
         data.stored.add("mcap/a/b.mcap", 1_000_000);
         data.stored.add("fit/a.json", 234_000);
-        let counts: Vec<String> = key_figures(&data).into_iter().map(|(n, what)| format!("{n} {what}")).collect();
+        let counts: Vec<String> = key_numbers(&data).into_iter().map(|(n, what)| format!("{n} {what}")).collect();
         assert_eq!(counts, ["1 covariance fit", "2 missions", "1 MCAP recording", "2 data files", "1.23 MB of data"]);
     }
 }

@@ -31,7 +31,7 @@ use serde::Serialize;
 
 /// Areal parameters; NaN where undefined.
 #[derive(Clone, Debug, PartialEq, Serialize)]
-pub struct ArealFigures {
+pub struct ArealParameters {
     /// Root mean square height, m.
     pub sq_m: f64,
     /// Mean absolute height, m.
@@ -70,12 +70,12 @@ pub struct ArealFigures {
 
 /// Areal parameters of a surface: `map` is its spectrum, `band_cycles_m` the frequencies used for the texture direction,
 /// `hurst_lags_m` the lags of the Hurst exponent (see [`hurst`]).
-pub fn areal_figures(
+pub fn areal_parameters(
     dem: &Grid,
     map: Option<&SpectralMap>,
     band_cycles_m: [f64; 2],
     hurst_lags_m: Option<[f64; 2]>,
-) -> ArealFigures {
+) -> ArealParameters {
     let surface = level(dem);
     let cell = surface.geometry.cell;
     let heights = sums::finite(&surface.values);
@@ -85,7 +85,7 @@ pub fn areal_figures(
     let [slope_x, slope_y] = rms_slopes(&surface);
     let lags = LagSums::of(&surface, lags_of(&surface));
     let texture = autocorrelation(&lags, cell);
-    ArealFigures {
+    ArealParameters {
         sq_m: variance.sqrt(),
         sa_m: mean(f64::abs),
         ssk: mean(|z| z * z * z) / (variance * variance.sqrt()),
@@ -111,8 +111,8 @@ mod tests {
     use sastrugi_numeric::{Geometry, Streams};
     use std::f64::consts::{FRAC_1_SQRT_2, PI, TAU};
 
-    fn parameters(dem: &Grid) -> ArealFigures {
-        areal_figures(dem, SpectralMap::of(dem).as_ref(), [0.1, 3.0], None)
+    fn parameters(dem: &Grid) -> ArealParameters {
+        areal_parameters(dem, SpectralMap::of(dem).as_ref(), [0.1, 3.0], None)
     }
 
     /// A wave of amplitude 1 on a plane: Sq = 1 / sqrt(2), Sa = 2 / pi, Sku = 3/2, Ssk = 0, Sz = 2, and a slope of
@@ -141,7 +141,7 @@ mod tests {
     fn val_a_peak_by_hand() {
         let mut dem = Grid::filled(Geometry::square(3, 3, 1.0), 99.0);
         dem.values[4] = 108.0;
-        let f = areal_figures(&dem, None, [0.1, 0.4], None);
+        let f = areal_parameters(&dem, None, [0.1, 0.4], None);
         let near = |value: f64, expected: f64| (value - expected).abs() < 1e-12;
         assert!(near(f.sq_m, 8.0f64.sqrt()) && near(f.sa_m, 16.0 / 9.0), "{f:?}");
         assert!(near(f.ssk, 56.0 / 512.0f64.sqrt()) && near(f.sku, 456.0 / 64.0), "{f:?}");

@@ -10,7 +10,7 @@
 //! * Classes: [`moore_gradient`], then [`classify`] by [`ClassThresholds`], then [`close_disk`] and [`shares`].
 //! * Scale by scale: [`band_rms`], [`power_spectrum`] and [`psd_slope`]; after [`level`], [`LagSums`] and [`structure_function`], and
 //!   [`hurst()`].
-//! * All areal parameters: [`areal_figures`]; a row of the tables, with classes and spectrum: [`describe`].
+//! * All areal parameters: [`areal_parameters`]; a row of the tables, with classes and spectrum: [`describe`].
 //! * For vehicles: [`Ride`] (a [`WaveBand`], a [`Detrender`], ISO 8608, [`iri()`]).
 //! * For textures against their sites: [`surface_statistics`] and [`copies()`].
 //! * For wind: [`aerodynamic_roughness`].
@@ -67,7 +67,7 @@ pub use aerodynamic::{
     aerodynamic_roughness, lettau_z0_m, macdonald_displacement, macdonald_z0_m, munro_z0_m,
 };
 pub use agreement::{Scale, Statistic, surface_statistics, unfitted_statistics};
-pub use areal::{ArealFigures, areal_figures};
+pub use areal::{ArealParameters, areal_parameters};
 pub use background::odd_cells;
 pub use band::band_rms;
 pub use classes::{ClassThresholds, HIGH, LOW, NO_CLASS, SEMI, Shares, ThresholdError, classify, shares};

@@ -1,6 +1,6 @@
 //! Summary of one surface, as the tables record it.
 
-use crate::areal::{ArealFigures, areal_figures};
+use crate::areal::{ArealParameters, areal_parameters};
 use crate::band::band_rms;
 use crate::classes::{ClassThresholds, Shares, classify, shares};
 use crate::gradient::{moore_gradient, rms_slope};
@@ -62,7 +62,7 @@ pub struct Summary {
     /// Width of that border, m.
     pub share_border_m: f64,
     /// Areal parameters, with heights above the least-squares plane.
-    pub areal: ArealFigures,
+    pub areal: ArealParameters,
     /// Radially averaged power spectral density.
     pub spectrum: Vec<SpectrumBin>,
     /// Slope of the spectrum in log-log axes.
@@ -99,7 +99,7 @@ pub fn describe_classified(dem: &Grid, classes: &Grid<u8>, settings: &DescribeSe
     let (map, size) = (SpectralMap::of(dem), dem.geometry.size());
     let spectrum = map.as_ref().map_or_else(Vec::new, SpectralMap::rings);
     let slope_band_cycles_m = settings.slope_band_cycles_m.unwrap_or_else(|| default_slope_band(&dem.geometry));
-    let areal = areal_figures(dem, map.as_ref(), slope_band_cycles_m, settings.hurst_lags_m);
+    let areal = areal_parameters(dem, map.as_ref(), slope_band_cycles_m, settings.hurst_lags_m);
     Summary {
         valid_share: dem.finite_count() as f64 / dem.geometry.len() as f64,
         heights: height_statistics(dem),

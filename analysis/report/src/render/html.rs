@@ -31,7 +31,7 @@ pub struct Head {
     /// Facts in order: name, value.
     pub facts: Vec<(String, String)>,
     /// Key counts: value, and what is counted.
-    pub figures: Vec<(String, String)>,
+    pub numbers: Vec<(String, String)>,
 }
 
 /// The complete page.
@@ -58,10 +58,10 @@ fn head_parts(head: &Head) -> String {
     let pair =
         |(name, value): &(String, String)| format!("<div><dt>{}</dt><dd>{}</dd></div>", escape(name), fact(value));
     let facts: String = head.facts.iter().map(pair).collect();
-    let figure = |(value, what): &(String, String)| format!("<li><b>{}</b> {}</li>", escape(value), escape(what));
-    let figures: String = head.figures.iter().map(figure).collect();
-    let figures = if figures.is_empty() { figures } else { format!("<ul class=\"key\">{figures}</ul>\n") };
-    format!("{description}<dl class=\"facts\">{facts}</dl>\n{figures}")
+    let item = |(value, what): &(String, String)| format!("<li><b>{}</b> {}</li>", escape(value), escape(what));
+    let numbers: String = head.numbers.iter().map(item).collect();
+    let numbers = if numbers.is_empty() { numbers } else { format!("<ul class=\"key\">{numbers}</ul>\n") };
+    format!("{description}<dl class=\"facts\">{facts}</dl>\n{numbers}")
 }
 
 /// A value in the head of the page; a hash is set as code.

@@ -13,7 +13,8 @@ use sastrugi_schemas::fit::{FitFile, Quoted, SILL_OVER_RANGE, Source};
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::local::Local;
 use sastrugi_stages::verbs::roughness::{
-    AerodynamicRoughness, ArealFigures, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate, WindSettings,
+    AerodynamicRoughness, ArealParameters, Bumps, Detrender, ObstacleHeight, Ride, RideRequest, WindEstimate,
+    WindSettings,
 };
 use sastrugi_stages::verbs::texture::{Amplitude, Exemplar};
 use sastrugi_stages::verbs::{self, numbers, parameters};
@@ -192,9 +193,8 @@ fn parameter(name: &str, quoted: Quoted, number: impl Fn(f64) -> String) -> Stri
 }
 
 /// Areal parameters relative to the least-squares plane, as lines.
-fn areal(figures: &ArealFigures) -> [(&'static str, String); 6] {
+fn areal(f: &ArealParameters) -> [(&'static str, String); 6] {
     let known = |value: f64, text: String| if value.is_finite() { text } else { "none".to_owned() };
-    let f = figures;
     let hurst = f.hurst.as_ref().map_or_else(
         || "none".to_owned(),
         |h| format!("{:.3} +- {:.3} from {:.4} to {:.4} m", h.exponent, h.standard_error, h.lags_m[0], h.lags_m[1]),
@@ -212,9 +212,8 @@ fn areal(figures: &ArealFigures) -> [(&'static str, String); 6] {
 }
 
 /// Ride-relevant roughness, as lines.
-fn ride(figures: &Ride) -> Vec<(&'static str, String)> {
+fn ride(f: &Ride) -> Vec<(&'static str, String)> {
     let known = |value: f64, text: String| if value.is_finite() { text } else { "none".to_owned() };
-    let f = figures;
     let both = |[x, y]: [f64; 2], digits: usize| {
         let one = |value: f64| known(value, format!("{value:.digits$}"));
         format!("{} along x, {} along y", one(x), one(y))

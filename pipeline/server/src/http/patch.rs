@@ -260,7 +260,7 @@ impl Treatment {
     }
 
     fn kind(&self) -> Values {
-        let unitless = |description: Cow<'static, str>| Values::Figures { unit: "1".into(), description };
+        let unitless = |description: Cow<'static, str>| Values::Quantity { unit: "1".into(), description };
         match self.field {
             "albedo" => unitless("albedo, share of the light that is reflected".into()),
             "class" => unitless("share of the cell that rocks cover".into()),

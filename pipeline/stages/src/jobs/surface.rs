@@ -4,7 +4,7 @@ use crate::job::{JobError, Outcome, Work};
 use sastrugi_numeric::Grid;
 use sastrugi_roughness::multifractality::ScalingExponent;
 use sastrugi_roughness::{
-    ArealFigures, Direction, HistogramBin, ProfileBin, SpectralMap, SpectrumBin, StructureBin, areal_figures,
+    ArealParameters, Direction, HistogramBin, ProfileBin, SpectralMap, SpectrumBin, StructureBin, areal_parameters,
     default_slope_band, histogram,
 };
 use sastrugi_schemas::fit::FitFile;
@@ -42,7 +42,7 @@ impl SurfaceRows {
         surface: &Surface<'_>,
         spectrum: &[SpectrumBin],
         histogram: &[HistogramBin],
-        areal: &ArealFigures,
+        areal: &ArealParameters,
     ) -> Self {
         Self {
             surface: row(surface, areal),
@@ -62,7 +62,7 @@ impl SurfaceRows {
             .cell_m
             .zip(fit.window_m)
             .map(|(cell, window)| [cell[0].max(cell[1]), HURST_WINDOWS * window[0].min(window[1])]);
-        let areal = areal_figures(surface.grid, map.as_ref(), band, lags);
+        let areal = areal_parameters(surface.grid, map.as_ref(), band, lags);
         let spectrum = map.as_ref().map_or_else(Vec::new, SpectralMap::rings);
         Self::of(surface, &spectrum, &histogram(surface.grid, HISTOGRAM_BINS), &areal)
     }
@@ -80,7 +80,7 @@ impl SurfaceRows {
     }
 }
 
-fn row(surface: &Surface<'_>, areal: &ArealFigures) -> SurfaceRow {
+fn row(surface: &Surface<'_>, areal: &ArealParameters) -> SurfaceRow {
     let geometry = &surface.grid.geometry;
     let cells = surface.grid.finite_count();
     let hurst = |f: fn(&sastrugi_roughness::Hurst) -> f64| areal.hurst.as_ref().map_or(f64::NAN, f);

@@ -112,7 +112,7 @@ impl Made {
         let image = self.rendering.image();
         if let Some(target) = files.tif {
             let crs = if self.rendering.pose.is_nadir() { crs.clone() } else { Crs::default() };
-            let values = Values::Figures { unit: "1".into(), description: "brightness (I/F)".into() };
+            let values = Values::Quantity { unit: "1".into(), description: "brightness (I/F)".into() };
             dem::write(target, &image, &crs, &WriteOptions { values, ..options.clone() }).map_err(JobError::io)?;
         }
         if let Some(target) = files.json {

@@ -223,7 +223,7 @@ impl Map {
     /// # Errors
     /// A file that cannot be written.
     fn write(&self, target: Target<'_>, crs: &Crs, options: &WriteOptions) -> Result<(), JobError> {
-        let values = Values::Figures { unit: self.unit.into(), description: self.description.into() };
+        let values = Values::Quantity { unit: self.unit.into(), description: self.description.into() };
         let options = WriteOptions { values, ..options.clone() };
         dem::write(target, &self.values, crs, &options).map(|_| ()).map_err(JobError::io)
     }

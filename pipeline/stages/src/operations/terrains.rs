@@ -10,7 +10,7 @@ use sastrugi_terrain::{Generator, Input, Map, MapKind, Terrain, TerrainError};
 pub fn values_of(map: &Map) -> Values {
     match map.kind() {
         MapKind { unit: "", description, .. } => Values::Codes { description: description.into() },
-        MapKind { unit, description, .. } => Values::Figures { unit: unit.into(), description: description.into() },
+        MapKind { unit, description, .. } => Values::Quantity { unit: unit.into(), description: description.into() },
     }
 }
 

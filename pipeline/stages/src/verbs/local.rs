@@ -89,7 +89,7 @@ impl Local<'_> {
             [(BAND_RMS, Some(band_rms_m)), (SIGMA, sigma_m.as_ref()), (SIGMA2_OVER_B, sigma2_over_range_m.as_ref())];
         for ((end, description), map) in all {
             let Some(map) = map else { continue };
-            let values = Values::Figures { unit: "m".into(), description: description.into() };
+            let values = Values::Quantity { unit: "m".into(), description: description.into() };
             let options = WriteOptions { values, ..WriteOptions::default() };
             dem::write(&self.file(end), map, crs, &options).map_err(write_error)?;
         }

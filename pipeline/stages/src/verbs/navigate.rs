@@ -77,7 +77,7 @@ pub fn route(request: &Request<'_>, output: &Path) -> Result<Value, Error> {
         Some(Outcome::Found(route)) => route,
         other => return Err(Error::Input(no_route(&site, other))),
     };
-    let drawn = Drawn { site: &site, heights: &dem.grid, given: &given, route, figures: figures(&site, route) };
+    let drawn = Drawn { site: &site, heights: &dem.grid, given: &given, route, metrics: metrics(&site, route) };
     if output.extension().is_some_and(|ending| ending.eq_ignore_ascii_case("svg")) {
         let picture = drawn.picture(request.dem)?;
         atomic::write(output, picture.as_bytes()).map_err(|e| Error::at(output, e))?;
@@ -87,11 +87,11 @@ pub fn route(request: &Request<'_>, output: &Path) -> Result<Value, Error> {
             [x, y, z]
         };
         let positions = site.points(&route.smoothed).into_iter().map(own).collect();
-        let line = geojson::Route { positions, properties: drawn.figures.clone() };
+        let line = geojson::Route { positions, properties: drawn.metrics.clone() };
         geojson::write_routes(output, Some(&crs), &[line]).map_err(Error::io)?;
     }
     let notes: Vec<String> = own.notes.into_iter().chain(converted).collect();
-    Ok(json!({ "file": output.display().to_string(), "route": drawn.figures, "notes": notes }))
+    Ok(json!({ "file": output.display().to_string(), "route": drawn.metrics, "notes": notes }))
 }
 
 fn given(request: &Request<'_>, heights: &Grid, place: &Place) -> Result<Given, Error> {
@@ -120,11 +120,11 @@ fn no_route(site: &Site, outcome: Option<&Outcome>) -> String {
 }
 
 /// The metrics of a route, by name.
-fn figures(site: &Site, route: &Route) -> Map<String, Value> {
+fn metrics(site: &Site, route: &Route) -> Map<String, Value> {
     let degrees = |slope: f64| libm::atan(slope).to_degrees();
     let score = &route.smoothed_score;
     let points = site.points(&route.smoothed);
-    let figures = json!({
+    let metrics = json!({
         "length_m": crate::operations::routes::distances_m(&points).last(),
         "ground_length_m": score.length_m,
         "cost_m": score.cost,
@@ -135,7 +135,7 @@ fn figures(site: &Site, route: &Route) -> Map<String, Value> {
         "vertices": route.vertices,
         "expansions": route.expansions,
     });
-    figures.as_object().cloned().unwrap_or_default()
+    metrics.as_object().cloned().unwrap_or_default()
 }
 
 struct Drawn<'a> {
@@ -143,18 +143,18 @@ struct Drawn<'a> {
     heights: &'a Grid,
     given: &'a Given,
     route: &'a Route,
-    figures: Map<String, Value>,
+    metrics: Map<String, Value>,
 }
 
 impl Drawn<'_> {
     fn picture(&self, dem: &Path) -> Result<String, Error> {
-        let figure = |name: &str| self.figures.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
+        let metric = |name: &str| self.metrics.get(name).and_then(Value::as_f64).unwrap_or(f64::NAN);
         let words = format!(
             "{:.0} m in plan, cost {:.0} m, steepest climb {:.1} degrees, steepest descent {:.1} degrees",
-            figure("length_m"),
-            figure("cost_m"),
-            figure("steepest_up_deg"),
-            figure("steepest_down_deg")
+            metric("length_m"),
+            metric("cost_m"),
+            metric("steepest_up_deg"),
+            metric("steepest_down_deg")
         );
         let rings = self.given.polygons.iter().filter_map(|polygon| polygon.rings().first().cloned());
         let picture = RoutePicture {

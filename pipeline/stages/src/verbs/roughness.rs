@@ -7,7 +7,7 @@ use crate::study::check_roughness;
 use sastrugi_mobility::vehicle::TraverseParameters;
 use sastrugi_numeric::Grid;
 pub use sastrugi_roughness::{
-    AerodynamicRoughness, ArealFigures, Detrender, ObstacleHeight, Ride, WindEstimate, WindSettings,
+    AerodynamicRoughness, ArealParameters, Detrender, ObstacleHeight, Ride, WindEstimate, WindSettings,
 };
 use sastrugi_roughness::{
     BandError, DescribeSettings, Summary, WaveBand, WindError, aerodynamic_roughness, classify, describe,

@@ -17,7 +17,7 @@ pub enum Values {
     #[default]
     Heights,
     /// Values of another quantity.
-    Figures {
+    Quantity {
         /// Unit, `1` for dimensionless values.
         unit: Cow<'static, str>,
         /// Description.
@@ -35,7 +35,7 @@ impl Values {
     pub fn unit(&self) -> Option<&str> {
         match self {
             Self::Heights => Some("m"),
-            Self::Figures { unit, .. } => Some(unit),
+            Self::Quantity { unit, .. } => Some(unit),
             Self::Codes { .. } => None,
         }
     }
@@ -44,7 +44,7 @@ impl Values {
     pub fn description(&self) -> &str {
         match self {
             Self::Heights => "heights",
-            Self::Figures { description, .. } | Self::Codes { description } => description,
+            Self::Quantity { description, .. } | Self::Codes { description } => description,
         }
     }
 
@@ -53,8 +53,8 @@ impl Values {
         let unconverted = "they are used unconverted";
         match self {
             Self::Heights => None,
-            Self::Figures { unit, .. } if unit == "m" => None,
-            Self::Figures { unit, .. } => {
+            Self::Quantity { unit, .. } if unit == "m" => None,
+            Self::Quantity { unit, .. } => {
                 Some(format!("values are in `{unit}` according to the file, not in m; {unconverted}"))
             }
             Self::Codes { description } => {
@@ -73,7 +73,7 @@ impl Values {
         };
         match self {
             Self::Heights => item("UNITTYPE", "unittype", "m"),
-            Self::Figures { unit, description } => {
+            Self::Quantity { unit, description } => {
                 item("UNITTYPE", "unittype", unit);
                 item("DESCRIPTION", "description", description);
             }
@@ -95,10 +95,10 @@ impl Values {
         match find(&format!("name=\"{CODES}\"")).map(String::as_str) {
             Some("codes") => Self::Codes { description },
             _ if !METRES.contains(&unit.to_lowercase().as_str()) => {
-                Self::Figures { unit: Cow::Owned(unit), description }
+                Self::Quantity { unit: Cow::Owned(unit), description }
             }
             _ if description.is_empty() => Self::Heights,
-            _ => Self::Figures { unit: Cow::Borrowed("m"), description },
+            _ => Self::Quantity { unit: Cow::Borrowed("m"), description },
         }
     }
 }
@@ -141,9 +141,9 @@ mod tests {
                  <Item name=\"UNITTYPE\" sample=\"0\" role=\"unittype\">{unit}</Item>\n</GDALMetadata>\n"
             ))
         };
-        let metres = Values::Figures { unit: "m".into(), description: "band & <1>".into() };
+        let metres = Values::Quantity { unit: "m".into(), description: "band & <1>".into() };
         assert!(["m", "metre", "Meter", ""].iter().all(|unit| of(unit) == metres) && metres.note().is_none());
-        assert_eq!(of("ft"), Values::Figures { unit: "ft".into(), description: "band & <1>".into() });
+        assert_eq!(of("ft"), Values::Quantity { unit: "ft".into(), description: "band & <1>".into() });
         assert!(of("ft").note().unwrap().contains("`ft`"));
         assert_eq!(Values::of_metadata("<GDALMetadata><Item name=\"VALUES"), Values::Heights);
     }
@@ -156,8 +156,8 @@ mod tests {
             let codes = Values::Codes { description: description.clone() };
             prop_assert_eq!(&Values::of_metadata(&codes.metadata()), &codes);
             prop_assume!(!METRES.contains(&unit.as_str()) || unit == "m" && !description.is_empty());
-            let figures = Values::Figures { unit: unit.into(), description };
-            prop_assert_eq!(&Values::of_metadata(&figures.metadata()), &figures);
+            let quantity = Values::Quantity { unit: unit.into(), description };
+            prop_assert_eq!(&Values::of_metadata(&quantity.metadata()), &quantity);
         }
 
         #[test]
