@@ -15,7 +15,8 @@ super::table! {
         model: String [""],
         /// Standard deviation of the texture.
         sigma_m: f64 ["m"],
-        /// Range b of the exponential covariance sigma^2 exp(-lag / b).
+        /// Range b of the covariance model, along the long axis; for the exponential, the covariance is sigma^2 exp(-lag / b). Not given for
+        /// `self_affine` or a sum of terms.
         range_m: f64 ["m"],
         /// Nugget (white) variance.
         nugget_m2: f64 ["m2"],
