@@ -439,7 +439,7 @@ fn val_textures_repeat_a_site() {
     let made = ok_json(path, &[&laid[..], &["--onto", "background.tif", "-o", "laid.tif"]].concat());
     assert_eq!(made["parameters"]["covariance"], "residual");
     let notes = made["notes"].to_string();
-    assert!(notes.contains("are raised") && notes.contains("assumed to be a measured background"), "{notes}");
+    assert!(notes.contains("are amplified") && notes.contains("assumed to be a measured background"), "{notes}");
     let (base, sum) = (heights(path, "background.tif"), heights(path, "laid.tif"));
     assert!(base.len() == sum.len() && base.iter().zip(&sum).any(|(a, b)| a != b));
 }

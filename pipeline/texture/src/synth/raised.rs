@@ -1,31 +1,32 @@
-//! A texture of a measured residual for the background of its fit: its waves of about the window are raised.
+//! Textures for the background of a fit: wavelengths near the window of the fit are amplified.
 //!
-//! Of a wave of the ground, a moving average over the window of the fit keeps the share D of the amplitude (D its response), and the residual has `1 - D`.
-//! With S the spectrum of the ground, background and residual hold `S D^2` and `S (1 - D)^2`; as parts of one surface they add up to S. A texture is independent of the
-//! background, and of independent waves the powers add: with the spectrum of the residual the sum has `S (D^2 + (1 - D)^2)`, half of the ground's
-//! where D = 1/2. What a measured background lacks is `S (1 - D^2)`, which [`super::fft_ma`] makes with `covariance = "residual"`. Here every wave
-//! of the texture is multiplied by
+//! A moving average over the window multiplies the amplitude of a wave by its response D, so that `1 - D` is left in the residual. With S the spectrum
+//! of the ground, background and residual have the spectra `S D^2` and `S (1 - D)^2`. As parts of one surface they add up to S, because their waves
+//! are coherent. A texture is independent of the background, so powers add: with the spectrum of the residual the sum has
+//! `S (D^2 + (1 - D)^2)`, half of the ground's where D = 1/2. A measured background lacks `S (1 - D^2)`, the spectrum of [`super::fft_ma`] with
+//! `covariance = "residual"`. Here every wave of the texture is multiplied by
 //!
 //! `g(D) = min(sqrt((1 + D) / (1 - D)), G)`, `G = 3` ([`GAIN_MAX`])
 //!
-//! which is exact up to D = 0.8. Of longer waves the residual holds less than a twenty-fifth of the power, so that what is found there is leakage
-//! of a finite site rather than ground: they are raised no further. D is the response on the torus of the texture, so a periodic texture stays
-//! periodic. The mean, of which the residual holds nothing, becomes 0.
+//! which is exact up to D = 0.8. Of longer waves the residual has less than a twenty-fifth of the power. What is found there is leakage of a finite
+//! site rather than ground, so the gain stays at G. D is the response on the torus of the texture, so a periodic texture stays periodic. The mean,
+//! which the residual lacks, becomes 0.
 //!
 //! Closed form for exponential covariances of range b under a window of 2.1 m on cells of 0.1 m; errors of the covariance at any lag as shares of the
 //! variance (`val_the_sum_has_the_covariance_of_the_site`):
 //!
-//! | b, m | RMS of background and texture over the site's: as measured | raised | error of the covariance: as measured | raised | of its residual: as measured | raised |
+//! | b, m | RMS of background and texture over the site's: as measured | amplified | error of the covariance: as measured | amplified | of its residual: as measured | amplified |
 //! |---|---|---|---|---|---|---|
 //! | 0.28 | 0.975 | 0.999 | 0.061 | 0.003 | 0.044 | 0.000 |
 //! | 1 | 0.908 | 0.990 | 0.176 | 0.021 | 0.070 | 0.000 |
 //! | 3 | 0.934 | 0.983 | 0.128 | 0.034 | 0.082 | 0.001 |
 //!
-//! Source: ours. It is a linear filter after the synthesis, the same for all methods: shapes, increments and curvatures of waves much shorter than the
-//! window stay as they are. Where D is negative (waves of 0.5 to 1 windows) it lowers them, by a fifth at most. Heights become a little more normal.
+//! Source: ours. It is a linear filter after the synthesis, the same for all methods. Shapes, increments and curvatures at wavelengths much shorter
+//! than the window do not change. Where D is negative (wavelengths of 0.5 to 1 windows) the filter attenuates, by a fifth at most. Heights become
+//! slightly more normal.
 //!
-//! Cost: two transforms of the texture. Memory: 24 bytes per cell. A texture that is not periodic is made wider by a window on each
-//! side, where the wrapping of the transform would be seen.
+//! Cost: two transforms of the texture. Memory: 24 bytes per cell. A texture that is not periodic is synthesised one window wider on each side,
+//! because the transform wraps around; the margin is cut off.
 
 use super::residual::ResidualKernel;
 use super::statistics::lags;
@@ -39,19 +40,19 @@ use sastrugi_roughness::background::BoxWindow;
 use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::statistics::LagCovariances;
 
-/// Largest factor on the amplitude of a wave.
+/// Largest gain of a wave.
 pub const GAIN_MAX: f64 = 3.0;
 /// Bytes per cell at the peak: heights before and after, and their spectrum.
 const BYTES_PER_CELL: u64 = 24;
 
-/// The factor on a wave of which the background keeps the share `response`, from about -0.22 to 1.
+/// The gain of a wave at which the response of the moving average is `response`, from about -0.22 to 1.
 pub fn gain(response: f64) -> f64 {
     let (power, kept) = (1.0 + response, 1.0 - response);
-    // Not divided first: nothing may be left of a wave.
+    // No division before the comparison: `kept` may be 0.
     if power >= GAIN_MAX * GAIN_MAX * kept { GAIN_MAX } else { (power / kept).sqrt() }
 }
 
-/// What raises the waves of a texture.
+/// The filter that amplifies wavelengths near the window.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Raised {
     window: BoxWindow,
@@ -66,7 +67,7 @@ impl Raised {
         Ok(Self { window: window_on(window_m, cell_m)? })
     }
 
-    /// The tile to be made for a tile: the same if it is periodic, otherwise at least a window wider on each side.
+    /// The tile that is synthesised for `tile`: the same if it is periodic, otherwise at least one window wider on each side.
     ///
     /// # Errors
     /// Too many cells.
@@ -78,8 +79,8 @@ impl Raised {
         let cells: f64 = [0, 1].iter().map(|&k| shape[k] as f64 + 2.0 * window[k] as f64).product();
         if cells > CELLS_MAX as f64 {
             let message = format!(
-                "is false, which on a background needs a texture of {cells:.1e} cells, one window wider on each side; the most is {CELLS_MAX}: \
-                 make it smaller, or periodic"
+                "is false, for which a texture on a background is synthesised one window wider on each side: {cells:.1e} cells, more than {CELLS_MAX}; \
+                 make it smaller or periodic"
             );
             return Err(ParameterError::new("periodic", message));
         }
@@ -88,7 +89,7 @@ impl Raised {
 
     /// Cost of a texture whose widened tile costs `made`.
     pub fn cost(made: Cost, widened: &Tile) -> Cost {
-        /// Operations for the factor of a mode.
+        /// Operations for the gain of a mode.
         const PER_CELL: f64 = 20.0;
         let cells = widened.geometry.len() as u64;
         Cost {
@@ -117,7 +118,7 @@ impl Raised {
         Ok((Grid::new(whole, heights_m).window(row, col, shape.rows, shape.cols).values, notes))
     }
 
-    /// Covariance of the raised texture at lags of 0, 1, 2 ... cells along rows, m2, as far as the residual's is known, and at most `most`.
+    /// Covariance of the amplified texture at lags of 0, 1, 2 ... cells along rows, m2, as far as the residual's is known, and at most `most`.
     pub fn along_rows_m2(&self, residual: &LagCovariances, most: usize) -> Vec<f64> {
         let reach = lags::reach(residual);
         let torus = reach.map(|lag| smooth_length(4 * (lag + 1)));
@@ -175,7 +176,7 @@ mod tests {
 
     /// Two waves eastwards over 60 cells, and three southwards over 50, are multiplied by the gain of their responses; the mean is removed.
     #[test]
-    fn val_waves_are_raised() {
+    fn val_waves_are_amplified() {
         let wave = |at: usize, count: f64, cells: f64| libm::cos(TAU * count * at as f64 / cells);
         let [east, south] = [(2, 60), (3, 50)].map(|(k, n)| gain(mean_of_cosine(21, k, n)));
         let field = |gains: [f64; 2], mean: f64| -> Vec<f64> {
@@ -369,7 +370,7 @@ mod tests {
         // The mean is removed.
         assert!(sastrugi_numeric::sums::mean(&made.grid.values).abs() < 1e-12);
         let notes = texture.notes().join("\n");
-        assert!(notes.contains("are raised") && notes.contains("heights of copied cells change"), "{notes}");
+        assert!(notes.contains("are amplified") && notes.contains("changes the heights of copied cells"), "{notes}");
         assert_eq!(texture.parameters()["covariance"], "residual");
         let bare = FitFile { window_m: None, ..fit };
         let error = prepare_from("quilting", &raw, &bare, Some(&measured)).err().unwrap().to_string();

@@ -8,7 +8,7 @@
 //! * the cells are those of the site;
 //! * directions, heights and long waves are the site's: a tile has no `ratio`, `azimuth_deg`, `outer_m`, `marginal` and `marginal_m`;
 //! * waves longer than the window of the fit are missing, and belong to the base that the texture is added to; on the background of the fit
-//!   (`covariance = "residual"`), waves of about the window are raised ([`super::raised`]);
+//!   (`covariance = "residual"`), wavelengths near the window are amplified ([`super::raised`]);
 //! * noise and blur of the DEM, which a fit takes out of its covariance where they are stated, are in the residual and in the texture;
 //! * the mean covariance of an ensemble is not known beforehand: [`Synthesis::covariance`] states the residual's along rows, with NaN as
 //!   `achieved_m2`, and [`Synthesis::ratio`] is NaN. A scoreboard measures both on realisations.
@@ -261,7 +261,7 @@ impl<P: ResidualParameters> Checked<P> {
         self.tile.repeated_cost(if made.is_some() { Raised::cost(cost, tile) } else { cost })
     }
 
-    /// What raises the waves of a texture for a background over a window, and the tile to be made for that; `None` for a residual as measured.
+    /// The filter of a texture for a background over a window, and the tile that is synthesised for it; `None` for the residual as measured.
     ///
     /// # Errors
     /// An unknown window; too many cells.
@@ -335,13 +335,13 @@ impl<P: ResidualParameters> Method for Checked<P> {
 /// A note on a texture for the background of a fit; `copied` if it is made of copied cells.
 fn raised_note(window_m: f64, copied: bool) -> String {
     let heights = if copied {
-        "; the heights of copied cells change, and the share that has the height of its source is that before"
+        "; this changes the heights of copied cells, so the share of cells that have the height of their source was counted before it"
     } else {
         ""
     };
     format!(
-        "covariance = residual: waves of about the window of the fit, {window_m} m, are raised, so that a measured background and the texture together \
-         have the covariance of the site{heights}"
+        "covariance = residual: wavelengths near the window of the fit, {window_m} m, are amplified, so that a measured background and the texture \
+         together have the covariance of the site{heights}"
     )
 }
 

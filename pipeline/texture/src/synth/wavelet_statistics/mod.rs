@@ -105,9 +105,9 @@ pub struct WaveletStatisticsParameters {
     pub periodic: bool,
     /// Number of rounds, 1 to 200. Default 10.
     pub rounds: u32,
-    /// What the texture is for: `surface` (level or synthetic ground: the residual as it was measured) or `residual` (a measured background: its waves
-    /// of about the fit's window are raised, so that the background and the texture together have the covariance of the site). Default: `residual`
-    /// on a measured DEM, otherwise `surface`.
+    /// Base that the texture is for: `surface` (level or synthetic ground; the texture has the covariance of the residual) or `residual` (a measured
+    /// background; wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site).
+    /// Default: `residual` on a measured DEM, otherwise `surface`.
     pub covariance: CovarianceOf,
 }
 
