@@ -1,4 +1,4 @@
-"""Values that stay in memory, up to a number of bytes."""
+"""A cache of values, limited in bytes."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ Value = TypeVar("Value")
 
 
 class Kept(Generic[Key, Value]):
-    """Values by key, each read when it is first asked for.
+    """Values by key, each read on first access.
 
-    read: returns the value of a key, and its size in bytes.
-    limit: bytes; beyond them, the least recently used values are dropped. The last one asked for stays, whatever its size.
+    read: returns the value of a key and its size in bytes.
+    limit: bytes beyond which the least recently used values are dropped. The latest value stays, whatever its size.
 
     >>> kept = Kept(lambda word: (word.upper(), len(word)), limit=8)
     >>> [kept(word) for word in ("snow", "ice", "snow", "sand")]
@@ -39,7 +39,7 @@ class Kept(Generic[Key, Value]):
             if known is not None:
                 self._values.move_to_end(key)
                 return known[0]
-        # Without the lock: threads that ask for the same value at once each read it.
+        # The lock is not held: threads that ask for one value at the same time each read it.
         value, size = self._read(key)
         with self._lock:
             _, replaced = self._values.pop(key, (value, 0))
@@ -51,6 +51,6 @@ class Kept(Generic[Key, Value]):
         return value
 
     def __iter__(self) -> Iterator[Key]:
-        """The keys of the values that are kept, the least recently used first."""
+        """The keys of the cached values, least recently used first."""
         with self._lock:
             return iter(list(self._values))

@@ -21,15 +21,15 @@ from ._kept import Kept
 from ._values import INPUT, USAGE, number, pair
 
 MANIFEST = "manifest.json"
-# Missions on terrains in none of the other splits, whose column `split` is null, have the last name.
+# The last is for missions on terrains in none of the others; their column `split` is null.
 OTHER = "other"
 SPLITS = ("train", "validation", "test", OTHER)
-# Heightfields and tracks that stay in memory for patches, bytes.
+# Bytes of the heightfields and tracks that stay in memory for patches.
 GROUND_BYTES = 256 << 20
 TRACK_BYTES = 128 << 20
-# Tracks are read together: those of a terrain, or of as many of its missions in a row as have so many samples.
+# Tracks of one terrain are read in blocks of consecutive missions with about so many samples.
 BLOCK_SAMPLES = 1 << 18
-# Size of a track without its samples, and of a sample, bytes.
+# Bytes of a track without its samples, and of a sample.
 TRACK_OVERHEAD_BYTES = 1000
 SAMPLE_BYTES = 40
 
@@ -50,7 +50,7 @@ class Table:
         polars.DataFrame(table)
         duckdb.sql("select outcome, count(*) from table group by outcome")
 
-    `table[column]` is a NumPy array: float64 with NaN for null, int64, bool, or objects (text, lists, integers and flags with nulls). `len(table)` is
+    `table[column]` is a NumPy array: float64 with NaN for null, int64, bool, or objects (text, lists, integers and booleans with nulls). `len(table)` is
     the number of rows; as in pandas, iteration gives the names of the columns, and `in` looks for one.
     """
 
@@ -96,7 +96,7 @@ class Table:
         return {name: self[name] for name in self}
 
     def to_rows(self) -> list[dict[str, Any]]:
-        """The rows as dicts of Python values; lists are lists, and a float that is null is NaN."""
+        """The rows as dicts of Python values, with lists as lists. A float that is null is NaN."""
         columns = {name: _python(values) for name, values in self.to_numpy().items()}
         return [dict(zip(columns, row)) for row in zip(*columns.values())]
 
@@ -117,12 +117,12 @@ def _objects(values: list[Any]) -> npt.NDArray[Any]:
 
 
 def _python(values: npt.NDArray[Any]) -> list[Any]:
-    """The values as Python's, also those of lists."""
+    """The values, including those of lists, as Python objects."""
     return [value.tolist() if isinstance(value, np.ndarray) else value for value in values.tolist()]
 
 
 class _Columns:
-    """The table `missions`, sorted by terrain and mission. A column is read when it is first asked for."""
+    """The table `missions`, sorted by terrain and mission. A column is read on first access."""
 
     __slots__ = ("names", "_table", "_order", "_read")
 
@@ -130,7 +130,7 @@ class _Columns:
         self.names = list(table)
         self._table = table
         terrains = table["terrain_id"]
-        # With splits there are several files. Each is sorted, and holds all missions of its terrains.
+        # With splits there are several files. Each is sorted, and has all missions of its terrains.
         is_sorted = bool(np.all(terrains[:-1] <= terrains[1:]))
         self._order = None if is_sorted else np.argsort(terrains, kind="stable")
         self._read = {"terrain_id": self._sorted(terrains)}
@@ -168,7 +168,7 @@ class _Row(Mapping[str, Any]):
         return len(self._columns.names)
 
     def __reduce__(self) -> tuple[type[dict[str, Any]], tuple[dict[str, Any]]]:
-        # A pickled mission has its own values, not the columns of all.
+        # A pickled mission carries its own values, not the columns of all missions.
         return dict, (dict(self),)
 
     def __repr__(self) -> str:
@@ -177,7 +177,7 @@ class _Row(Mapping[str, Any]):
 
 @dataclass(frozen=True)
 class Mission:
-    """A mission of a release: its key, and its row of the table `missions`, whose values are read when they are asked for."""
+    """A mission of a release: its key, and its row of the table `missions`, read on access."""
 
     terrain_id: str
     mission_id: str
@@ -197,7 +197,7 @@ class Mission:
 
 
 class Missions(Sequence[Mission]):
-    """Missions of a release, sorted by terrain and mission. Each is made when it is asked for; `list(missions)` makes all of them."""
+    """Missions of a release, sorted by terrain and mission. Each is created on access; `list(missions)` creates all."""
 
     __slots__ = ("_release", "_split", "_columns", "_places")
 
@@ -220,7 +220,7 @@ class Missions(Sequence[Mission]):
         return _mission(self._columns, int(self._places[index]))
 
     def __reduce__(self) -> tuple[Callable[..., Missions], tuple[Release, str | None]]:
-        # The worker processes of a data loader read them for themselves.
+        # The worker processes of a data loader read the columns for themselves.
         return Release.missions, (self._release, self._split)
 
     def __repr__(self) -> str:
@@ -269,7 +269,7 @@ class Recording:
 
 
 class _Block(NamedTuple):
-    """Missions whose tracks are read together: all of a terrain from the first to the last."""
+    """Missions of a terrain, from the first to the last, whose tracks are read together."""
 
     terrain_id: str
     first: str
@@ -372,7 +372,7 @@ class Release:
         return Recording(self.path / self._mission(mission).row["path"])
 
     def track(self, mission: Mission | str) -> Track:
-        """The recorded poses of a mission. Those of other missions on its terrain are read with them, and stay in memory for the next calls.
+        """The recorded poses of a mission. Those of other missions on its terrain are read too, and stay in memory for later calls.
 
         Raises SastrugiError (65) for a mission without samples.
         """
@@ -422,7 +422,7 @@ class Release:
 
     @cached_property
     def _starts(self) -> npt.NDArray[np.int64]:
-        """Samples of all missions before each."""
+        """For each mission, the number of samples of all missions before it."""
         samples = self._columns["samples"]
         starts = np.zeros(len(samples), dtype=np.int64)
         np.cumsum(samples[:-1], out=starts[1:])

@@ -39,7 +39,7 @@ def run(
     replace: also replace a release of another study, or one with fewer failed items.
     progress: called as `progress(done, total, what)` on this thread; what it raises ends the run.
 
-    Items that failed are listed in `release.summary["failures"]`. Settings that are allowed but make no sense are issued as warnings. On Ctrl-C no
+    Items that failed are listed in `release.summary["failures"]`. Settings that are allowed but implausible give warnings. On Ctrl-C no
     further item starts; the work area stays busy until those that had begun have ended, and another call goes on from there.
 
     Raises SastrugiError: 2 for an invalid study (each error with its place), 65 for input data that cannot be used, 75 for a busy work area.

@@ -43,7 +43,7 @@ def heights(values: Any) -> npt.NDArray[np.float64]:
     """Heights as an array (rows, columns) of float64; what a mask hides is NaN."""
     try:
         given = values if isinstance(values, np.ndarray) else np.asarray(values)
-        # Text would be read, also that in arrays of objects, and of complex numbers the imaginary part dropped.
+        # NumPy would parse text, also in arrays of objects, and drop the imaginary part of complex numbers.
         real = given.dtype.kind in "biuf" or (given.dtype.kind == "O" and not any(isinstance(value, (str, bytes)) for value in given.flat))
         found = given.astype(np.float64, copy=False) if real else None
     except (TypeError, ValueError):

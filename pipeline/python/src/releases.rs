@@ -16,7 +16,7 @@ use sastrugi_store::parquet::{TableError, TableFiles};
 use std::collections::HashMap;
 use std::path::PathBuf;
 
-/// Different texts that a column may repeat without a further object: ids of terrains, splits, outcomes.
+/// Most distinct texts of a column that are shared as objects: ids of terrains, splits, outcomes.
 const TEXTS_SHARED: usize = 1 << 10;
 
 /// Arrays of floats.
@@ -47,7 +47,7 @@ impl Table {
         self.0.clone().selecting(column, text).map(Self).map_err(|e| usage(e.to_string()))
     }
 
-    /// The rows whose text in a column is neither before the first nor after the last.
+    /// The rows whose text in a column lies between `first` and `last`, inclusive.
     fn between(&self, column: &str, first: &str, last: &str) -> PyResult<Self> {
         self.0.clone().between(column, first, last).map(Self).map_err(|e| usage(e.to_string()))
     }
@@ -69,7 +69,7 @@ impl Table {
         py.detach(|| self.0.rows()).map_err(unusable)
     }
 
-    /// The values of a column: an array of floats (NaN for null), or of integers or flags without nulls; otherwise a list.
+    /// The values of a column: an array of floats (NaN for null), or of integers or booleans without nulls; otherwise a list.
     fn column<'py>(&self, py: Python<'py>, name: &str) -> PyResult<Bound<'py, PyAny>> {
         let table = self.0.table();
         let place = table.position(name).ok_or_else(|| {
@@ -92,7 +92,7 @@ impl Table {
         objects(py, table.columns[place].column_type, cells)
     }
 
-    /// The rows in runs of the same text in a column, read in one pass: the text, and an array of each of the other columns, which hold floats.
+    /// Runs of rows with the same text in a column, read in one pass: the text, and an array for each column of `floats`.
     fn runs<'py>(&self, py: Python<'py>, column: &str, floats: Vec<String>) -> PyResult<Vec<(String, Floats<'py>)>> {
         let read = || {
             let floats: Vec<&str> = floats.iter().map(String::as_str).collect();
@@ -134,7 +134,7 @@ fn type_name(column: ColumnType) -> &'static str {
     }
 }
 
-/// Values for NumPy: an array of flags, or a list.
+/// Values for NumPy: an array of booleans, or a list.
 fn objects<'py>(py: Python<'py>, column: ColumnType, cells: Vec<Cell>) -> PyResult<Bound<'py, PyAny>> {
     let flag = |cell: &Cell| if let Cell::Bool(flag) = cell { Some(*flag) } else { None };
     if column == ColumnType::Bool
@@ -158,7 +158,7 @@ fn objects<'py>(py: Python<'py>, column: ColumnType, cells: Vec<Cell>) -> PyResu
     Ok(list.into_pyobject(py)?.into_any())
 }
 
-/// A text as an object; one that was seen lately is the same object.
+/// A text as an object: the same object for a text that was seen recently.
 fn shared_text<'py>(py: Python<'py>, seen: &mut HashMap<String, Bound<'py, PyAny>>, text: String) -> Bound<'py, PyAny> {
     if let Some(object) = seen.get(&text) {
         return object.clone();
