@@ -173,7 +173,7 @@ mod tests {
         assert!(matches!(usage, Error::Usage(message) if message == "`trim` is 2"));
     }
 
-    /// A full disk is worth a retry, a path that is not a file is the user's mistake, anything else is a failure; messages name the file.
+    /// A full disk is worth a retry, a path that is not a file is bad input, anything else is a failure. Messages name the file.
     #[test]
     fn val_errors_of_files_name_them() {
         let path = Path::new("a/b.tif");

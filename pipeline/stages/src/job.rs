@@ -150,7 +150,7 @@ impl Outcome {
     }
 }
 
-/// Writes the item's rows of a table as they come, sorted by key, so that they need not all be in memory. Without rows, no file is written.
+/// Writes the item's rows of a table as they are computed, sorted by key, so that not all need be in memory. Without rows, no file is written.
 pub struct RowWriter<'w, R> {
     work: &'w Work<'w>,
     /// Created with the first row.
@@ -313,7 +313,7 @@ mod tests {
         }
     }
 
-    /// Rows written in pieces of any size make the same file, and the same product, as rows written at once; no rows make none.
+    /// Rows written in pieces of any size give the same file and product as rows written at once; without rows there is none.
     #[test]
     fn prop_rows_in_pieces_make_the_same_file() {
         const ROWS: i64 = 5000;

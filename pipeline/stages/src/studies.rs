@@ -144,7 +144,7 @@ pub fn run_sharing(
 /// written otherwise.
 ///
 /// # Errors
-/// A busy work area; a cache that is only read, or that an item could not be published to, because the shards would compute it again.
+/// A busy work area; a cache that is read-only, or to which an item could not be published: the shards would compute it again.
 /// Failed items are listed, even if all of them failed: other items of the study may have results.
 pub fn run_ancestors(
     loaded: &Loaded,
@@ -167,8 +167,7 @@ pub fn run_ancestors(
     write_timings(&cache, &execution)?;
     let summary = summary(&work, needed.len(), execution, &cache);
     if let Some(problem) = cache.shared().and_then(Sharing::lasting_problem) {
-        let message =
-            format!("some ancestors may be missing from the cache: {problem}; remove the cause and run again");
+        let message = format!("some ancestors may be missing from the cache: {problem}; fix the problem and run again");
         return Err(Error::Failed(message));
     }
     match summary.cache.as_ref().and_then(|tally| tally.problems.first().cloned()) {

@@ -24,8 +24,8 @@ pub fn is_address(path: &Path) -> bool {
 /// Opens a regular file.
 ///
 /// # Errors
-/// Those of the file system, with `NotFound` also for a path that leads through a file; `IsADirectory` for a folder; `InvalidInput` for
-/// a pipe, a socket or a device.
+/// Errors of the file system, with `NotFound` also for a path that leads through a file; `IsADirectory` for a folder; `InvalidInput` for a
+/// pipe, a socket or a device.
 pub fn open(path: &Path) -> io::Result<File> {
     // Checked before opening, because opening a pipe blocks until something writes to it.
     let kind = fs::metadata(path).map_err(missing)?.file_type();
@@ -72,7 +72,7 @@ pub fn read_text(path: &Path) -> io::Result<String> {
     String::from_utf8(read(path)?).map_err(|_| io::Error::new(ErrorKind::InvalidData, "is not UTF-8 text"))
 }
 
-/// A path such as `a.tif/x` leads to no file, as one whose folder does not exist.
+/// A path such as `a.tif/x` gives the error of a path whose folder does not exist.
 fn missing(error: io::Error) -> io::Error {
     match error.kind() {
         ErrorKind::NotADirectory => io::Error::new(ErrorKind::NotFound, "no such file"),

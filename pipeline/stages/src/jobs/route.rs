@@ -225,8 +225,8 @@ struct RouteJob {
     streams: Streams,
 }
 
-/// Approximate time of some searches on one terrain, s: its ground, and for each search the cells that it visits, or, of a search with
-/// legs at any angle, the lines of sight from them.
+/// Approximate time of some searches on one terrain, s: its ground, and for each search the cells that it visits, or, if its legs have any
+/// angle, the lines of sight from them.
 fn seconds(method: Method, cells: f64, searches: f64) -> f64 {
     let each = match method {
         Method::ThetaStar => 2e-9 * cells * cells.sqrt(),

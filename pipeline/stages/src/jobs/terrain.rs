@@ -286,7 +286,7 @@ mod tests {
     use sastrugi_store::atomic::Draft;
     use std::path::Path;
 
-    /// No file is no trail; a folder in its place is not.
+    /// Without a file there is no trail; a folder in its place is an error.
     #[test]
     fn val_trails_that_cannot_be_read_are_not_absent() {
         let (folder, item) = (tempfile::tempdir().unwrap(), ItemRef::new(STAGE, "a"));

@@ -35,7 +35,7 @@ use std::sync::Arc;
 /// Name of the stage.
 pub const STAGE: &str = "traverse";
 
-/// Missions that are driven before their samples are written; their samples are in memory, about 0.7 MB a mission of 35 s.
+/// Missions that are driven before their samples are written. Until then the samples are in memory, about 0.7 MB per mission of 35 s.
 const MISSIONS_AT_ONCE: usize = 32;
 
 /// The one kind of run.

@@ -15,7 +15,7 @@ pub fn scaled(texture: Grid, factor: f64) -> Grid {
     if factor == 1.0 { texture } else { texture.map(|height| factor * height) }
 }
 
-/// Whether a method can make what a measured background lacks, `covariance = "residual"`: FFT-MA and those that repeat a site.
+/// Whether a method can synthesise what a measured background lacks (`covariance = "residual"`): FFT-MA and those that repeat a site.
 pub fn completes_background(method: &str) -> bool {
     method == fft_ma::kind().kind || sastrugi_texture::needs(method).is_some_and(|needs| needs != Needs::Covariance)
 }
@@ -50,7 +50,7 @@ pub fn check_memory(method: &str, parameters: &Value, fit: &FitFile) -> Result<(
     memory::check("the texture", method.cost_of(&prospect).memory_bytes)
 }
 
-/// Notes on a texture that fills holes, whose surroundings give it the long waves that it lacks.
+/// Notes on a texture that fills holes, without the note on long waves: the surroundings of a hole supply them.
 pub fn notes_on_filling(notes: Vec<String>) -> impl Iterator<Item = String> {
     notes.into_iter().filter(|note| !note.starts_with(NO_LONG_WAVES))
 }
@@ -61,7 +61,7 @@ pub fn fill_note(fit: &FitFile, method: &str) -> Option<String> {
     Some(match sastrugi_texture::needs(method) {
         Some(Needs::Statistics | Needs::Residual) => {
             format!(
-                "the fit is empirical; the fitted model ({model}) only weights the measured cells around a hole; the texture in it is that of the site"
+                "the fit is empirical; the fitted model ({model}) only weights the measured cells around a hole, which is filled with texture of the site"
             )
         }
         _ => format!(
@@ -103,14 +103,14 @@ mod tests {
     use super::*;
     use sastrugi_schemas::fit::CovarianceMap;
 
-    /// A base for long waves is not asked for where there is one.
+    /// Where holes are filled, no base is recommended for long waves.
     #[test]
     fn val_a_filled_hole_needs_no_base() {
         let notes = [format!("{NO_LONG_WAVES}, 2 m; add it to a base that has them"), "made of cells".to_owned()];
         assert_eq!(notes_on_filling(notes.to_vec()).collect::<Vec<_>>(), ["made of cells"]);
     }
 
-    /// Only a normal texture is that of the fitted model; without a measured covariance there is nothing to note.
+    /// Only `fft_ma` fills holes with texture of the fitted model. Without a measured covariance there is no note.
     #[test]
     fn val_notes_on_filled_holes_name_what_the_model_is_for() {
         let map = CovarianceMap { model: "exponential".to_owned(), ..CovarianceMap::default() };

@@ -95,7 +95,7 @@ impl DestinationLock {
 
 impl Drop for DestinationLock {
     fn drop(&mut self) {
-        // While the lock is held: those who opened the file before find it gone. A leftover is harmless, as only the lock matters.
+        // Removed while the lock is held, so that processes that have opened the file find it gone. A leftover file is harmless.
         let _ = std::fs::remove_file(&self.path);
     }
 }
@@ -292,7 +292,7 @@ mod tests {
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
     }
 
-    /// However they meet, also while one removes its lock file, one writes at a time.
+    /// One process writes at a time, in any order of events, also while one removes its lock file.
     #[test]
     fn val_writers_take_turns() {
         let folder = tempfile::tempdir().unwrap();

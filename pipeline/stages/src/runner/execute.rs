@@ -94,8 +94,8 @@ impl Ready {
         self.by_memory.remove(&(memory_bytes, position));
     }
 
-    /// One of the first items that fits, or else the smallest: a search through all would take too long where very many are ready and
-    /// memory is short.
+    /// The first item that fits among a few, or else the smallest. A search through all would take too long if very many are ready and memory
+    /// is short.
     fn first_that_fits(&self, fits: impl Fn(usize) -> bool) -> Option<usize> {
         let mut first = self.in_order.iter().take(FIRST_READY).copied();
         let smallest = || self.by_memory.first().map(|&(_, position)| position).filter(|&position| fits(position));

@@ -21,7 +21,7 @@ pub fn take(path: &Path) -> io::Result<Option<File>> {
         let file = File::options().write(true).create(true).truncate(false).open(path)?;
         match file.try_lock() {
             Ok(()) if atomic::is_at(&file, path) => return Ok(Some(file)),
-            // Its holder removed it after it was opened here, and the next one locks a new file.
+            // The holder removed the file after it was opened here; the next process would lock a new file.
             Ok(()) => {}
             Err(TryLockError::WouldBlock) => return Ok(None),
             Err(TryLockError::Error(e)) => return Err(e),

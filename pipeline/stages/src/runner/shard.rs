@@ -1,8 +1,8 @@
 //! Shards: a run split into N parts on N machines, and the merge of the parts.
 //!
 //! An item belongs to shard `1 + (key modulo N)`. A shard computes its own items and all their parents, but keeps only its own
-//! items. Its description lists them with their places in the study, and the hash of the list of all items: the lists of N shards together
-//! are that list, and take the space of one.
+//! items. Its description lists them with their places in the study, and has the hash of the list of all items. The lists of N shards together
+//! are that list, and take no more space.
 
 use super::assemble::{DestinationLock, fewer_items};
 use super::cache::{Cache, Record, StoredFile, copy_result, load_record};
@@ -30,7 +30,7 @@ const STUDY: &str = "study.toml";
 const ITEMS_NAMED: usize = 5;
 /// Maximum number of parts of a run.
 pub const PARTS_MAX: u32 = 10_000;
-/// The part that holds what all have in common.
+/// The part with what all have in common.
 const FIRST: u32 = 1;
 
 /// Part `index` of `count`, counted from 1.
@@ -335,7 +335,7 @@ fn read_all(folders: &[PathBuf]) -> (Vec<Placed<'_>>, Vec<String>) {
 /// All items of the study in graph order, from the lists of a complete set of shards, which are emptied.
 ///
 /// # Errors
-/// Lists that are not all items of the study together.
+/// Lists that do not have each item of the study exactly once.
 fn all_items(shards: &mut [Placed<'_>]) -> Result<Vec<OwnItem>, Error> {
     let mut items: Vec<OwnItem> =
         shards.iter_mut().flat_map(|placed| std::mem::take(&mut placed.shard.items)).collect();
@@ -347,7 +347,7 @@ fn all_items(shards: &mut [Placed<'_>]) -> Result<Vec<OwnItem>, Error> {
             let count = first.shard.part.count;
             let numbers: Vec<u32> = (1..=count).collect();
             let advice = mend(&numbers, count);
-            Err(Error::Input(format!("the items that the shards list are not those of the study; {advice}")))
+            Err(Error::Input(format!("the shards do not list each item of the study exactly once; {advice}")))
         }
         _ => Ok(items),
     }
@@ -592,7 +592,7 @@ mod tests {
         }
     }
 
-    /// The lists of a complete set, in whatever order, are the list of the study; one that lacks an item, has another, or has one twice is
+    /// The lists of a complete set, in any order, are the list of the study. A set that lacks an item, has a foreign one, or has one twice is
     /// refused.
     #[test]
     fn val_the_lists_of_shards_are_one_list() {
@@ -608,7 +608,7 @@ mod tests {
         let changed = |items: Vec<OwnItem>| {
             let error = all(vec![description(1, 3), Description { items, ..description(2, 3) }, description(3, 3)]);
             let expected =
-                format!("the items that the shards list are not those of the study; {}", mend(&[1, 2, 3], 3));
+                format!("the shards do not list each item of the study exactly once; {}", mend(&[1, 2, 3], 3));
             assert_eq!(error.unwrap_err().to_string(), expected);
         };
         changed(Vec::new());

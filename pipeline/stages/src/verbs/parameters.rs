@@ -75,7 +75,7 @@ pub fn assign_vehicle(params: &mut Value, vehicle: &str) -> Result<(), Error> {
     if changes.is_empty() { Ok(()) } else { place(params, CHANGES, Value::Object(changes)) }
 }
 
-/// What a vehicle file describes: the name of a vehicle, and the values that differ from it.
+/// Content of a vehicle file: the name of a vehicle, and the values that differ from it.
 fn described(file: &Value) -> Result<(&str, Map<String, Value>), String> {
     let mut keys = file.as_object().into_iter().flat_map(Map::keys);
     if let Some(unknown) = keys.find(|key| !VEHICLE_KEYS.contains(&key.as_str())) {
@@ -86,7 +86,7 @@ fn described(file: &Value) -> Result<(&str, Map<String, Value>), String> {
         Some(Value::Object(changes)) => changes.clone(),
         Some(_) => return Err("`parameters` must be a table".to_owned()),
         None if base.is_some() => Map::new(),
-        None => return Err("missing table `parameters`; without `base` it must hold all values".to_owned()),
+        None => return Err("missing table `parameters`; without `base` it must give all values".to_owned()),
     };
     let (key, name) = match base {
         None => ("base", CUSTOM),

@@ -57,7 +57,7 @@ use std::path::{Path, PathBuf};
 pub struct TableFiles {
     table: &'static Table,
     paths: Vec<PathBuf>,
-    /// What rows must have in columns of text.
+    /// Conditions on columns of text that rows must meet.
     wanted: Vec<Wanted>,
     schema: SchemaRef,
 }
@@ -105,8 +105,8 @@ impl TableFiles {
         self.between(column, text, text)
     }
 
-    /// The rows among these whose text in a column is neither before the first nor after the last of two, in the order of their bytes. Row
-    /// groups whose statistics exclude it are not decoded.
+    /// The rows among these whose text in a column lies between `first` and `last`, inclusive, in byte order. Row groups whose statistics exclude
+    /// such rows are not decoded.
     ///
     /// # Errors
     /// As [`Self::selecting`].
@@ -197,8 +197,7 @@ impl TableFiles {
         Ok(Some(values))
     }
 
-    /// The rows in runs of the same text in one column, with the floats of other columns; all of them are read in one pass. Null counts as an
-    /// empty text.
+    /// Runs of rows with the same text in one column, with the floats of other columns, read in one pass. Null counts as an empty text.
     ///
     /// # Errors
     /// As [`Self::floats`].
@@ -265,11 +264,11 @@ impl TableFiles {
         column.ok_or_else(|| self.unusable("has a column of unknown type"))
     }
 
-    /// Position of a column that must have this type; `what` says in the error what it was to hold.
+    /// Position of a column that must have this type; `what` names the expected values in the error.
     fn typed(&self, column: &str, column_type: ColumnType, what: &str) -> Result<usize, TableError> {
         let position = self.position(column)?;
         if self.table.columns[position].column_type != column_type {
-            return Err(self.unusable(format!("column {column} of table {} does not hold {what}", self.table.name)));
+            return Err(self.unusable(format!("column {column} of table {} does not have {what}", self.table.name)));
         }
         Ok(position)
     }
@@ -301,12 +300,12 @@ impl TableFiles {
         decoding(path, || builder.build())
     }
 
-    /// The row groups that may hold wanted rows, by what their statistics state.
+    /// The row groups that may have wanted rows, according to their statistics.
     pub(super) fn groups(&self, metadata: &ParquetMetaData) -> Vec<usize> {
         let may_hold = |group: &RowGroupMetaData, wanted: &Wanted| {
             let name = self.table.columns[wanted.column].name;
             let column = group.columns().iter().find(|column| column.column_path().parts() == [name]);
-            // Long texts are shortened there, but the ends always enclose what the group holds.
+            // Long texts are truncated there, but the bounds always enclose those of the group.
             let stated = column.and_then(|column| column.statistics()).filter(|stated| !stated.is_min_max_deprecated());
             let ends = stated.and_then(|stated| Some((stated.min_bytes_opt()?, stated.max_bytes_opt()?)));
             ends.is_none_or(|(low, high)| low <= wanted.last.as_bytes() && wanted.first.as_bytes() <= high)

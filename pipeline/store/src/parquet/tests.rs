@@ -248,7 +248,7 @@ fn val_lists_that_are_not_there_are_not_skipped() {
     assert!(error.contains("fields that Parquet does not define"), "{error}");
 }
 
-/// Columns of numbers come without a detour through cells; nulls are NaN among floats, and make a column of integers no array.
+/// Columns of numbers are read without going through cells. A null is NaN among floats; a column of integers with a null is not an array.
 #[test]
 fn val_columns_of_numbers() {
     let folder = tempfile::tempdir().unwrap();
@@ -262,7 +262,7 @@ fn val_columns_of_numbers() {
     let azimuth = files.clone().selecting("fit_id", "fit-001").unwrap().floats("azimuth_deg").unwrap();
     assert!(azimuth[1].is_nan() && [azimuth[0], azimuth[2]] == [0.0, 1.0], "{azimuth:?}");
     let refused = |column: &str| files.floats(column).unwrap_err().to_string();
-    assert!(refused("pairs").ends_with("column pairs of table covariance does not hold floats"));
+    assert!(refused("pairs").ends_with("column pairs of table covariance does not have floats"));
     assert!(refused("wheels").contains("has no column wheels"));
     assert!(files.integers("lag_m").is_err() && files.clone().between("lag_m", "a", "b").is_err());
     // As `column` gives them, cell by cell.

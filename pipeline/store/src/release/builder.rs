@@ -75,7 +75,7 @@ pub struct TablePart {
     pub table: &'static Table,
     /// Name of the part; the file is `part-<name>.parquet`.
     pub name: String,
-    /// Origin, which the parts of a table share: it may list very many parents.
+    /// Origin, shared by the parts of a table because it may list very many parents.
     pub origin: Arc<Origin>,
 }
 

@@ -50,7 +50,7 @@ fn read(file: File, f: impl FnMut(Artifact)) -> Result<Manifest, serde_json::Err
     Ok(Manifest { failed, ..manifest })
 }
 
-/// The keys of a manifest; the files go to the function, and failed items, of which there may be many, to their list.
+/// Visitor of a manifest's keys: files are passed to the function, failed items, of which there may be many, are added to their list.
 struct Parts<'a, F> {
     f: F,
     failed: &'a mut Vec<FailedItem>,

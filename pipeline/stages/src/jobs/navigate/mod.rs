@@ -339,8 +339,8 @@ impl NavigateJob {
     }
 }
 
-/// Approximate time of some runs over one terrain, s: its ground, and along the way of each run the steps of its members, and with sensing
-/// the searches for detours.
+/// Approximate time of some runs over one terrain, s: its ground, the steps of the members along the way of each run, and with sensing the
+/// searches for detours.
 fn seconds(cells: f64, runs: f64, members: f64, senses: bool) -> f64 {
     let along = 6e-6 * members + if senses { 1.5e-4 } else { 0.0 };
     0.01 + 2.5e-7 * cells + along * cells.sqrt() * runs

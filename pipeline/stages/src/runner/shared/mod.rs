@@ -132,7 +132,7 @@ pub struct Tally {
 pub struct Sharing {
     place: Box<dyn Shared>,
     tally: Mutex<Tally>,
-    /// The first problem that a retry does not solve.
+    /// The first problem that a retry cannot solve.
     lasting: OnceLock<String>,
 }
 
@@ -163,7 +163,7 @@ impl Sharing {
         self.lock().clone()
     }
 
-    /// The first problem so far that a retry does not solve, such as a missing permission.
+    /// The first problem so far that a retry cannot solve, such as a missing permission.
     pub fn lasting_problem(&self) -> Option<&str> {
         self.lasting.get().map(String::as_str)
     }
@@ -176,7 +176,7 @@ impl Sharing {
     pub fn fetch(&self, item: &ItemRef, key: &str, folder: Draft<'_>) -> Option<Record> {
         let name = name_of(key);
         let attempt = || copy(&*self.place, &name, item, key, folder);
-        // An entry that was evicted while it was read, and perhaps published again, looks damaged once, but not twice.
+        // An entry that is evicted while it is read, and perhaps published again, looks damaged once but not twice.
         let found = match attempt() {
             Ok(Found::Damaged) => attempt(),
             found => found,

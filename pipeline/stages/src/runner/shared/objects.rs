@@ -2,9 +2,9 @@
 //!
 //! The objects of an entry are `entries/ab/ab12.../<file>`. There is no rename, so the record is written last, and only if there is none: an
 //! entry exists when its record does. It disappears with its record, which is removed first. Writers that meet write the same bytes; a
-//! reader that meets a removal finds a file missing and computes the item. A removal leaves files that are newer than the record: another
-//! run is uploading them to publish the item again. One that is uploaded after they were listed may still go; its entry is then damaged, and
-//! the next reader publishes it again. Entries age from their publication.
+//! reader that meets a removal finds a file missing and computes the item. A removal leaves files that are newer than the record, because
+//! another run is uploading them to publish the item again. A file that is uploaded after they were listed may still be removed. Its entry is
+//! then damaged, and the next reader publishes it again. Entries age from their publication.
 
 use super::{DRAFT_AGE_MAX, Entry, Shared, is_entry};
 use crate::error::Error;

@@ -337,7 +337,7 @@ fn val_a_release_in_a_bucket_is_not_a_shared_cache() {
     assert!(Objects::open(Bucket::in_memory("s3://bucket/snow").unwrap(), false).is_ok());
 }
 
-/// An unfinished upload of another run, which is newer than the record, stays when an entry is removed, and without a record until it is old.
+/// Removing an entry leaves an unfinished upload of another run, which is newer than the record; without a record, uploads stay until they are old.
 #[test]
 fn val_removal_leaves_what_another_run_uploads() {
     let bucket = Arc::new(Bucket::in_memory("s3://bucket/cache").unwrap());
@@ -449,7 +449,7 @@ fn ancestors(ending: Ending, place: Box<dyn Shared>) -> Result<RunSummary, Error
     run_ancestors(&loaded, 2, &request, Sharing::new(place), &Silent)
 }
 
-/// That all common ancestors fail is no reason to run no shard: other items may have results.
+/// Shards run even if all common ancestors failed: other items may have results.
 #[test]
 fn val_failed_ancestors_are_listed() {
     let shared = tempfile::tempdir().unwrap();
@@ -492,7 +492,7 @@ fn val_problems_of_the_cache_keep_their_kind() {
     let missing = "some ancestors may be missing from the cache: no room; ";
     assert!(matches!(said(Error::Retry), Error::Retry(why) if why == format!("{missing}run again")));
     for lasting in [Error::Failed, Error::Input] {
-        let expected = format!("{missing}remove the cause and run again");
+        let expected = format!("{missing}fix the problem and run again");
         assert!(matches!(said(lasting), Error::Failed(why) if why == expected));
     }
 }

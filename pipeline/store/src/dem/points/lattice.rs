@@ -40,7 +40,7 @@ impl Lattice {
             let [width, height] = [0, 1].map(|axis| shown(survey.high[axis] - survey.low[axis]));
             let [rows, cols, cell] = [rows, cols, cell_m].map(shown);
             return Err(Refusal::new(format!(
-                "covers {width} x {height} m, which is {rows} x {cols} cells of {cell} m; at most {MAX_CELLS} cells can be held"
+                "covers {width} x {height} m, which is {rows} x {cols} cells of {cell} m; at most {MAX_CELLS} cells are allowed"
             )));
         }
         Ok(Self { cell_m, west, south, north, rows: rows as usize, cols: cols as usize })

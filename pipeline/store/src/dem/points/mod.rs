@@ -14,9 +14,9 @@
 //! while gaps are filled; for medians and percentiles also 8 bytes per point; while searching for a cell size, up to 64 MiB. The
 //! file is decoded twice, and once or twice more if no cell size is given (3.5 s per pass for 10^7 points of LAZ).
 //!
-//! Without a given cell size, memory is planned for four cells per point ([`super::claimed`]): as many as a square at 45 degrees takes,
-//! which fills half of its box, if only half of its cells hold a point. A narrow strip across its box takes more, and is refused where the
-//! memory was planned ([`GridSettings::planned_cells`]).
+//! Without a given cell size, memory is planned for four cells per point ([`super::claimed`]). That is enough for a square at 45 degrees, which
+//! fills half of its box, if half of its cells have a point. A narrow strip across its box needs more, and is refused where memory was planned
+//! ([`GridSettings::planned_cells`]).
 //!
 //! Points outside the box that the header states, by more than a cell, are refused before any cell is held: the box is what memory
 //! is planned for ([`super::claimed`]), and a flipped bit of a single point could make the grid any size. Boxes that other programs
@@ -56,7 +56,7 @@ use survey::{Chosen, check_stated, survey};
 
 /// Cells per point for which memory is planned without a given cell size.
 const PLANNED_CELLS_PER_POINT: u64 = 4;
-/// Least number of cells for which memory is planned: a few points may lie in more cells than four each.
+/// Fewest cells for which memory is planned: a few points may need more than four each.
 const PLANNED_CELLS_MIN: u64 = 1 << 10;
 
 /// A gridded cloud.

@@ -18,7 +18,7 @@ pub struct GridSettings {
     pub fill_cells: u32,
     /// Use only points of class 2, ground. Withheld points and the noise classes 7 and 18 are never used.
     pub ground_only: bool,
-    /// Most cells of a grid whose cell size is not given, for which memory was planned; by default no limit but that of all rasters.
+    /// Most cells of a grid without a given cell size, for which memory was planned. By default only the limit of all rasters applies.
     pub planned_cells: Option<u64>,
 }
 

@@ -322,8 +322,8 @@ fn val_cells_hold_the_points_that_numpy_finds() {
     }
 }
 
-/// Points 50 mm apart in a strip across a box of 60 m, which fills a tenth of it: 1200 x 1200 cells for 141 540 points. Planned are four
-/// cells per point, or 1024; more are refused only if they were planned for and no cell size is given.
+/// Points 50 mm apart in a strip across a box of 60 m, of which it fills a tenth: 1200 x 1200 cells for 141 540 points. Memory is planned for
+/// four cells per point, at least 1024. More are refused only where memory was planned and no cell size is given.
 #[test]
 fn val_a_strip_across_its_box_takes_no_more_cells_than_planned() {
     let across = |i: i32| (i - 60).max(0)..=(i + 60).min(1199);
