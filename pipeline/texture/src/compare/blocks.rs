@@ -2,15 +2,15 @@
 //!
 //! # What
 //! Both rasters go through the same moving average, the texture with the site's holes, and without the objects of either (unless `find_objects` is
-//! false), and are cut into blocks of one shape, at least two windows
-//! wide. Each block has the statistics of [`sastrugi_roughness::surface_statistics`], and the logarithms of its root mean square height, slope and
-//! curvature. A statistic of a set of blocks is the mean over them; `spread_of_blocks` is the logarithm of the standard deviation of those three
-//! over them, so that a texture that repeats itself, or is alike everywhere where the site is not, is detected. Blocks far apart in one large
-//! texture count as its realisations. Also reported, without a verdict, are verbatim copies ([`sastrugi_roughness::copies()`]).
+//! false). They are cut into blocks of one shape, at least two windows wide. Each block has the statistics of
+//! [`sastrugi_roughness::surface_statistics`], and the logarithms of its root mean square height, slope and curvature. A statistic of a set of
+//! blocks is the mean over them; `spread_of_blocks` is the logarithm of the standard deviation of those three over them, which reveals a texture
+//! that repeats itself, or is uniform where the site is not. Blocks far apart in one large texture count as its realisations. Also reported,
+//! without a verdict, are verbatim copies ([`sastrugi_roughness::copies()`]).
 //!
 //! # Null hypothesis and error rates
 //! No generator is known, so nothing can be simulated. The null hypothesis is that the texture is more ground of the same kind: its blocks and the
-//! site's are exchangeable. Under it, the share of arrangements of all blocks into two such sets that lie at least as far apart is an exact
+//! site's are exchangeable. Under it, the share of divisions of all blocks into two such sets that lie at least as far apart is an exact
 //! p-value (permutation test), and Holm's adjustment bounds the probability of any wrong `different` by alpha.
 //!
 //! Blocks of a site that changes from one end to the other are not exchangeable. Where its halves (west and east, north and south) lie farther
@@ -22,7 +22,7 @@
 //! texture does, or a bound that is narrower than its blocks can resolve.
 //!
 //! # Cost
-//! Statistics of each block; 2000 arrangements take less than the statistics of a million cells. Some 150 bytes per cell.
+//! The statistics of each block; 2000 permutations take less time than the statistics of a million cells. Some 150 bytes per cell.
 
 use super::halves::cut;
 use super::surfaces::case;
@@ -278,7 +278,7 @@ impl<'a> Judge<'a> {
         let split = |blocks: &[&'a Block], order: &[usize], first: usize| {
             let picked = |order: &[usize]| {
                 let mut order = order.to_vec();
-                // Sums do not depend on the order of the draw, so that a draw of the observed arrangement ties with it.
+                // Sums must not depend on the order within a set, so that a draw of the observed sets ties with them.
                 order.sort_unstable();
                 order.into_iter().map(|i| blocks[i]).collect::<Vec<&Block>>()
             };
@@ -474,8 +474,8 @@ mod tests {
         assert!(parts(&row.iter().collect::<Vec<_>>(), |[_, c]| c == 0).is_none());
     }
 
-    /// The observed arrangement drawn in another order, also with the sides exchanged, lies exactly as far apart, so that it counts as equal. The sums of
-    /// these values, 1/3 to 1/14, depend on their order.
+    /// The observed sets drawn in another order, also with the sides exchanged, lie exactly as far apart, so that they count as ties. The sums of these
+    /// values, 1/3 to 1/14, depend on their order.
     #[test]
     fn prop_equal_arrangements_tie() {
         let side = |first: u32| -> Vec<Block> {

@@ -19,8 +19,8 @@ pub struct CompareParameters {
     pub outer_scale_m: f64,
     /// Significance level at which residuals are trimmed. Default 0.05.
     pub trim: f64,
-    /// Whether objects (trees, rocks, structures) of both sides are found and left out. Default true. Set it to false where a texture should have the
-    /// objects of its site, which are then judged with the rest.
+    /// Whether objects (trees, rocks, structures) of both sides are found and left out. Default true. Set it to false if a texture should reproduce
+    /// the objects of its site: they are then judged with the rest.
     pub find_objects: bool,
     /// Covariance model of both sides: a single term, optionally with `+nugget`. Default `exponential`.
     pub model: String,

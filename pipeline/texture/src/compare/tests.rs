@@ -254,7 +254,7 @@ fn val_normal_and_repeated_textures_are_told() {
     assert!(copies.of_site.longest_run_cells >= 30 && copies.between_halves.share < 0.01, "{copies:?}");
 }
 
-/// A site with a boulder in each of its ten blocks, and a texture without: left out as objects, they are not judged; kept, they are told by the
+/// A site with a boulder in each of its ten blocks, and a texture without boulders. Left out as objects, they are not judged; kept, they show in the
 /// heights. A boulder of 7 % of a block and eight standard deviations high moves the standardised quantiles by more than twice what two normal
 /// surfaces differ by, 0.05 to 0.1; the rarest arrangement of 10 + 10 blocks has p = 1/2000.
 #[test]

@@ -35,9 +35,9 @@
 //! * No bias of the standard deviation was found, but a tile with few first cells is a small sample: of tiles of 128 x 128 cells in an independent
 //!   program, a synthetic site rough in patches gave 1.08 +- 0.06 of it and 1.07 +- 0.06 of the increments (spacing 8), two measured ones 1.00 +-
 //!   0.04 and 0.98 +- 0.01, 0.89 +- 0.15 and 0.97 +- 0.11 (spacing 32). The logarithm of the increments' flatness was lower, by 0.1, 0.9 and 0.2; that of
-//!   the shipped kernel is lower by 0.19 to 0.39 on seven synthetic sites like those of its test: 28 to 49 % of what is above 3 are lost.
+//!   the shipped kernel is lower by 0.19 to 0.39 on seven synthetic sites like those of its test: the excess over 3 drops by 28 to 49 %.
 //! * Distances are in cells, not in metres: on oblong cells the nearest neighbours are not the nearest on the ground.
-//! * A level residual gives a level texture, as it does with [`super::quilting`]; the methods from statistics refuse it.
+//! * A level residual gives a level texture, as with [`super::quilting`]; the methods that use statistics refuse it.
 //! * A gap in the site costs only the places whose neighbourhood it covers by more than 30 %. The DEM licence extends to the texture.
 //!
 //! # Cost

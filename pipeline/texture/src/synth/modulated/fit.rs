@@ -11,12 +11,13 @@
 //! at the range with the least misfit. The mean that is subtracted is that of a finite site: rho~ is taken less its mean over all pairs of cells.
 //! This v must be the one that y was made with, which a secant iteration finds.
 //!
-//! On smooth ground the map to products is seen itself: d holds `f'' z_x z_y` beside `f' z_xy`, f the map, so that about any v finds itself. Of normal products
-//! (v = 0), `Q = <d_x^2> <d_y^2> / (256 <d^2> <y^2>)` says how smooth the ground is, d_x and d_y the differences of the same blocks along rows and
-//! along columns: 1 for waves much longer than the blocks, 1/16 for independent cells. Where Q is above 0.5, what normal products show of v tells, v_0:
-//! v_0 / v is 1 less the mean slope of the iteration between 0 and v. A v of which they show less than a quarter, or that lies at the largest allowed, is not
-//! believed there: v_0 is taken, and the difference counts as error. On rough ground the share is as small where patches are strong, and v is right. With
-//! numpy, 256 x 256 cells, patches of 8 cells:
+//! On smooth ground the map to products dominates d: with f the map, d has the term `f'' z_x z_y` beside `f' z_xy`, so that almost any v reproduces
+//! itself. The smoothness of the ground is measured on normal products (v = 0): `Q = <d_x^2> <d_y^2> / (256 <d^2> <y^2>)`, where d_x and d_y are the
+//! differences of the same blocks along rows and along columns. Q is 1 for waves much longer than the blocks, and 1/16 for independent cells.
+//!
+//! Where Q is above 0.5, v is compared with v_0, the log variance found in normal products: v_0 / v is 1 less the mean slope of the iteration between 0
+//! and v. If v_0 is less than a quarter of v, or v is the largest allowed, v_0 is taken instead, and the difference counts as error. On rough ground
+//! the ratio is as small where patches are strong, but v is right. With numpy, 256 x 256 cells, patches of 8 cells:
 //!
 //! | ground | truth | Q | v by the iteration | v_0 | v_0 / v |
 //! |---|---|---|---|---|---|
@@ -26,7 +27,7 @@
 //! | over 4 cells | 0, 0.3, 0.8 | 0.87 to 0.93, 0.70 to 0.72, 0.53 to 0.56 | 0.30 to 0.98, 1.24 to 2.00, 2.00 | 0.02 to 0.10, 0.29 to 0.43, 0.55 to 0.79 | 0.02 to 0.22, 0.15 to 0.27, 0.28 to 0.39 |
 //! | over 6 cells | 0, 0.3 | 0.88 to 1.01, 0.65 to 0.70 | 0.62 to 1.66, 1.64 to 2.00 | 0.05 to 0.23, 0.25 to 0.45 | 0.04 to 0.25, 0.12 to 0.28 |
 //!
-//! (3 to 8 fields each.) On smooth ground v_0 itself is near the truth; normal ground low-passed over 6 cells and more has up to 0.3 of its own.
+//! (3 to 8 fields each.) On smooth ground v_0 itself is near the truth, but normal ground low-passed over 6 cells or more gives up to 0.3.
 //!
 //! The standard error counts patches: n = the site's cells over those of `rho^2`, and of the squared correlation of y, whose quantiles are as uncertain;
 //! `sqrt(2 / n) (v + pi^2 / 8 / cells of a patch) / (1 - s)`, s the slope of the iteration: the last one where v hardly matters, otherwise the mean, for which
@@ -61,8 +62,8 @@ const STEPS: usize = 8;
 const SLOPES: [f64; 2] = [-0.5, 0.75];
 /// Ground is smooth where [`smoothness`] is above this.
 const SMOOTH: f64 = 0.5;
-/// Least share of a log variance that normal products must show on smooth ground if patches are visible: below the first it is not believed, below the
-/// second not well known.
+/// Least ratio of the log variances of normal and of implied products on smooth ground, if patches are visible: below the first the latter is not
+/// accepted, below the second it is not well known.
 const SHOWN_SHARES: [f64; 2] = [0.25, 1.0 / 3.0];
 /// Change of the log variance at which the iteration ends: absolute, and relative.
 const TOLERANCES: [f64; 2] = [2e-3, 5e-3];
@@ -198,7 +199,7 @@ impl Site<'_> {
         (0..RANGES).map(|k| RANGE_CELLS_MIN * libm::exp(step * k as f64)).collect()
     }
 
-    /// The log variance that is found in the products that it implies, or in normal ones if it is not to be believed.
+    /// The log variance that is found in the products that it implies, or in normal ones if that one is not accepted.
     fn solved(&self) -> Found {
         match self.iterated() {
             Some(found) => self.believed(found),
@@ -206,7 +207,7 @@ impl Site<'_> {
         }
     }
 
-    /// What was found, unless the map to products alone may have put it there; with the error that such a map leaves.
+    /// The modulation found, unless the map to products alone may explain it; with the error that such a map leaves.
     fn believed(&self, found: Found) -> Found {
         let normal = (found.log_variance >= NOTED_MIN).then(|| self.step(0.0, found.range)).flatten();
         let Some(normal) = normal else { return found };
@@ -360,8 +361,8 @@ fn signed_sums(y: &Grid, [south, east]: [f64; 2]) -> Grid {
     Grid::new(geometry, (0..geometry.rows).into_par_iter().flat_map_iter(line).collect())
 }
 
-/// How smooth a surface about 0 is: what the product of its two slopes weighs beside its mixed difference, from 1/16 for independent cells to 1 for
-/// waves much longer than four cells.
+/// Smoothness Q of a surface with mean 0: the product of its two slopes relative to its mixed difference, from 1/16 for independent cells to 1 for waves
+/// much longer than four cells.
 pub(super) fn smoothness(y: &Grid) -> f64 {
     let mean_square = |z: &Grid| sums::mean(&sums::finite(&z.map(|v| v * v).values));
     let [southwards, eastwards, mixed] =

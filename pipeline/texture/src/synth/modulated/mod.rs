@@ -5,9 +5,10 @@
 //!
 //! `C_z(h) = C_z(r(h), rho(h))`, without T simply `sigma^2 r(h) exp(-s^2 (1 - rho(h)))`
 //!
-//! (`transform.rs`). r is solved for at every lag, so that the covariance of z, with its anisotropy, is that of the residual, as far as r may be 1 and
-//! its spectrum is not negative: negative eigenvalues of r are set to 0 and the others scaled to unit variance. [`Modulated::covariance_error`] is the
-//! largest difference that remains at any lag, from C_z at the r that is made. Smooth ground has the least room, where patches are narrower than its waves.
+//! (`transform.rs`). r is solved for at every lag, so that the covariance of z, with its anisotropy, is that of the residual. That is possible as long
+//! as r is at most 1 and its spectrum is not negative: r is limited to 1, negative eigenvalues are set to 0 and the others scaled to unit variance.
+//! [`Modulated::covariance_error`] is the largest difference that remains at any lag, from C_z at this r. It is largest on smooth ground whose waves
+//! are longer than the patches.
 //!
 //! | parameter | unit, range | meaning |
 //! |---|---|---|
@@ -26,10 +27,10 @@
 //! | 0.3 | 0.302, 0.051 | 0.301, 0.045 | 0.308, 0.061 | 0.292, 0.040 |
 //! | 0.8 | 0.840, 0.198 | 0.826, 0.197 | 0.857, 0.247 | 0.763, 0.143 |
 //!
-//! L within 8 %. With a heavy-tailed T 0.304 and 0.856; with a Matern 3/2 covariance 0.340 and 1.00, and worse on smoother ground (`fit.rs`). White noise fills quiet places: with 20 % of the standard deviation 0.3
-//! becomes 0.15, and the texture has the noise in patches too. L of 2 or 3 cells are found as 4.3 and 3.7. The standard error that is stated covers
-//! the spread within a third to a half, not noise. Where the covariance of a texture would be off by more than 10 % of the variance, or its one-cell increments
-//! by more than 10 % of theirs, s^2 is lowered until it is not.
+//! L within 8 %. With a heavy-tailed T, 0.3 and 0.8 are found as 0.304 and 0.856; with a Matern 3/2 covariance as 0.340 and 1.00, and worse on smoother
+//! ground (`fit.rs`). White noise fills quiet places: with 20 % of the standard deviation 0.3 becomes 0.15, and the texture has the noise in patches
+//! too. L of 2 or 3 cells are found as 4.3 and 3.7. The stated standard error covers the spread within a third to a half, but not noise. s^2 is reduced
+//! until the covariance of a texture is within 10 % of the variance, and the variance of one-cell increments within 10 %.
 //!
 //! Source: Castaing, Gagne and Hopfinger 1990, Physica D 46, 177, doi:10.1016/0167-2789(90)90035-N (log-normal amplitudes, flatness by scale);
 //! Mehler 1866. Departure: the monotone map outside the product.
@@ -39,9 +40,9 @@
 //!
 //! Patches are isotropic in metres, whatever the anisotropy of the site.
 //!
-//! Not identified: s^2 of smooth ground (`fit.rs`); L beyond 40 cells or a sixth of the site, where the fit ends; one scale of patches is fitted, so L is a compromise where
-//! patches have patches. Not reached: a flatness far above that of the heights, since T cuts the tails of the product to those of the heights. Flatness over 1, 2, 4,
-//! 8, 16 and 32 cells of the unseen half of three sites, of textures of the other half, and of T alone (s^2 = 0):
+//! Not identified: s^2 of smooth ground (`fit.rs`); L beyond 40 cells or a sixth of the site, where the search ends. One scale of patches is fitted, so
+//! L is a compromise where patches have patches. Not reached: a flatness far above that of the heights, since T cuts the tails of the product to those
+//! of the heights. Flatness over 1, 2, 4, 8, 16 and 32 cells of the unseen half of three sites, of textures of the other half, and of T alone (s^2 = 0):
 //!
 //! | site | s^2, L | unseen half | texture | T alone |
 //! |---|---|---|---|---|
@@ -49,13 +50,14 @@
 //! | gullies, 50 cm | 0.10 (0.01), 24 | 131, 99, 55, 25, 14, 8.7 | 9.9, 9.4, 8.7, 7.6, 6.5, 5.6 | 8.7, 8.4, 7.8, 6.9, 5.9, 5.8 |
 //! | volcanic cone, 1 m | 0.70 (0.34), 32 | 6.7, 6.7, 6.9, 7.5, 8.3, 6.4 | 19, 16, 13, 9.3, 6.6, 4.7 | 3.7, 3.7, 3.6, 3.5, 3.5, 3.6 |
 //!
-//! (From an earlier version of the fit, which believed any v.) So: right where roughness comes in patches; too low where rims and steps on smooth ground make
-//! it, which are not patches. Too high on the cone, where a curved map may have been taken for patches, as on smooth ground. Not reproduced either: third-order
-//! structure (the field looks the same with its axes reversed), ridges, and whatever else needs aligned phases: use `wavelet_statistics`.
+//! (Values are from an earlier version of the fit, which accepted any s^2.) The flatness is right where roughness comes in patches, and too low where it comes
+//! from rims and steps on smooth ground. It is too high on the cone, where a nonlinear map may have been taken for patches, as on smooth ground. Not
+//! reproduced either: third-order structure (the field looks the same with its axes reversed), ridges, and whatever else needs aligned phases: use
+//! `wavelet_statistics`.
 //!
 //! Cost: for 1024 x 1024 cells some 1.7 times FFT-MA's: one forward and three inverse half transforms, an exponential and two table look-ups
-//! per cell (an estimate), and a third look-up for the error of the covariance; once per texture some 60 ms of tables. Memory: 44 bytes per torus cell. The fit: about five
-//! rounds of two masked covariances with lags of up to 40 cells.
+//! per cell (an estimate), and a third look-up for the error of the covariance; once per texture some 60 ms of tables. Memory: 44 bytes per torus
+//! cell. The fit: about five rounds of two masked covariances with lags of up to 40 cells.
 
 mod fit;
 mod transform;
@@ -95,7 +97,7 @@ const RANGE_CELLS_FITTED: f64 = 40.0;
 const ERROR_MAX: f64 = 0.1;
 /// Largest variance of the one-cell increments of a texture, over the measured one.
 const INCREMENT_RATIO_MAX: f64 = 1.1;
-/// Error of the covariance, as a share of the variance, above which it is noted: the tables have up to 1 %.
+/// Error of the covariance, as a share of the variance, above which it is noted. Interpolation in the tables gives up to 1 %.
 const COVARIANCE_NOTE: f64 = 0.02;
 /// Standard error of a fitted log variance, as a share of it, above which it is noted.
 const ERROR_NOTE: f64 = 0.25;
@@ -193,7 +195,7 @@ impl ResidualKernel for Modulated {
 }
 
 impl ModulatedParameters {
-    /// Refuses stated parameters with which a texture would not have the covariance on its torus, m2, or the increments over one cell.
+    /// Refuses stated parameters with which a texture would not have the given covariance on its torus, m2, or the one-cell increments.
     fn check_effect(&self, made: &Modulated, covariance_m2: &[f64]) -> Result<(), ParameterError> {
         let stated = [("log_variance", self.log_variance), ("range_m", self.range_m)];
         let Some((key, value)) = stated.into_iter().find_map(|(key, value)| Some((key, value?))) else { return Ok(()) };

@@ -20,20 +20,21 @@
 //! * the covariance at all stored lags instead of 7 x 7 in each octave;
 //! * differences with their distributions, because moments up to the fourth do not hold the tails of rough ground (flatness of one-cell
 //!   increments 30 to 350);
-//! * no relative phase between octaves: the skewness of increments by direction, to which it leads, is in their quantiles. Phase harmonics describe it
-//!   as covariances (Zhang and Mallat 2021, Maximum entropy models from phase harmonic covariances, Applied and Computational Harmonic Analysis 53,
-//!   199-230), reached by descent along their gradient, which a fixed number of projections does not give.
+//! * no relative phase between octaves: the skewness of increments by direction, which it causes, is in their quantiles. Phase harmonics describe the
+//!   phases as covariances (Zhang and Mallat 2021, Maximum entropy models from phase harmonic covariances, Applied and Computational Harmonic Analysis
+//!   53, 199-230). Matching these takes gradient descent; a fixed number of projections does not reach them.
 //!
-//! Measured with a prototype of the same steps, which is not part of this repository (`benches/measure_textures` judges the shipped kernel), on halves of sites (window 25 cells, four octaves, lags of differences to 8 cells): distance of
-//! the texture of one half from the other half, and of the two halves from each other in brackets; slopes and curvatures relative. The
-//! last columns are the one-cell flatness (fitted, other half) and the largest error of the covariance to 12 lags.
+//! Measured on halves of sites with a prototype of the same steps, which is not part of this repository (`benches/measure_textures` judges the shipped
+//! kernel); window 25 cells, four octaves, lags of differences to 8 cells. Values are the distance of the texture of one half from the other half, and
+//! in brackets that of the two halves from each other; slopes and curvatures relative. The last columns are the one-cell flatness (fitted half, other
+//! half) and the largest error of the covariance up to 12 lags.
 //!
 //! | site | slope | curvature | flatness | third order | extrema | directions | one-cell flatness | covariance |
 //! |---|---|---|---|---|---|---|---|---|
-//! | `otira_grid_2cm` | 0.19 (0.19) | 0.19 (0.21) | 0.22 (0.31) | 0.77 (0.76) | 0.12 (0.07) | 0.14 (0.34) | 39 (46, 39) | 4.5 % |
-//! | `pozo_blanca_grid_50cm` | 0.34 (0.33) | 0.17 (0.15) | 1.29 (1.08) | 3.15 (3.49) | 0.17 (0.18) | 0.60 (0.59) | 26 (32, 179) | 1.0 % |
-//! | `akl_lidar`, 320 x 320 | 0.13 (0.14) | 0.24 (0.22) | 0.29 (0.29) | 0.51 (0.55) | 0.19 (0.28) | 0.75 (0.88) | 8.6 (7.9, 7.0) | 2.9 % |
-//! | `avaAlr`, 320 x 320 | 1.03 (1.04) | 1.36 (1.26) | 0.44 (0.45) | 0.83 (0.85) | 0.03 (0.09) | 0.25 (0.21) | 20 (22, 11) | 3.9 % |
+//! | otira gravel bar, 2 cm | 0.19 (0.19) | 0.19 (0.21) | 0.22 (0.31) | 0.77 (0.76) | 0.12 (0.07) | 0.14 (0.34) | 39 (46, 39) | 4.5 % |
+//! | pozo blanca, 50 cm | 0.34 (0.33) | 0.17 (0.15) | 1.29 (1.08) | 3.15 (3.49) | 0.17 (0.18) | 0.60 (0.59) | 26 (32, 179) | 1.0 % |
+//! | akl lidar, 320 x 320 | 0.13 (0.14) | 0.24 (0.22) | 0.29 (0.29) | 0.51 (0.55) | 0.19 (0.28) | 0.75 (0.88) | 8.6 (7.9, 7.0) | 2.9 % |
+//! | avaAlr, 320 x 320 | 1.03 (1.04) | 1.36 (1.26) | 0.44 (0.45) | 0.83 (0.85) | 0.03 (0.09) | 0.25 (0.21) | 20 (22, 11) | 3.9 % |
 //!
 //! These are without the covariance of the mean logarithm. With it the first site is nearer (0.12, 0.11, 0.27, 0.55, 0.08, 0.11 after six
 //! rounds), and the spread of the logarithm of the RMS slope between blocks of 64 cells is 0.35 instead of 0.15; the halves have
