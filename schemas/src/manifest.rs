@@ -119,12 +119,12 @@ pub struct FailedItem {
     pub item: String,
     /// The error.
     pub error: String,
-    /// Parameters of the item; none of one that was skipped because another failed, which `error` names.
+    /// Parameters of the item; `None` if it was skipped because another failed, which `error` names.
     pub parameters: Option<JsonText>,
 }
 
-/// A JSON value, kept as its text: a study may have very many failed items, and a value takes several times the memory. Copies share the
-/// text.
+/// A JSON value, stored as its text. A study may have very many failed items, and a parsed value takes several times the memory. Copies share
+/// the text.
 #[derive(Clone, PartialEq, Eq)]
 pub struct JsonText(Arc<str>);
 
@@ -207,8 +207,7 @@ mod tests {
         assert_eq!(serde_json::from_value::<Manifest>(written).unwrap(), manifest());
     }
 
-    /// Parameters are written as the value that their text states, and read back; a skipped item has none. Text that is not JSON is not
-    /// written.
+    /// Parameters are written as a JSON value, not as text, and read back; a skipped item has none. Text that is not JSON is refused.
     #[test]
     fn val_parameters_of_failed_items() {
         let value = serde_json::json!({ "b": 0.1, "a": [null, "x"], "n": u64::MAX });

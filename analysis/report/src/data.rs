@@ -100,8 +100,8 @@ pub struct Data {
     pub failed: Vec<FailedItem>,
     /// Heightfields.
     pub terrains: Vec<TerrainRow>,
-    /// Ids of surfaces whose curves are not kept: generated terrains beyond a random sample of [`CURVES_MAX`] of their group, textures that
-    /// are not drawn, and the residuals of these, of which only the structure function over all directions is kept.
+    /// Ids of surfaces whose curves are not kept: generated terrains beyond a random sample of [`CURVES_MAX`] of their group, and textures that
+    /// are not drawn, with their residuals. Of such a residual only the structure function over all directions is kept.
     pub without_curves: BTreeSet<String>,
     /// Fits.
     pub fits: Vec<FitRow>,
@@ -249,7 +249,7 @@ impl Data {
         variants
     }
 
-    /// What rows are grouped by. Takes a few passes over all missions, so those who group several times make it once.
+    /// What rows are grouped by. Takes a few passes over all missions, so build it once if you group several times.
     pub fn grouping(&self) -> Grouping<'_> {
         Grouping::of(self)
     }
@@ -391,7 +391,7 @@ impl<'a> Grouping<'a> {
         }
     }
 
-    /// Rows by label and run; a group has the same number whatever is grouped.
+    /// Rows by label and run. The number of a group does not depend on the rows.
     fn grouped<R>(&self, rows: impl Iterator<Item = (Of<'a>, &'a R)>) -> Vec<Group<'a, R>> {
         let mut groups: Vec<(Of, Vec<&R>)> = Vec::new();
         let (mut places, mut keys) = (BTreeMap::<Of, usize>::new(), BTreeMap::<Natural, usize>::new());
@@ -508,7 +508,7 @@ pub fn parameter(terrain: &TerrainRow, key: &str) -> Option<String> {
 mod tests {
     use super::*;
 
-    /// A group has the same number whichever rows are grouped, alone or together; the numbers are the places of all groups in natural order.
+    /// The number of a group does not depend on which rows are grouped: it is the position of the group among all groups in natural order.
     #[test]
     fn prop_numbers_of_groups_do_not_depend_on_what_is_grouped() {
         let data = crate::tests::made_up::full(2, 24);
@@ -548,8 +548,8 @@ mod tests {
         assert_eq!(plain(vec![&one, &two], |_| false), [&1, &2]);
     }
 
-    /// Of a group with many terrains, the curves of 200 are kept, the same each time; smaller groups keep all. Of textures, those that are
-    /// drawn: the first four, in the order of the table, those without a base before the others.
+    /// A group with many terrains keeps the curves of 200, the same each time; smaller groups keep all. Of textures, those are kept
+    /// that are drawn: the first four in the order of the table, those without a base first.
     #[test]
     fn prop_curves_of_a_sample_of_each_large_group() {
         let one = crate::tests::made_up::full(1, 24).terrains.swap_remove(0);

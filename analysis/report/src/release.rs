@@ -249,7 +249,7 @@ impl Release {
         self.read(path, |file| parquet::for_each_row(file, f)).map(|_| ())
     }
 
-    /// All heightfields, sorted by id. The parameters of generated ones, 1 to 2 kB of each, are read only of the worlds of rovers.
+    /// All heightfields, sorted by id. Parameters of generated ones, 1 to 2 kB each, are read only for the worlds of rovers.
     fn terrains(&self, with_parameters: bool) -> Result<Vec<TerrainRow>, ReportError> {
         let (rows, is_sorted) = self.rows_as_stored(|mut row: TerrainRow| {
             if !with_parameters && row.stage == "terrain" {

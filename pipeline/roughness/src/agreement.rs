@@ -14,8 +14,8 @@
 //!
 //! [`surface_statistics`], of parts of a surface, adds half an extremum of each kind, and one cell: a smooth part may have none, whose logarithm
 //! would be infinite. It also adds what a fit may set, and the shape of the sets above a level:
-//! * `covariance`: mean product of the residuals, m²: at lag 0, then at 1, 2, 3 ... cells east-west, north-south, and along both diagonals as far as that
-//!   distance, in cells;
+//! * `covariance`: mean product of the residuals, m²: at lag 0, then at lags of 1, 2, 3 ... cells east-west, north-south, and along both diagonals up to
+//!   the same distance in cells;
 //! * `height_distribution`: 99 quantiles over their root mean square, so that unit and sigma do not count; it is also the area above a level,
 //!   the first Minkowski functional;
 //! * `boundary_by_level` and `euler_by_level`: boundary length (1/m) and Euler characteristic (1/m²), per area, of the sets of the highest 10,
@@ -153,7 +153,7 @@ fn standardised(sorted: &[f64]) -> Vec<f64> {
 /// Covariance at lag 0, then east-west, north-south, towards the south-east, and towards the south-west.
 fn covariance(z: &Grid, lag_max: usize) -> Vec<f64> {
     let sums = LagSums::of(z, [lag_max; 2]);
-    // A step along a diagonal is longer.
+    // A step along a diagonal is sqrt(2) cells long.
     let diagonal = lag_max.min(((lag_max as f64 * FRAC_1_SQRT_2) as usize).max(1));
     let along = |[south, east]: [isize; 2], most: usize| (1..=most as isize).map(move |l| [l * south, l * east]);
     let all = std::iter::once([0, 0])

@@ -10,8 +10,8 @@
 //!
 //! The map is closed as sets, one threshold at a time. A cell belongs to the dilated set if, in some row of its disk, a
 //! member of the set is no farther along that row than the half width of the disk there. Cost: two distances and
-//! `2 radius / cell` integer comparisons per cell, for each of two thresholds and two steps. Distances are bytes if the radius is below
-//! 255 cells, so that a vector compares many of them.
+//! `2 radius / cell` integer comparisons per cell, for each of two thresholds and two steps. Distances are stored as bytes if the radius is below
+//! 255 cells, so that one vector instruction compares many.
 
 use crate::classes::{HIGH, NO_CLASS, SEMI};
 use rayon::prelude::*;
@@ -173,7 +173,7 @@ mod tests {
         }
     }
 
-    /// Distances as bytes and as 32-bit numbers give the same map; a disk of 255 cells or more takes the latter.
+    /// Distances as bytes and as 32-bit numbers give the same map; a disk of 255 cells or more uses the latter.
     #[test]
     fn val_narrow_and_wide_distances_agree() {
         let mut s = Streams::for_seed(4, "closing-test").stream("sparse");

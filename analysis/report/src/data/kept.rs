@@ -89,7 +89,7 @@ impl CellType for Name {
 #[derive(Default)]
 pub struct Names(HashSet<Name>);
 
-/// The column whose names no other row has: looking for equal ones would take memory for each row.
+/// The column whose names are unique: a search for equal names would take memory for each row.
 const OWN: &str = "path";
 
 /// A value in which names can be replaced by equal ones that are stored already.

@@ -155,8 +155,8 @@ impl<T: Copy> Clusters<T> {
 }
 
 impl Clusters<f64> {
-    /// As [`Self::interval`], of a function of the medians of the groups, whose values are sorted: without a copy of the values for each
-    /// bootstrap sample.
+    /// As [`Self::interval`], for a function of the medians of the groups, whose values are sorted. Values are not copied for each bootstrap
+    /// sample.
     pub fn interval_of_medians(
         &self,
         stream: &mut Stream,
@@ -208,8 +208,8 @@ mod tests {
         }
     }
 
-    /// The same bits as the medians of the pooled values, for groups with clusters of their own and with common ones, some of which have no
-    /// values in one group.
+    /// The same bits as the medians of the pooled values, for groups with their own clusters and with common ones, some of which lack values in
+    /// one group.
     #[test]
     fn prop_intervals_of_medians_are_those_of_pooled_values() {
         let mut s = Streams::for_seed(2, "clusters-test").stream("medians");

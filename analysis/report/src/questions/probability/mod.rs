@@ -103,7 +103,7 @@ fn introduction(groups: &[Split]) -> String {
 
 /// Missions with several starts, by group: those of the plain run, or of the first variant that has any.
 fn groups(data: &Data) -> Vec<Split<'_>> {
-    // Without starts, every variant would be looked at.
+    // Without starts, every variant would be examined.
     if data.replicates.is_empty() {
         return Vec::new();
     }

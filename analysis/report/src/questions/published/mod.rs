@@ -101,8 +101,8 @@ impl Row<'_> {
     }
 }
 
-/// Rows of the values, then of the steps, in the paper's order. The values behind them are collected once for each figure, and held for one
-/// figure at a time.
+/// Rows of the values, then of the steps, in the paper's order. The values behind them are collected once for each published number, and kept
+/// for one of them at a time.
 fn rows<'a>(data: &Data, paper: &'a Paper, pairing: &Pairing) -> Vec<Row<'a>> {
     let ours = Ours {
         terrains: shared(data.terrain_groups(), paper),
@@ -176,7 +176,7 @@ fn estimate(
     (of(&groups.iter().map(own).collect::<Vec<_>>()), band)
 }
 
-/// What is published of the values of a group.
+/// The published statistic of a group's values.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Statistic {
     Mean,

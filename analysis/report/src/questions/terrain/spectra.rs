@@ -112,7 +112,7 @@ fn in_words(data: &Data, group: &Group<TerrainRow>, curves: &[Curve]) -> (String
     }
 }
 
-/// Approximate number of rows of all terrains of a group, from those of the terrains whose curves are kept: two digits, since surfaces
+/// Approximate number of rows of all terrains of a group, estimated from the terrains whose curves are kept. It has two digits, because surfaces
 /// differ in their numbers of bins.
 fn of_whole_group(data: &Data, group: &Group<TerrainRow>, rows: usize) -> usize {
     let (kept, all) = (kept(data, group), group.rows.len());
