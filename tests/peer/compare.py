@@ -12,10 +12,10 @@ from pathlib import Path
 
 import numpy as np
 import release as release_files
-from metrics import figures
+from metrics import of_poses
 
 OUTCOMES = ["success", "tipped", "stuck", "out_of_bounds", "timeout"]
-FIGURES = {
+METRICS = {
     "rms_vertical_acceleration_m_s2": "RMS vertical acceleration, m/s2",
     "rms_pitch_rate_deg_s": "RMS pitch rate, deg/s",
     "rms_roll_rate_deg_s": "RMS roll rate, deg/s",
@@ -44,14 +44,14 @@ def geometric(ours, theirs):
     return ratio, ratio * float(np.std(logarithms, ddof=1)) / math.sqrt(len(logarithms))
 
 
-def check_figures(release, rows):
+def check_metrics(release, rows):
     """Largest relative difference of the release's metrics from those of its samples by the peer's formulas; NaN if any is."""
     differences = []
     for terrain in sorted({row["terrain_id"] for row in rows}):
         poses = release_files.samples(release, terrain)
         for row in (r for r in rows if r["terrain_id"] == terrain):
-            found = figures(poses[row["mission_id"]], row["sample_rate_hz"])
-            differences.extend(abs(found[key] / row[key] - 1) for key in FIGURES)
+            found = of_poses(poses[row["mission_id"]], row["sample_rate_hz"])
+            differences.extend(abs(found[key] / row[key] - 1) for key in METRICS)
     # The largest of Python leaves NaN out.
     return float(np.max(differences))
 
@@ -78,7 +78,7 @@ def main():
     head = "sastrugi | MuJoCo | ratio | ratio of geometric means | correlation"
     print(f"| medians where both succeed ({both.sum()}) | {head} |\n|---|---|---|---|---|---|")
     ratios, means = {}, {}
-    for key, label in [*FIGURES.items(), ("time_s", "time, s")]:
+    for key, label in [*METRICS.items(), ("time_s", "time, s")]:
         a, b = (np.array([row[key] for row in side])[both] for side in (rows, theirs))
         ratios[key] = float(np.median(a) / np.median(b))
         means[key], error = geometric(a, b)
@@ -94,7 +94,7 @@ def main():
     found = {
         "missions": len(rows),
         "height_error_m": at_centres,
-        "figures_error": check_figures(release, rows),
+        "metrics_error": check_metrics(release, rows),
         "real_time_factor": speed,
         "ratios": ratios,
         "geometric": means,

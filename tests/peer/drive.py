@@ -18,7 +18,7 @@ import engine
 import mujoco
 import numpy as np
 import release as release_files
-from metrics import figures
+from metrics import of_poses
 from steering import PurePursuit
 
 
@@ -132,7 +132,7 @@ def drive_terrain(release, terrain_id, vehicle_file, traverse):
     for mission in missions:
         outcome, time_s, poses = course.drive(mission)
         simulated += time_s + course.rules["settle_s"]
-        found = figures(poses, course.rules["sample_rate_hz"])
+        found = of_poses(poses, course.rules["sample_rate_hz"])
         name = {"terrain_id": terrain_id, "mission_id": mission["mission_id"]}
         driven.append({**name, "outcome": outcome, "time_s": time_s, **found})
     spent = time.process_time() - start

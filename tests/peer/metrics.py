@@ -12,7 +12,7 @@ def euler(poses):
     return roll, pitch, yaw
 
 
-def figures(poses, rate_hz):
+def of_poses(poses, rate_hz):
     """Root mean squares: vertical acceleration, m/s2, and rates of pitch and roll, deg/s."""
     roll, pitch, _ = euler(poses)
 

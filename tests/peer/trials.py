@@ -3,8 +3,8 @@
     trials.py RELEASE PEER.json
 
 PEER.json is that of `drive.py RELEASE VEHICLE.toml --traverse unchanged`. Ratios are of geometric means, ours over MuJoCo's, with standard
-errors over missions. The first table takes the missions on which the trial and MuJoCo both succeed, which differ from row to row; the second
-takes those on which all trials and MuJoCo succeed, and states the change from the unchanged vehicle mission by mission.
+errors over missions. The first table has the missions on which the trial and MuJoCo both succeed, which differ from row to row. The second has those
+on which all trials and MuJoCo succeed; it also gives ratios over the unchanged vehicle, mission by mission.
 """
 
 import json
@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 import release as release_files
-from compare import FIGURES, geometric
+from compare import METRICS, geometric
 
 UNCHANGED = "unchanged"
 
@@ -29,7 +29,7 @@ def succeeded(rows):
 
 def cells(ours, theirs, missions):
     """Ratios of geometric means over the missions, one cell for each metric."""
-    pairs = [[(ours[m][name], theirs[m][name]) for m in missions] for name in FIGURES]
+    pairs = [[(ours[m][name], theirs[m][name]) for m in missions] for name in METRICS]
     ratios = [geometric(*np.array(values).T) for values in pairs]
     return " | ".join(f"{ratio:.2f} +- {error:.2f}" for ratio, error in ratios)
 
@@ -48,7 +48,7 @@ def main():
         print(f"| {name} | {len(ours)} | {len(both)} | {cells(ours, peer, both)} |")
 
     common = sorted(set.intersection(set(peer), *map(set, trials.values())))
-    head = f"| on the {len(common)} missions that all complete | over MuJoCo's: acceleration | pitch rate | roll rate"
+    head = f"| on the {len(common)} missions that succeed in all | over MuJoCo's: acceleration | pitch rate | roll rate"
     print(f"\n{head} | over unchanged: acceleration | pitch rate | roll rate |\n|---|---|---|---|---|---|---|")
     for name, ours in trials.items():
         print(f"| {name} | {cells(ours, peer, common)} | {cells(ours, trials[UNCHANGED], common)} |")
