@@ -17,6 +17,7 @@ use super::lag::length_m;
 use crate::bitmap::Bitmap;
 use rayon::prelude::*;
 use sastrugi_roughness::background::{BoxWindow, Moments};
+use std::hint::select_unpredictable;
 use std::ops::Range;
 
 /// Approximate number of pairs with a partial window averaged over in each bin: the correction is accurate to 2e-4 of the variance, and
@@ -218,10 +219,9 @@ impl LagWeights {
         }
     }
 
-    /// Adds `times` the products of two windows' weights, minus those of complete windows.
-    fn add_product(&mut self, from: isize, near: &Window, far: &Window, times: f64) {
-        near.points.iter().for_each(|n| self.add(from - n.at, 1, &far.points, times * n.weight));
-        near.complete.iter().for_each(|n| self.add(from - n.at, 1, &far.complete, -times * n.weight));
+    /// Adds `times` the products of the weights of two windows' points.
+    fn add_product(&mut self, from: isize, near: &[Point], far: &[Point], times: f64) {
+        near.iter().for_each(|n| self.add(from - n.at, 1, far, times * n.weight));
     }
 
     /// Place of a lag.
@@ -250,19 +250,39 @@ struct Point {
     at: isize,
 }
 
-/// A window of a cell as points, and as the points it would have if it were complete.
+/// A block of a window, and the two cells that represent it.
+struct Block {
+    /// Its cells, as offsets.
+    span: Rectangle,
+    /// Where in the block the first of the two lies.
+    place: [f64; 2],
+    /// Both, as offsets, if the block is complete.
+    both: [[isize; 2]; 2],
+}
+
+/// A complete window in blocks, wherever it lies.
+struct Pattern {
+    axes: [Axis; 2],
+    /// Row by row.
+    blocks: Vec<Block>,
+    points: Vec<Point>,
+}
+
+/// The window of a cell as points, and as the points it would have if it were complete.
 struct Window {
     points: Vec<Point>,
-    complete: Vec<Point>,
+    complete: Pattern,
 }
 
 /// The first cell of pairs.
 struct Near {
     cell: [isize; 2],
-    /// Where its points lie in their blocks.
-    shift: [f64; 2],
-    /// Its window in fine and in coarse blocks, if it is partial.
-    partial: Option<[Window; 2]>,
+    /// Its window in coarse blocks.
+    coarse: Window,
+    /// The same in fine blocks, if it is partial.
+    fine: Option<Window>,
+    /// A complete window in coarse blocks, as the second cells of the pairs have.
+    far: Pattern,
 }
 
 struct Sampler<'a> {
@@ -287,39 +307,50 @@ impl Sampler<'_> {
         }
         let draw = Draw { index: sample };
         let shift = [draw.unit(1), draw.unit(2)];
-        let windows = || [FINE_BLOCKS, COARSE_BLOCKS].map(|blocks| self.window(cell, blocks, shift));
-        Some(Near { cell, shift, partial: self.is_partial(cell).then(windows) })
+        let window = |blocks: usize| {
+            let complete = self.pattern(blocks, shift);
+            Window { points: self.points(cell, &complete).unwrap_or_else(|| complete.points.clone()), complete }
+        };
+        Some(Near {
+            cell,
+            coarse: window(COARSE_BLOCKS),
+            fine: self.is_partial(cell).then(|| window(FINE_BLOCKS)),
+            far: self.pattern(COARSE_BLOCKS, [draw.unit(3), draw.unit(4)]),
+        })
     }
 
     /// Adds a pair of `near` and a used cell at one of the lags of a bin, if there is such a cell.
     fn add_pair(&self, near: &Near, lags: &[[isize; 2]], draw: &Draw, line: &mut LagWeights) {
         let tried = lags.len().min(LAGS_TRIED);
-        let lag_at = |k: usize| lags[((k as f64 + draw.unit(0)) * lags.len() as f64 / tried as f64) as usize];
+        let start = draw.unit(0);
+        let lag_at = |k: usize| {
+            let place = (k as f64 + start) * lags.len() as f64;
+            // Division by a constant power of two is quick, and by it most are divided.
+            let place = if tried == LAGS_TRIED { place / LAGS_TRIED as f64 } else { place / tried as f64 };
+            lags[place as u32 as usize]
+        };
         let partner_at = |lag: [isize; 2]| [near.cell[0] + lag[0], near.cell[1] + lag[1]];
-        let is_used = |lag: &[isize; 2]| self.index(partner_at(*lag)).is_some_and(|k| self.cells.used.get(k));
-        let used = (0..tried).fold(0u64, |bits, k| bits | u64::from(is_used(&lag_at(k))) << k);
+        let mut used = 0u64;
+        for k in 0..tried {
+            let cell = self.index(partner_at(lag_at(k)));
+            used |= u64::from(cell.is_some() & self.cells.used.get(cell.unwrap_or(0))) << k;
+        }
         let found = used.count_ones() as usize;
         let Some(lag) = (0..tried).filter(|k| used >> k & 1 == 1).nth(draw.below(6, found)).map(lag_at) else { return };
         let (partner, share) = (partner_at(lag), found as f64 / tried as f64);
         line.pairs += share;
         let from = line.place(lag);
         // - D_i(j) C(h - j); on average equal to - D_(i+h)(k) C(h + k), whose pairs are those of the opposite lag.
-        if let Some([fine, _]) = &near.partial {
+        if let Some(fine) = &near.fine {
             line.add(from, -1, &fine.points, -2.0 * share);
-            line.add(from, -1, &fine.complete, 2.0 * share);
+            line.add(from, -1, &fine.complete.points, 2.0 * share);
         }
         // D_i(j) D_(i+h)(k) C(h + k - j).
-        let far = || self.window(partner, COARSE_BLOCKS, [draw.unit(3), draw.unit(4)]);
-        match &near.partial {
-            Some([_, coarse]) => {
-                line.partial += share;
-                line.add_product(from, coarse, &far(), share);
-            }
-            None if self.is_partial(partner) => {
-                line.partial += share;
-                line.add_product(from, &self.window(near.cell, COARSE_BLOCKS, near.shift), &far(), share);
-            }
-            None => {}
+        if near.fine.is_some() || self.is_partial(partner) {
+            line.partial += share;
+            let (coarse, far) = (&near.coarse, self.points(partner, &near.far));
+            line.add_product(from, &coarse.points, far.as_ref().unwrap_or(&near.far.points), share);
+            line.add_product(from, &coarse.complete.points, &near.far.points, -share);
         }
     }
 
@@ -329,30 +360,39 @@ impl Sampler<'_> {
         !self.complete.at(at) && (self.data.within([span(0), span(1)]) as usize) < self.window.area()
     }
 
-    /// The window of the cell `at`, with `blocks` blocks in each direction, at cells given by `shift`. Weights are those of the plane
-    /// through the points, so that the model's background reproduces planes as the data's does.
-    fn window(&self, at: [isize; 2], blocks: usize, shift: [f64; 2]) -> Window {
+    /// A complete window with `blocks` blocks in each direction, at cells given by `shift`.
+    fn pattern(&self, blocks: usize, shift: [f64; 2]) -> Pattern {
         let axes = [Axis::new(self.window.half[0], blocks), Axis::new(self.window.half[1], blocks)];
-        let counts = self.data.blocks(at, &axes);
-        let points = 2 * axes[0].blocks * axes[1].blocks;
-        let [mut complete, mut own] = [(); 2].map(|()| Vec::with_capacity(points));
-        for index in 0..points / 2 {
-            let (row, col) = (index / axes[1].blocks, index % axes[1].blocks);
-            let block = [axes[0].span(row), axes[1].span(col)];
-            let place =
-                [fraction(shift[0] + index as f64 * LATTICE[0]), fraction(shift[1] + index as f64 * LATTICE[1])];
-            let one = [0, 1].map(|k| point(block[k], place[k]));
-            let both = [one, [0, 1].map(|k| block[k][0] + block[k][1] - 1 - one[k])];
-            let data = counts[row][col];
-            complete.extend(both.map(|offset| (offset, 0.5 * cells(block))));
+        let block = |index: usize| {
+            let span = [axes[0].span(index / axes[1].blocks), axes[1].span(index % axes[1].blocks)];
+            let place = [0, 1].map(|k| fraction(shift[k] + index as f64 * LATTICE[k]));
+            let one = [0, 1].map(|k| point(span[k], place[k]));
+            Block { span, place, both: [one, [0, 1].map(|k| span[k][0] + span[k][1] - 1 - one[k])] }
+        };
+        let blocks: Vec<Block> = (0..axes[0].blocks * axes[1].blocks).map(block).collect();
+        let counted = |b: &Block| b.both.map(|offset| (offset, 0.5 * cells(b.span)));
+        let points = self.weighted(&blocks.iter().flat_map(counted).collect::<Vec<_>>());
+        Pattern { axes, blocks, points }
+    }
+
+    /// The window of the cell `at`; `None` if it is complete. Weights are those of the plane through the points, so that the model's background
+    /// reproduces planes as the data's does.
+    fn points(&self, at: [isize; 2], complete: &Pattern) -> Option<Vec<Point>> {
+        let Pattern { axes, blocks, .. } = complete;
+        let counts = self.data.blocks(at, axes);
+        let counts = counts[..axes[0].blocks].iter().flat_map(|row| &row[..axes[1].blocks]);
+        let mut own = Vec::with_capacity(2 * blocks.len());
+        let mut is_complete = true;
+        for (Block { span, place, both }, &data) in blocks.iter().zip(counts) {
+            let whole = f64::from(data) == cells(*span);
+            is_complete &= whole;
             if data > 0 {
-                let whole = f64::from(data) == cells(block);
-                let pick = |place: [f64; 2]| self.data.pick(at, block, data, place);
-                let picked = if whole { both } else { [place, place.map(|p| 1.0 - p)].map(pick) };
+                let pick = |place: [f64; 2]| self.data.pick(at, *span, data, place);
+                let picked = if whole { *both } else { [*place, place.map(|p| 1.0 - p)].map(pick) };
                 own.extend(picked.map(|offset| (offset, 0.5 * f64::from(data))));
             }
         }
-        Window { points: self.weighted(&own), complete: self.weighted(&complete) }
+        (!is_complete).then(|| self.weighted(&own))
     }
 
     /// Points with the weights of the plane through them, from offsets and the number of cells that each represents.
@@ -474,16 +514,26 @@ impl DataCount {
 
     /// The offset of one of the `data` cells with data in a block around the cell `at`: its rank is a fraction of their number, and a
     /// fraction of the number in its row.
-    fn pick(&self, at: [isize; 2], block: Rectangle, data: u32, place: [f64; 2]) -> [isize; 2] {
-        let moved = |span: [isize; 2], by: isize| [span[0] + by, span[1] + by];
-        let count = |rows: [isize; 2], cols: [isize; 2]| self.within([moved(rows, at[0]), moved(cols, at[1])]);
+    fn pick(&self, at: [isize; 2], [rows, cols]: Rectangle, data: u32, place: [f64; 2]) -> [isize; 2] {
         let rank = |place: f64, of: u32| ((place * f64::from(of)) as u32).min(of - 1);
-        let [[top, bottom], [left, right]] = block;
-        let wanted = rank(place[0], data);
-        let row = bisect(top, bottom - 1, |r| count([top, r + 1], [left, right]) > wanted);
-        let own = [row, row + 1];
-        let wanted = rank(place[1], count(own, [left, right]));
-        [row, bisect(left, right - 1, |c| count(own, [left, c + 1]) > wanted)]
+        let column = |col: isize| (at[1] + col).clamp(0, self.cols) as usize;
+        // Above a row, between the sides of the block.
+        let sides = cols.map(column);
+        let above = |row: isize| {
+            let line = self.line(at[0] + row);
+            self.sums[line + sides[1]].wrapping_sub(self.sums[line + sides[0]])
+        };
+        let (first, wanted) = (above(rows[0]), rank(place[0], data));
+        let row = bisect(rows[0], rows[1] - 1, |r| above(r + 1).wrapping_sub(first) > wanted);
+        // In that row, left of a column.
+        let lines = [row, row + 1].map(|row| self.line(at[0] + row));
+        let left = |col: isize| {
+            let col = column(col);
+            self.sums[lines[1] + col].wrapping_sub(self.sums[lines[0] + col])
+        };
+        let first = left(cols[0]);
+        let wanted = rank(place[1], left(cols[1]).wrapping_sub(first));
+        [row, bisect(cols[0], cols[1] - 1, |c| left(c + 1).wrapping_sub(first) > wanted)]
     }
 }
 
@@ -525,11 +575,14 @@ impl CompleteTiles {
     }
 }
 
-/// First of `from..=last` at which `holds` becomes true, or `last` if it is true nowhere before.
-fn bisect(mut from: isize, mut last: isize, holds: impl Fn(isize) -> bool) -> isize {
-    while from < last {
-        let middle = from + (last - from) / 2;
-        if holds(middle) { last = middle } else { from = middle + 1 }
+/// First of `from..=last` at which `holds` becomes true, or `last` if it is true nowhere before. How many steps it takes depends on the number
+/// of places alone, and nothing branches on `holds`: half of these branches would be foreseen wrongly.
+fn bisect(mut from: isize, last: isize, holds: impl Fn(isize) -> bool) -> isize {
+    let mut places = last - from + 1;
+    while places > 1 {
+        let half = places / 2;
+        from = select_unpredictable(holds(from + half - 1), from, from + half);
+        places -= half;
     }
     from
 }
@@ -561,7 +614,7 @@ impl Draw {
     }
 }
 
-/// Fractional part of a positive number.
+/// Fractional part of a positive number below 2^63.
 fn fraction(x: f64) -> f64 {
-    x - (x as u64) as f64
+    x - (x as i64) as f64
 }
