@@ -5,6 +5,7 @@
 #[cfg(target_arch = "x86_64")]
 mod emulated;
 mod every_stage;
+mod offline;
 
 use every_stage::EveryStage;
 use sastrugi_tests::{
@@ -113,27 +114,6 @@ fn gold_the_cpu_changes_nothing() {
     let narrow = ("GLIBC_TUNABLES", "glibc.cpu.hwcaps=-FMA,-AVX2");
     let masked = study.release("masked", Command::new(program()).env(narrow.0, narrow.1));
     assert_same(&plain, &masked, "without FMA and AVX2");
-}
-
-/// A build for the CPU at hand (FMA, AVX2, AVX-512 if it has them) gives the same bytes. The profile `native`
-/// optimises only the rooms of kernels and `libm`: the rest computes nothing, and takes most of the time of a build.
-#[test]
-#[ignore = "slow: ./test --full builds the program a second time"]
-fn gold_a_native_build_changes_nothing() {
-    let root = sastrugi_fixtures::workspace_root();
-    let target = root.join(".cache/target-native");
-    let built = Command::new(env!("CARGO"))
-        .args(["build", "--profile", "native", "--package", "sastrugi-cli", "--target-dir"])
-        .arg(&target)
-        .env("RUSTFLAGS", "-C target-cpu=native")
-        .current_dir(&root)
-        .status()
-        .unwrap();
-    assert!(built.success());
-    let study = EveryStage::new();
-    let any = study.release("any", &mut Command::new(program()));
-    let native = study.release("native", &mut Command::new(target.join("native/sastrugi")));
-    assert_same(&any, &native, "target-cpu=native");
 }
 
 /// Random streams are named by id, so one more terrain changes no artifact of the others.

@@ -2,6 +2,7 @@
 
 #![allow(clippy::expect_used, reason = "a test may end where it stands")]
 
+pub mod checkout;
 pub mod server;
 pub mod synthetic;
 

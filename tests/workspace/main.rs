@@ -4,7 +4,6 @@
 
 mod licences;
 mod notice;
-mod offline;
 mod pages;
 mod walk;
 

@@ -1,8 +1,8 @@
 //! The walk of CONTRIBUTING.md, followed step by step in a scratch copy of the checkout.
 
+use sastrugi_tests::checkout::{self, run};
 use std::fs;
 use std::path::{Path, PathBuf};
-use std::process::Command;
 
 /// A fenced block of the page that the walk uses.
 #[derive(Debug, PartialEq)]
@@ -44,34 +44,14 @@ fn inserted(text: &str, after: &str, lines: &str) -> String {
     format!("{}{lines}{}", &text[..at], &text[at..])
 }
 
-/// Runs a command line in a folder; its output is shown when it fails.
-pub fn run(folder: &Path, line: &str) {
-    let mut command = Command::new("bash");
-    command.args(["-euo", "pipefail", "-c", line]).current_dir(folder);
-    let output = sastrugi_tests::outside_package(&mut command).output().unwrap();
-    let [out, err] = [&output.stdout, &output.stderr].map(|bytes| String::from_utf8_lossy(bytes));
-    assert!(output.status.success(), "{line}\n{out}{err}");
-}
-
-/// A copy of the files under version control, in a folder of this name beside the tests' own files.
-pub fn checkout(name: &str) -> PathBuf {
-    let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    if copy.exists() {
-        fs::remove_dir_all(&copy).unwrap();
-    }
-    fs::create_dir_all(&copy).unwrap();
-    let files = format!("git ls-files -z | xargs -0 cp -p --parents -t '{}'", copy.display());
-    run(&sastrugi_fixtures::workspace_root(), &files);
-    copy
-}
-
 /// Settings of cargo with which the rooms that use a generator, all of which the walk compiles again, are not optimised.
 const QUICKLY: &str = "[profile.release.package]\n\
     sastrugi-stages.opt-level = 0\nsastrugi-server.opt-level = 0\nsastrugi-cli.opt-level = 0\n";
 
 /// A checkout with the compiled libraries, so that only what the walk touches is built again.
 fn scratch() -> PathBuf {
-    let copy = checkout("walk");
+    let copy = Path::new(env!("CARGO_TARGET_TMPDIR")).join("walk");
+    checkout::copy(&copy);
     sastrugi_tests::copy_build(&copy.join("target"));
     fs::create_dir_all(copy.join(".cargo")).unwrap();
     fs::write(copy.join(".cargo/config.toml"), QUICKLY).unwrap();
