@@ -12,6 +12,7 @@ mod machine;
 mod million;
 mod perturb;
 mod photoclinometry;
+mod prototype;
 mod recipes;
 mod route;
 mod rover;
