@@ -44,9 +44,9 @@ fn inserted(text: &str, after: &str, lines: &str) -> String {
     format!("{}{lines}{}", &text[..at], &text[at..])
 }
 
-/// Settings of cargo with which the rooms that use a generator, all of which the walk compiles again, are not optimised.
+/// Settings of cargo with which the room of the generator and those that use it, all of which the walk compiles again, are not optimised.
 const QUICKLY: &str = "[profile.release.package]\n\
-    sastrugi-stages.opt-level = 0\nsastrugi-server.opt-level = 0\nsastrugi-cli.opt-level = 0\n";
+    sastrugi-terrain.opt-level = 0\nsastrugi-stages.opt-level = 0\nsastrugi-server.opt-level = 0\nsastrugi-cli.opt-level = 0\n";
 
 /// A checkout with the compiled libraries, so that only what the walk touches is built again.
 fn scratch() -> PathBuf {
