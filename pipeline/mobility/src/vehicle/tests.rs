@@ -783,14 +783,19 @@ fn val_ground_is_the_stored_bilinear_surface() {
 #[ignore = "slow: ./test --full"]
 fn conv_outcomes_do_not_depend_on_the_step() {
     let [coarse, fine] = [500, 1000].map(|rate| prepared(|p| p.step_rate_hz = rate));
-    let mut pairs = Vec::new();
-    for (seed, amplitude_m) in [0.009, 0.010, 0.011, 0.012].into_iter().enumerate() {
-        let dem = rough(amplitude_m, 10 + seed as u64);
+    let driven = |amplitude_m: f64, seed: u64| -> Vec<[Recording; 2]> {
+        let dem = rough(amplitude_m, seed);
         let ground = Ground::new(&dem, &coarse.0).unwrap();
-        for index in 0..100 {
-            pairs.push([&coarse, &fine].map(|(v, s)| drive(&ground, v, s, &crossing(index)).unwrap()));
-        }
-    }
+        let both = |index| [&coarse, &fine].map(|(v, s)| drive(&ground, v, s, &crossing(index)).unwrap());
+        (0..100).map(both).collect()
+    };
+    // Side by side: this test is alone in its program.
+    let pairs: Vec<[Recording; 2]> = std::thread::scope(|scope| {
+        let driven = &driven;
+        let grounds = [(0.009, 10), (0.010, 11), (0.011, 12), (0.012, 13)];
+        let threads = grounds.map(|(amplitude_m, seed)| scope.spawn(move || driven(amplitude_m, seed)));
+        threads.into_iter().flat_map(|thread| thread.join().unwrap()).collect()
+    });
     let same = pairs.iter().filter(|[a, b]| outcome(a).kind == outcome(b).kind).count();
     let medians = [0, 1].map(|rate| {
         let succeeded = pairs.iter().map(|pair| &pair[rate]).filter(|r| outcome(r).kind == EventKind::Success);
