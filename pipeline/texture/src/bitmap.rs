@@ -3,7 +3,7 @@
 use std::ops::Range;
 
 /// Bits in the order in which they were pushed.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug, Default, PartialEq)]
 pub(crate) struct Bitmap {
     words: Vec<u64>,
     len: usize,

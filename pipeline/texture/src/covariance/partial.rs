@@ -58,6 +58,7 @@ pub struct DetrendedCells<'a> {
 /// Contribution of partial windows to the covariance of the residual in each bin, as weights of the surface's covariance by lag.
 /// Memory: 4 bytes per cell of a strip of 4 million cells or six reaches (lag and two half windows), and 8 bytes per bin and
 /// lag within the largest lag and two windows, one of two opposite lags.
+#[derive(Clone)]
 pub struct PartialWindows {
     /// Largest lag with a weight, in cells.
     reach: [isize; 2],

@@ -97,8 +97,12 @@ impl<'a> Estimator<'a> {
     }
 
     fn with_pairs(case: &'a Case<'a>, bins: &'a LagBins, pairs: f64) -> Self {
+        Self::with_partial(case, bins, PartialWindows::new(&case.survey.cells(), case.window, bins, pairs))
+    }
+
+    /// The estimator with these partial windows of the case's cells.
+    pub fn with_partial(case: &'a Case<'a>, bins: &'a LagBins, partial: PartialWindows) -> Self {
         let measurement = case.settings.measurement();
-        let partial = PartialWindows::new(&case.survey.cells(), case.window, bins, pairs);
         let expectation = Expectation {
             filter: DetrendFilter::new(case.window, case.geometry.cell, case.max_lag, measurement),
             wide: DetrendFilter::wide(case.window, case.geometry.cell, case.max_lag, measurement),

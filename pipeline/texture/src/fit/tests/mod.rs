@@ -2,13 +2,16 @@ mod noise;
 mod slopes;
 
 use super::*;
+use crate::bitmap::Bitmap;
 use crate::covariance::Covariance;
+use crate::covariance::partial::{PAIRS_FINE, PartialWindows};
 use crate::noise::Noise;
 use crate::synth::Synthesis;
 use crate::synth::fft_ma::{self, FftMaParameters, Phase};
 use crate::synth::tile::{Cell, TileParameters};
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, sums};
+use std::sync::Mutex;
 
 const CELL_M: f64 = 0.06;
 
@@ -29,13 +32,65 @@ fn settings(mode: Mode, outer_scale_m: f64, trim: f64) -> FitSettings {
     FitParameters { mode, outer_scale_m, trim, bootstrap: 0, ..FitParameters::default() }.try_into().unwrap()
 }
 
+/// All that the partial windows of a raster follow from.
+#[derive(PartialEq)]
+struct Cells {
+    side: [usize; 2],
+    half: [usize; 2],
+    lags: Vec<([isize; 2], usize)>,
+    trusted: Bitmap,
+    used: Bitmap,
+}
+
+/// The partial windows that [`Estimator::new`] would compute. They take most of the time of an estimate, and the fields of a study that have neither
+/// holes nor objects have the same ones: these are computed once.
+fn partial_windows(case: &Case) -> PartialWindows {
+    static KNOWN: Mutex<Vec<(Cells, PartialWindows)>> = Mutex::new(Vec::new());
+    let cells = case.survey.cells();
+    let computed = || PartialWindows::new(&cells, case.window, &case.bins, PAIRS_FINE);
+    if cells.trusted.count() < case.geometry.len() {
+        return computed();
+    }
+    let of = Cells {
+        side: [cells.rows, cells.cols],
+        half: case.window.half,
+        lags: case.bins.members.iter().map(|m| (m.lag, m.bin)).collect(),
+        trusted: cells.trusted.clone(),
+        used: cells.used.clone(),
+    };
+    let known = |of: &Cells| KNOWN.lock().unwrap().iter().find(|(other, _)| other == of).map(|(_, w)| w.clone());
+    // The lock is free meanwhile: a thread that waits for others may take up another field.
+    known(&of).unwrap_or_else(|| {
+        let windows = computed();
+        KNOWN.lock().unwrap().push((of, windows.clone()));
+        windows
+    })
+}
+
+/// The same windows, kept or computed: the estimate of a field without gaps is that of the program.
+#[test]
+fn val_kept_partial_windows_are_those_of_the_program() {
+    let s = settings(Mode::Corrected, 2.0, 0.05);
+    for seed in [1, 2] {
+        let dem = field(0.28, 256, CELL_M, seed);
+        let case = Case::new(&dem, &s).unwrap();
+        let naive = ordinary(&case, &Form::parse("exponential").unwrap());
+        let ours = best(&Estimator::new(&case, &case.bins).candidates(&naive)).unwrap().covariance.clone();
+        let found = estimate(&dem, &s);
+        assert_eq!(found.map(f64::to_bits), [ours.sigma_m(), ours.range_m()].map(f64::to_bits), "{seed}");
+    }
+}
+
 /// The estimate alone, without intervals and verdicts.
 fn estimate(dem: &Grid, settings: &FitSettings) -> [f64; 2] {
     let case = Case::new(dem, settings).unwrap();
     let naive = ordinary(&case, &Form::parse("exponential").unwrap());
     let covariance = match settings.mode() {
         Mode::Paper => naive.covariance,
-        Mode::Corrected => best(&Estimator::new(&case, &case.bins).candidates(&naive)).unwrap().covariance.clone(),
+        Mode::Corrected => {
+            let estimator = Estimator::with_partial(&case, &case.bins, partial_windows(&case));
+            best(&estimator.candidates(&naive)).unwrap().covariance.clone()
+        }
     };
     [covariance.sigma_m(), covariance.range_m()]
 }
