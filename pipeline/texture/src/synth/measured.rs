@@ -119,10 +119,11 @@ impl Measured {
     }
 }
 
-/// Bytes that [`Measured::correlation_cells`] needs for a site of `cells` cells: transforms of tiles of up to 1024 x 1024 cells, padded by a half on
-/// each axis.
+/// Bytes that [`Measured::correlation_cells`] needs for a site of `cells` cells: the site, and transforms of tiles of up to 1024 x 1024 cells. A tile
+/// with lags of a quarter of its side is padded to 2.25 times its cells and takes 48 bytes for each at the end, when spectra and sums are in memory;
+/// two overlaps of 0.75 times its cells take 16. Lengths are rounded up to ones that transform fast.
 pub(super) fn correlation_bytes(cells: u64) -> u64 {
-    8 * cells + 90 * cells.min(1 << 20)
+    8 * cells + 150 * cells.min(1 << 20)
 }
 
 /// Refuses a residual that is not the fit's, by quantiles of its heights; a fit may state none.
