@@ -138,6 +138,7 @@ mod tests {
         let shape = PatchShape::new([2.0, 2.0], 0.5).unwrap();
         let patch = height_patch(&grid, [107.0, 205.0], FRAC_PI_2, &shape);
         let window = grid.window(8, 12, 4, 4);
+        assert_eq!(patch.len(), 16);
         patch.iter().zip(&window.values).for_each(|(a, b)| assert!((a - b).abs() < 1e-12, "{a} {b}"));
     }
 
