@@ -132,7 +132,7 @@ mod tests {
             assert!(drawn[0].iter().all(|c| *c < 3) && drawn[1].iter().all(|c| *c < 5));
             (drawn[0].len(), drawn[1].len(), drawn[2].len())
         };
-        assert!(redraw(&[3, 5, 0], 50, &mut stream("sizes"), sizes).iter().all(|s| *s == (3, 5, 0)));
+        assert_eq!(redraw(&[3, 5, 0], 50, &mut stream("sizes"), sizes), [(3, 5, 0); 50]);
         assert_eq!(cluster_interval(&[3, 1], 9, 0.9, &mut stream("few"), |_| 1.0), None);
     }
 
