@@ -285,8 +285,11 @@ mod tests {
         Grid::new(geometry, (0..rows * cols).map(|k| f(geometry.x(k % cols), geometry.y(k / cols))).collect())
     }
 
+    /// The values of a statistic; one without any would pass every test of all of them.
     fn values(all: &[Statistic], name: &str) -> Vec<f64> {
-        all.iter().find(|s| s.name == name).unwrap().values.clone()
+        let found = all.iter().find(|s| s.name == name).unwrap().values.clone();
+        assert!(!found.is_empty(), "{name} has no values");
+        found
     }
 
     /// A paraboloid: its Laplacian is 2 (a + b) everywhere, and it has one maximum.

@@ -154,6 +154,7 @@ mod tests {
             }
         }
         assert!((weight - slow_weight).abs() < 1e-12);
+        assert_eq!(fast.len(), slow.len());
         assert!(fast.iter().zip(slow).all(|(a, b)| (a - b).abs() < 1e-11), "{fast:?} {slow:?}");
     }
 

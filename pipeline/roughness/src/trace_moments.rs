@@ -101,12 +101,14 @@ mod tests {
         assert_eq!(moments.iter().map(|m| m.box_px).collect::<Vec<_>>(), [4, 8, 16]);
         for m in &moments {
             let scale = (side / m.box_px) as f64;
+            assert_eq!(m.moments.len(), 3);
             assert!(
                 m.moments.iter().zip([1.0, scale, scale * scale]).all(|(a, b)| (a / b - 1.0).abs() < 1e-12),
                 "{m:?}"
             );
         }
         let found = moment_exponents(&[moments.clone(), moments], &orders).unwrap();
+        assert_eq!(found.len(), 3);
         for (e, k) in found.iter().zip([0.0, 1.0, 2.0]) {
             assert!((e.exponent - k).abs() < 1e-12 && e.standard_error < 1e-12, "{e:?}");
         }
