@@ -160,9 +160,21 @@ mod tests {
             prop_assert_eq!(&Values::of_metadata(&quantity.metadata()), &quantity);
         }
 
+        /// Whatever the items of a file say, also damaged and in any order: what is read of them is written and read back the same.
         #[test]
-        fn prop_any_text_is_read(text in "\\PC*") {
-            let _ = Values::of_metadata(&text);
+        fn prop_any_items_are_read(
+            start in "\\PC{0,20}",
+            all in prop::collection::vec(
+                (
+                    "(sample=\"0\"|role=\"unittype\"|role=\"description\"|name=\"VALUES\"| |>){0,4}",
+                    "(codes|m|ft|\\PC{0,8})",
+                ),
+                0..4,
+            ),
+        ) {
+            let text: String = all.iter().map(|(attributes, value)| format!("<Item {attributes}>{value}</Item>")).collect();
+            let found = Values::of_metadata(&format!("{start}{text}"));
+            prop_assert_eq!(&Values::of_metadata(&found.metadata()), &found);
         }
     }
 }

@@ -465,6 +465,7 @@ fn prop_ros2_recordings_are_read_back() {
         assert_eq!((read.position_m, read.orientation), (wrote.position_m, wrote.orientation));
         assert_eq!(read.angular_velocity_rad_s, Some(wrote.angular_velocity_rad_s));
     }
+    assert_eq!(log.imus[0].samples.len(), recording.imu.len());
     for (read, wrote) in log.imus[0].samples.iter().zip(&recording.imu) {
         assert_eq!(read.specific_force_m_s2, wrote.specific_force_m_s2);
     }

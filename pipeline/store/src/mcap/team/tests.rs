@@ -316,7 +316,9 @@ fn val_a_minimal_recording_is_written() {
     recording.moving.clear();
     recording.events.clear();
     for flavour in [McapFlavour::Viewer, McapFlavour::Ros2] {
-        scene.encode(flavour).unwrap();
+        let (bytes, summary) = scene.encode(flavour).unwrap();
+        assert!(summary.messages > 0);
+        assert_eq!(read(&bytes).len() as u64, summary.messages);
     }
 }
 
