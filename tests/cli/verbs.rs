@@ -615,6 +615,7 @@ fn val_exports_are_reproducible() {
     assert_eq!(sums_of("merged"), sums_of("release"));
     let of_first = |p: &&String| p.starts_with("export/t-0001/");
     assert_eq!(sums_of("release").keys().filter(of_first).count(), 20);
+    let mut compared = 0;
     for target in ["unreal", "unity", "gazebo", "mujoco", "isaac"] {
         ok(path, &["convert", "release/terrain/t-0001.tif", target, "--for", target, "--threads", "1"]);
         for entry in std::fs::read_dir(path.join(target)).unwrap() {
@@ -622,8 +623,10 @@ fn val_exports_are_reproducible() {
             let released = path.join("release/export/t-0001").join(target).join(&name);
             let (a, b) = (std::fs::read(path.join(target).join(&name)).unwrap(), std::fs::read(released).unwrap());
             assert!(a == b, "{target}: {} differs", name.display());
+            compared += 1;
         }
     }
+    assert_eq!(compared, 20);
     // Exports change no other file.
     write(path, "plain.toml", &study.replace("exports = ", "# exports = "));
     ok(path, &["run", "plain.toml", "-o", "plain"]);
