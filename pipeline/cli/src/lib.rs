@@ -1,6 +1,25 @@
 //! The command line as a library: parses arguments, calls the stages, prints results, and returns a documented exit code.
 //!
 //! Two programs call it: the binary `sastrugi`, and the console script of the Python package.
+//!
+//! # Flow
+//!
+//! 1. [`run`] parses the arguments (`args.rs`). `--help`, `--version` and refused arguments end here.
+//! 2. `verbs::dispatch` calls the verb, in a file of `verbs/`. A verb computes nothing: it calls `sastrugi_stages`, `sastrugi_server` or
+//!    `sastrugi_report`.
+//! 3. Results go to stdout, as text or with `--json` as JSON; progress and warnings go to stderr.
+//! 4. An error becomes a message and a [`Code`], which is part of the contract.
+//!
+//! # Example
+//!
+//! ```
+//! use sastrugi_cli::{Code, run};
+//! use std::ffi::OsString;
+//!
+//! // Prints the parameters of a generator, with units, defaults and sources.
+//! let code = run(["sastrugi", "kinds", "gap"].map(OsString::from));
+//! assert_eq!(code, Code::Done);
+//! ```
 
 mod args;
 mod examples;

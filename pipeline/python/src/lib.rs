@@ -1,5 +1,21 @@
 //! `sastrugi._native`: what the Python package takes from the program. Thin: every function is one call into the stages or a kernel, with the
 //! interpreter's lock released while it works. Parameters and results that are not arrays pass as JSON; `sastrugi/*.py` gives them their shape.
+//!
+//! # Flow
+//!
+//! 1. A function of `sastrugi/*.py` turns its arguments into arrays and JSON.
+//! 2. A function here (`surfaces.rs`, `runs.rs`, `releases.rs`) calls `sastrugi_stages`; `rasters.rs` passes heightfields.
+//! 3. `waiting.rs` reports progress and watches for Ctrl-C meanwhile; `errors.rs` makes any error a `SastrugiError`.
+//!
+//! # Example
+//!
+//! ```python
+//! import sastrugi
+//!
+//! snow = sastrugi.Fit({"model": "exponential", "parameters": {"sigma_m": 0.05, "range_m": 0.2}})
+//! site = snow.texture(size=(16.0, 12.0), cell=0.1, seed=1, phase="gaussian", periodic=False)
+//! sastrugi.fit(site, outer_scale=1.0, bootstrap=0).model  # "exponential"
+//! ```
 
 mod errors;
 mod rasters;
