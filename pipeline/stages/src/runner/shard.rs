@@ -193,21 +193,25 @@ impl Description {
         file.commit()
     }
 
-    /// Checks that the part is valid, and that all items belong to it and stay inside the folder.
+    /// Checks that the shard is valid, and that all items belong to it and stay inside the folder.
     fn check(&self) -> Result<(), String> {
         let Part { index, count } = self.part;
         if !self.part.is_valid() {
             return Err(format!(
-                "part {index} of {count} is invalid; parts count from 1, and there are at most {PARTS_MAX}"
+                "shard {index} of {count} is invalid; shards count from 1, and there are at most {PARTS_MAX}"
             ));
         }
         self.items.iter().try_for_each(|OwnItem { item, key, .. }| {
             check_path(&item.to_string()).map_err(|e| e.to_string())?;
-            if self.part.owns(key) { Ok(()) } else { Err(format!("{item} does not belong to part {index} of {count}")) }
+            if self.part.owns(key) {
+                Ok(())
+            } else {
+                Err(format!("{item} does not belong to shard {index} of {count}"))
+            }
         })
     }
 
-    /// True if it is the same part of the same study with fewer failed items.
+    /// True if it is the same shard of the same study with fewer failed items.
     fn holds_more_than(&self, other: &Self) -> bool {
         let same = self.study_sha256 == other.study_sha256 && self.part == other.part;
         same && self.failures.len() < other.failures.len()
@@ -637,14 +641,14 @@ mod tests {
         assert_eq!(description(2, 3).check(), Ok(()));
         for (index, count) in [(0, 3), (4, 3), (1, 10_001)] {
             let error = description(index, count).check().unwrap_err();
-            assert!(error.starts_with(&format!("part {index} of {count} is invalid")), "{error}");
+            assert!(error.starts_with(&format!("shard {index} of {count} is invalid")), "{error}");
         }
         for id in ["../a", "a/../../b", "", ".hidden"] {
             let items = vec![own(1, id)];
             assert!(Description { items, ..description(1, 1) }.check().is_err(), "{id}");
         }
         let error = Description { items: vec![own(1, "a")], ..description(2, 3) }.check().unwrap_err();
-        assert_eq!(error, "terrain/a does not belong to part 2 of 3");
+        assert_eq!(error, "terrain/a does not belong to shard 2 of 3");
     }
 
     /// Results that change while they are merged stay where they are; each shard is named with what to run again.
