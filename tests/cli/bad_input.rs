@@ -373,7 +373,7 @@ fn val_bad_rasters_are_input_errors() {
     }
 }
 
-/// A band that is none, that the DEM does not hold, or whose figures cannot be compared.
+/// A band that is invalid, that the DEM does not hold, or whose metrics cannot be compared.
 #[test]
 fn val_bands_of_vehicles_are_refused() {
     let folder = area();

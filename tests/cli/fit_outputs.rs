@@ -142,7 +142,7 @@ fn val_several_dems_make_one_table() {
     assert!(!path.join("snow.json").exists());
 }
 
-/// A range at the bound of the search is no estimate: printed alone and in a table it is a lower limit of the profile, or, where the model
+/// A range at the bound of the search is not an estimate: printed alone and in a table it is a lower limit of the profile, or, where the model
 /// misfits and blocks know no end, not identified; sigma^2 / b has its interval.
 #[test]
 fn val_a_range_at_the_bound_is_no_estimate() {

@@ -54,7 +54,7 @@ fn gold_an_archive_has_the_same_bytes_wherever_it_is_packed() {
     assert!(call.stdout.starts_with(first["sha256"].as_str().unwrap()), "{}", call.stdout);
 }
 
-/// Where stderr is no terminal: what is checked, what is packed, and how long it takes where it takes long; no line for each file.
+/// Where stderr is not a terminal: what is checked, what is packed, and how long it takes where it takes long; no line for each file.
 #[test]
 fn val_packing_tells_its_progress_in_a_few_lines() {
     let folder = area();

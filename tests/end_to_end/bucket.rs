@@ -94,7 +94,7 @@ fn val_a_bucket_is_cache_and_place_of_a_release() {
     succeeds(&server.call(path, &merge));
     assert_eq!(differing(&whole, &sums(&server.object("small"))), [""; 0]);
     succeeds(&server.call(path, &["verify", "s3://terrains/small", "--quiet"]));
-    // The same release again is no change.
+    // The same release again changes nothing.
     succeeds(&server.call(path, &merge));
     succeeds(&server.call(path, &["run", "study.toml", "-o", "s3://terrains/small", "--quiet"]));
     // Another one is refused for what is at the address, not for the copy in the work area, and nothing of it is uploaded.

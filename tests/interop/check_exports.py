@@ -218,7 +218,7 @@ def check_usda(path, dem):
     expect(UsdPhysics.CollisionAPI(prim).GetCollisionEnabledAttr().Get(), f"{path}: collision is off")
     expect(UsdPhysics.MeshCollisionAPI(prim).GetApproximationAttr().Get() == "none", f"{path}: collision of another shape")
     expect(mesh.GetSubdivisionSchemeAttr().Get() == "none" and mesh.GetOrientationAttr().Get() == "rightHanded", f"{path}: mesh")
-    expect(set(mesh.GetFaceVertexCountsAttr().Get()) == {3}, f"{path}: faces are no triangles")
+    expect(set(mesh.GetFaceVertexCountsAttr().Get()) == {3}, f"{path}: faces are not triangles")
     problems = []
     ok = UsdGeom.Mesh.ValidateTopology(mesh.GetFaceVertexIndicesAttr().Get(), mesh.GetFaceVertexCountsAttr().Get(), len(mesh.GetPointsAttr().Get()))
     expect(ok if isinstance(ok, bool) else ok[0], f"{path}: topology {ok} {problems}")

@@ -292,7 +292,7 @@ def check_release(release):
 
 
 def check_files(paths):
-    raise SystemExit(f"{paths[0]} is no release")
+    raise SystemExit(f"{paths[0]} is not a release")
 
 
 if __name__ == "__main__":

@@ -133,7 +133,7 @@ def check_viewer(release, rover, rows):
     expect(len(poses) == len(messages["/tf"]) and rover["time_s"] - 1 <= len(poses) - 1 <= rover["time_s"], f"{path}: {len(poses)} poses")
     for (_, pose), (_, tf) in zip(poses, messages["/tf"]):
         expect(values(pose.pose.position) == values(tf.transforms[0].translation), f"{path}: /tf is elsewhere")
-        expect(abs(np.linalg.norm(values(pose.pose.orientation)) - 1) < 1e-12, f"{path}: an orientation is no rotation")
+        expect(abs(np.linalg.norm(values(pose.pose.orientation)) - 1) < 1e-12, f"{path}: an orientation is not a rotation")
     driven = np.array([values(pose.position) for pose in messages["/vehicle/path"][0][1].poses])
     expected = [values(pose.pose.position) for _, pose in poses]
     expect(np.array_equal(driven, np.array(expected[::10] + ([expected[-1]] if (len(expected) - 1) % 10 else []))), f"{path}: path")

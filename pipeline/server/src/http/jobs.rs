@@ -147,7 +147,7 @@ impl Job {
 
 impl Jobs {
     fn get(&self, id: &str) -> Result<Arc<Job>, Problem> {
-        // `+1` and `01` are no numbers of jobs.
+        // `+1` and `01` are not numbers of jobs.
         let number = id.parse().ok().filter(|number: &u64| number.to_string() == id);
         let found = number.and_then(|number| locked(&self.all).get(&number).cloned());
         found.ok_or_else(|| Problem::not_found("no such job; /v1/jobs lists them"))

@@ -348,7 +348,7 @@ fn val_repeated_poses_and_short_pauses() {
     assert_eq!((paused(0.49), paused(0.51)), (0, 1));
 }
 
-/// A steady climb is no vibration: its trend is removed before the spectrum is taken.
+/// A steady climb is not a vibration: its trend is removed before the spectrum is taken.
 #[test]
 fn val_a_climb_has_no_acceleration_in_the_band() {
     let poses = (0..800).map(|k| pose(0.05 * f64::from(k), 0.3 * 0.05 * f64::from(k), 0.0)).collect();
