@@ -5,7 +5,7 @@
 //! are sorted by their keys, which are never null; a `NaN` is stored as null, also within a list. Memory is bounded by one row
 //! group, whatever the number of rows.
 
-mod footer;
+mod headers;
 mod stream;
 #[cfg(test)]
 mod tests;
@@ -22,6 +22,7 @@ use arrow_array::{
     Array, ArrayRef, BooleanArray, Float64Array, Int64Array, ListArray, PrimitiveArray, RecordBatch, StringArray,
 };
 use arrow_schema::{DataType, Field, FieldRef, Schema, SchemaRef};
+use headers::Checked;
 use parquet::arrow::ArrowWriter;
 use parquet::arrow::arrow_reader::{ParquetRecordBatchReader, ParquetRecordBatchReaderBuilder};
 use parquet::basic::{Compression, Encoding, ZstdLevel};
@@ -33,7 +34,6 @@ use sastrugi_schemas::tables::compare_keys;
 use sastrugi_schemas::{Cell, Column, ColumnType, Record, Table};
 use std::cmp::Ordering;
 use std::collections::HashMap;
-use std::fs::File;
 use std::io;
 use std::path::{Path, PathBuf};
 use std::sync::Arc;
@@ -517,15 +517,15 @@ impl<T: ArrowPrimitiveType> Lists<T> {
     }
 }
 
-fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<File>, TableError> {
+fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<Checked>, TableError> {
     let io = |e| TableError::io(path, e);
-    let mut file = crate::file::open(path).map_err(io)?;
-    if !footer::is_sound(&mut file).map_err(io)? {
+    let file = crate::file::open(path).map_err(io)?;
+    let Some(file) = Checked::of(file).map_err(io)? else {
         return Err(TableError::unusable(
             path,
             "the file is damaged: its footer has fields that Parquet does not define",
         ));
-    }
+    };
     let builder = decoding(path, || ParquetRecordBatchReaderBuilder::try_new(file))?;
     let found = builder.schema();
     for (column, expected) in schema(table, None).fields().iter().enumerate() {

@@ -1,6 +1,7 @@
 //! The rows of a table in several files as one stream of Arrow record batches, for programs in other languages that take them without a
 //! copy ([`FFI_ArrowArrayStream`]), and single columns of it.
 
+use super::headers::Checked;
 use super::{BATCH_ROWS, ColumnValues, TableError, decoding, open, schema};
 pub use arrow_array::ffi_stream::FFI_ArrowArrayStream;
 use arrow_array::{Array, BooleanArray, Float64Array, Int64Array, RecordBatch, RecordBatchReader, StringArray};
@@ -12,7 +13,6 @@ use parquet::arrow::arrow_reader::{
 };
 use parquet::file::metadata::{ParquetMetaData, RowGroupMetaData};
 use sastrugi_schemas::{Cell, ColumnType, Table};
-use std::fs::File;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
 
@@ -345,7 +345,7 @@ fn extend_runs(runs: &mut Vec<Run>, texts: &StringArray, columns: &[&Float64Arra
 }
 
 /// Keeps rows with wanted text in a column.
-fn predicate(builder: &ParquetRecordBatchReaderBuilder<File>, wanted: Wanted) -> Box<dyn ArrowPredicate> {
+fn predicate(builder: &ParquetRecordBatchReaderBuilder<Checked>, wanted: Wanted) -> Box<dyn ArrowPredicate> {
     let mask = ProjectionMask::roots(builder.parquet_schema(), [wanted.column]);
     Box::new(ArrowPredicateFn::new(mask, move |batch: RecordBatch| {
         let texts = batch.column(0).as_any().downcast_ref::<StringArray>();

@@ -248,6 +248,23 @@ fn val_lists_that_are_not_there_are_not_skipped() {
     assert!(error.contains("fields that Parquet does not define"), "{error}");
 }
 
+/// Lists of 2^31 booleans in the first page header, in place of its type and in an unknown field: the crate would take seconds for each.
+#[test]
+fn val_damaged_page_headers_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.parquet");
+    write(&path, &(0..1000).map(|bin| row(0, bin, 0.5)).collect::<Vec<_>>());
+    let bytes = fs::read(&path).unwrap();
+    for lists in [&[0x19, 0xf1, 0xff, 0xff, 0xff, 0xff, 7][..], &[0x99, 0xf1, 0xff, 0xff, 0xff, 0xff, 7]] {
+        let mut damaged = bytes.clone();
+        // The first page follows the four bytes of the format's mark.
+        damaged[4..4 + lists.len()].copy_from_slice(lists);
+        fs::write(&path, damaged).unwrap();
+        let error = read_table::<CovarianceRow>(&path).unwrap_err().to_string();
+        assert!(error.contains("at byte 4, a page header has fields that Parquet does not define"), "{error}");
+    }
+}
+
 /// Columns of numbers are read without going through cells. A null is NaN among floats; a column of integers with a null is not an array.
 #[test]
 fn val_columns_of_numbers() {

@@ -1,11 +1,14 @@
-//! The footer of a Parquet file: structures of the Thrift compact protocol, checked before the crate `parquet` reads them.
+//! The footer and the page headers of a Parquet file: structures of the Thrift compact protocol, checked before the crate `parquet` reads them.
 //!
 //! The crate skips fields that it does not know by taking a step for each claimed element, also of lists of booleans, whose elements take no
-//! bytes there, and it reads known fields whatever type they have. So a few damaged bytes can hold it up for hours. A footer that passes
-//! this check has known fields of the right types alone: nothing is skipped but values that are there. One pass over the footer's bytes.
+//! bytes there, and it reads known fields whatever type they have. So a few damaged bytes can hold it up for hours. A structure that passes
+//! this check has known fields of the right types alone: nothing is skipped but values that are there. One pass over the bytes of each.
 
+use bytes::Bytes;
+use parquet::errors::Result as ParquetResult;
+use parquet::file::reader::{ChunkReader, Length};
 use std::fs::File;
-use std::io::{self, Read, Seek, SeekFrom};
+use std::io::{self, Cursor, ErrorKind, Read, Seek, SeekFrom};
 
 /// What a field holds.
 enum Kind {
@@ -14,12 +17,14 @@ enum Kind {
     I16,
     I32,
     I64,
+    /// Bytes of a page, an `I32` from 0 to [`PAGE_MAX`].
+    PageSize,
     Binary,
     List(&'static Kind),
     Struct(&'static [(i16, Kind)]),
 }
 
-use Kind::{Binary, Bool, Byte, I16, I32, I64, List, Struct};
+use Kind::{Binary, Bool, Byte, I16, I32, I64, List, PageSize, Struct};
 
 // Fields by number, from the definition of the format (`parquet.thrift` of Apache Parquet), without encryption and geometry.
 const UNIT: Kind = Struct(&[(1, EMPTY), (2, EMPTY), (3, EMPTY)]);
@@ -94,15 +99,29 @@ const FILE_METADATA: Kind = Struct(&[
     (6, Binary),
     (7, List(&Struct(&[(1, EMPTY), (2, EMPTY)]))),
 ]);
+const PAGE_HEADER: Kind = Struct(&[
+    (1, I32),
+    (2, PageSize),
+    (3, PageSize),
+    (4, I32),
+    (5, Struct(&[(1, I32), (2, I32), (3, I32), (4, I32), (5, STATISTICS)])),
+    (6, EMPTY),
+    (7, Struct(&[(1, I32), (2, I32), (3, Bool)])),
+    (8, Struct(&[(1, I32), (2, I32), (3, I32), (4, I32), (5, I32), (6, I32), (7, Bool), (8, STATISTICS)])),
+]);
 
 /// Bytes after the footer: its length and the mark of the format.
 const TAIL: usize = 8;
+/// Largest page, compressed or not, bytes; pages of writers have about 1 MiB. The crate reserves what a header claims.
+const PAGE_MAX: u64 = 1 << 28;
+/// Bytes in which a page header is looked for: most have less than 100, those with long texts as statistics more.
+const HEADER_BYTES: [u64; 2] = [1 << 12, 1 << 22];
 
 /// Whether the footer of a file has known fields alone. A file without a footer passes: it is refused as it is read.
 ///
 /// # Errors
 /// I/O errors.
-pub(super) fn is_sound(file: &mut File) -> io::Result<bool> {
+fn is_sound(file: &mut File) -> io::Result<bool> {
     let about = file.metadata()?;
     let Some(start) = about.len().checked_sub(TAIL as u64).filter(|_| about.is_file()) else { return Ok(true) };
     let mut tail = [0; TAIL];
@@ -117,6 +136,78 @@ pub(super) fn is_sound(file: &mut File) -> io::Result<bool> {
     let mut footer = Vec::new();
     Read::by_ref(file).take(length).read_to_end(&mut footer)?;
     Ok(Walk(&footer).value(&FILE_METADATA).is_some())
+}
+
+/// A Parquet file whose footer was checked, and whose page headers are checked as they are read.
+pub(super) struct Checked(File);
+
+impl Checked {
+    /// Checks the footer; `None` if it has unknown fields.
+    ///
+    /// # Errors
+    /// I/O errors.
+    pub(super) fn of(mut file: File) -> io::Result<Option<Self>> {
+        Ok(is_sound(&mut file)?.then_some(Self(file)))
+    }
+}
+
+impl Length for Checked {
+    fn len(&self) -> u64 {
+        Length::len(&self.0)
+    }
+}
+
+impl ChunkReader for Checked {
+    type T = Header;
+
+    /// The crate reads the length of the footer and page headers from what this returns, nothing else.
+    fn get_read(&self, start: u64) -> ParquetResult<Header> {
+        let is_tail = start.checked_add(TAIL as u64) == Some(Length::len(self));
+        Ok(Header { file: self.0.try_clone()?, start, is_tail, bytes: None })
+    }
+
+    fn get_bytes(&self, start: u64, length: usize) -> ParquetResult<Bytes> {
+        self.0.get_bytes(start, length)
+    }
+}
+
+/// The header of a page, or the end of the file. It is checked once it is read: the crate also asks for it where it has read it before.
+pub(super) struct Header {
+    file: File,
+    start: u64,
+    is_tail: bool,
+    bytes: Option<Cursor<Vec<u8>>>,
+}
+
+impl Header {
+    fn checked(&mut self) -> io::Result<Vec<u8>> {
+        let mut bytes = Vec::new();
+        for length in HEADER_BYTES {
+            bytes.clear();
+            self.file.seek(SeekFrom::Start(self.start))?;
+            Read::by_ref(&mut self.file).take(length).read_to_end(&mut bytes)?;
+            if self.is_tail || Walk(&bytes).value(&PAGE_HEADER).is_some() {
+                return Ok(bytes);
+            }
+            if (bytes.len() as u64) < length {
+                break;
+            }
+        }
+        let message = format!(
+            "the file is damaged: at byte {}, a page header has fields that Parquet does not define, or claims more than {PAGE_MAX} bytes",
+            self.start
+        );
+        Err(io::Error::new(ErrorKind::InvalidData, message))
+    }
+}
+
+impl Read for Header {
+    fn read(&mut self, buffer: &mut [u8]) -> io::Result<usize> {
+        if self.bytes.is_none() {
+            self.bytes = Some(Cursor::new(self.checked()?));
+        }
+        self.bytes.as_mut().map_or(Ok(0), |bytes| bytes.read(buffer))
+    }
 }
 
 /// The bytes that are left of a structure. `None` stands for bytes that do not hold what is expected.
@@ -149,6 +240,8 @@ impl Walk<'_> {
             Bool => Some(()),
             Byte => self.byte().map(drop),
             I16 | I32 | I64 => self.varint().map(drop),
+            // Signs are folded in: an even number is twice the value.
+            PageSize => self.varint().filter(|folded| folded % 2 == 0 && folded / 2 <= PAGE_MAX).map(drop),
             Binary => {
                 let length = usize::try_from(self.varint()?).ok()?;
                 self.0 = self.0.get(length..)?;
@@ -199,7 +292,7 @@ impl Kind {
             Bool => matches!(number, 1 | 2),
             Byte => number == 3,
             I16 => number == 4,
-            I32 => number == 5,
+            I32 | PageSize => number == 5,
             I64 => number == 6,
             Binary => number == 8,
             List(_) => number == 9,
@@ -234,5 +327,43 @@ mod tests {
             !walked(&[0x05, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 0xff, 1]),
             "no number is so long"
         );
+    }
+
+    /// A data page (type 0) of 10 bytes, 8 of them stored, with 3 values, plain (0), levels of the kind 3.
+    const PAGE: [u8; 17] = [0x15, 0, 0x15, 20, 0x15, 16, 0x2c, 0x15, 6, 0x15, 0, 0x15, 6, 0x15, 6, 0, 0];
+
+    /// Page headers by the definition of the compact protocol.
+    #[test]
+    fn val_page_headers_claim_no_more_than_a_page() {
+        let is_page = |bytes: &[u8]| Walk(bytes).value(&PAGE_HEADER).is_some();
+        assert!(is_page(&PAGE));
+        assert!((0..PAGE.len()).all(|cut| !is_page(&PAGE[..cut])));
+        let with_size = |size: &[u8]| [&PAGE[..3], size, &PAGE[4..]].concat();
+        // 2^28 and one more, folded: 2^29 and 2^29 + 2.
+        assert!(is_page(&with_size(&[0x80, 0x80, 0x80, 0x80, 2])));
+        assert!(!is_page(&with_size(&[0x82, 0x80, 0x80, 0x80, 2])));
+        assert!(!is_page(&with_size(&[1])), "-1 bytes");
+        // Field 4, a checksum, as a list of booleans.
+        let lists = [&PAGE[..6], &[0x19, 0xf1, 0xff, 0xff, 0xff, 0xff, 7, 0]].concat();
+        assert!(!is_page(&lists));
+    }
+
+    /// A header is checked when it is read, however long its statistics are; the end of the file passes as it is.
+    #[test]
+    fn val_headers_are_checked_as_they_are_read() {
+        let folder = tempfile::tempdir().unwrap();
+        // Statistics (field 5 of the data page) with a smallest value (field 6) of 5000 bytes; then a header with an unknown field 9.
+        let long = [&PAGE[..15], &[0x1c, 0x68, 0x88, 0x27], &[b'a'; 5000][..], &[0, 0, 0]].concat();
+        let unknown = [0x95, 2, 0];
+        let path = folder.path().join("pages");
+        std::fs::write(&path, [&long[..], &unknown, &[0; 5]].concat()).unwrap();
+        let file = Checked(File::open(&path).unwrap());
+        let read = |start: usize| {
+            let mut first = [0];
+            file.get_read(start as u64).unwrap().read(&mut first).map(|_| first[0])
+        };
+        assert_eq!(read(0).unwrap(), 0x15);
+        assert_eq!(read(long.len()).unwrap(), 0x95, "the last 8 bytes are no page header");
+        assert!(read(2).unwrap_err().to_string().contains("at byte 2, a page header"));
     }
 }
