@@ -117,6 +117,8 @@ pub struct Heightfield {
     pub release_path: String,
     /// Number of cells; for a measured DEM whose file does not state it, an upper bound.
     pub cells: u64,
+    /// Number of cells of the complete raster of a measured DEM, of which it may be a window.
+    pub raster_cells: Option<u64>,
     /// Smaller side of a cell, m, if known before the run.
     pub cell_m: Option<f64>,
     /// Geometry of a surface generated on its own cells, if known before the run.

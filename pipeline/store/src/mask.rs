@@ -14,7 +14,11 @@ mod tests;
 use crate::dem::{self, DemError};
 use crate::geojson;
 use sastrugi_numeric::{Geometry, Grid};
+use std::io::{self, BufReader};
 use std::path::{Path, PathBuf};
+
+/// Bytes of a file that are searched for the first that is not blank.
+const START_BYTES: u64 = 1 << 12;
 
 /// Failure to read a mask.
 #[derive(Debug, thiserror::Error)]
@@ -126,6 +130,18 @@ pub fn read_obstacles(path: &Path, geometry: &Geometry) -> Result<Obstacles, Mas
     }
     drop(bytes);
     of_raster(&dem::read(path)?, geometry).map(Obstacles::Cells).map_err(unusable)
+}
+
+/// Approximate memory that reading a mask or obstacles needs besides the cells of the grid, bytes: from the header of a raster, or by
+/// counting the values of a GeoJSON text.
+///
+/// # Errors
+/// A file that cannot be read.
+pub fn reading_bytes(path: &Path) -> io::Result<u64> {
+    if !looks_like_json(&crate::file::head(path, START_BYTES)?) {
+        return dem::reading_bytes(path);
+    }
+    geojson::polygons::parsing_bytes(BufReader::new(crate::file::open(path)?))
 }
 
 fn looks_like_json(bytes: &[u8]) -> bool {

@@ -70,6 +70,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         streams: None,
         release_path: format!("dem/{id}.metric.tif"),
         cells: expected.map_or(claimed.cells, |geometry| geometry.len() as u64),
+        raster_cells: Some(claimed.cells),
         cell_m: expected.map_or(claimed.cell_m, |geometry| Some(geometry.cell[0].min(geometry.cell[1]))),
         geometry: None,
         expected,

@@ -60,6 +60,8 @@ pub struct Site {
     settings: FitSettings,
     cells: u64,
     cell_m: Option<f64>,
+    /// Memory for the cells that a mask selects, bytes.
+    selection_bytes: u64,
 }
 
 /// The DEM of a fit as it is fitted.
@@ -110,9 +112,20 @@ impl Site {
         Ok(Measured { residual: sastrugi_texture::residual(&dem.grid, &settings).map_err(JobError::new)? })
     }
 
-    /// Most bytes that [`Self::residual`] needs: heights and residual, and the passes over them.
+    /// Most bytes that [`Self::residual`] needs: heights and residual, and the passes over them; or what is needed while they are read.
     pub fn memory_bytes(&self) -> u64 {
-        16 * self.cells + self.settings.memory_bytes(self.cells, self.cell_m, 0)
+        let detrending = 8 * self.cells + self.settings.memory_bytes(self.cells, self.cell_m, 0);
+        8 * self.cells + detrending.max(self.reading_bytes())
+    }
+
+    /// Most bytes that [`Self::read`] needs besides the heights. Masks, the noise reference and the other DEM are read one after the other.
+    fn reading_bytes(&self) -> u64 {
+        let largest = self.masks.iter().chain(&self.noise_reference).map(|mask| mask.reading_bytes).max();
+        // The noise is that of a copy of the heights.
+        let masked = largest.map_or(0, |bytes| bytes + self.selection_bytes + 8 * self.cells);
+        // Co-registration takes 80 bytes per cell of the first DEM, and the difference 8.
+        let subtracted = self.minus.as_ref().map_or(0, |minus| 8 * minus.cells + 88 * self.cells);
+        masked.max(subtracted)
     }
 
     /// Number of cells.
@@ -137,6 +150,7 @@ struct Subtrahend {
     id: String,
     dem: ItemRef,
     source: Source,
+    cells: u64,
 }
 
 impl Subtrahend {
@@ -144,7 +158,8 @@ impl Subtrahend {
         let Some(field) = builder.heightfields.get(id) else {
             return Err(unknown_id(entry, "minus", id, builder.heightfields.keys()).into());
         };
-        Ok(Self { id: id.to_owned(), dem: field.item.clone(), source: builder.source_of(id, field) })
+        let source = builder.source_of(id, field);
+        Ok(Self { id: id.to_owned(), dem: field.item.clone(), source, cells: field.cells })
     }
 
     /// The DEM of an item minus this one.
@@ -221,6 +236,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
             settings,
             cells: field.cells,
             cell_m: field.cell_m,
+            selection_bytes: mask::selection_bytes(&field),
         };
         builder.sites.insert(one.id.clone(), site.clone());
         let parents = site.parents();
@@ -266,7 +282,7 @@ impl Job for FitJob {
         // After the fit: background, residual, mask and the statistics of the residual take 81 bytes per cell.
         let Site { settings, cells, cell_m, .. } = &self.site;
         let fit = settings.memory_bytes(*cells, *cell_m, rayon::current_num_threads() as u64);
-        8 * cells + fit.max((256 << 20) + 81 * cells)
+        8 * cells + fit.max((256 << 20) + 81 * cells).max(self.site.reading_bytes())
     }
 
     fn estimate(&self) -> Estimate {

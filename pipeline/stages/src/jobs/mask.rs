@@ -1,7 +1,7 @@
 //! Stage `mask`: copies the mask files of fits and the obstacle files of routes into the release, and applies them.
 
 use super::original::{self, MASK_STAGE, Original};
-use crate::builder::{BuildError, Builder, InputPlace};
+use crate::builder::{BuildError, Builder, Heightfield, InputPlace};
 use crate::job::{ItemRef, JobError, Work};
 use crate::operations::masks;
 use crate::operations::place::{PLACE, Place};
@@ -10,6 +10,7 @@ use crate::study::Entry;
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::fit::MaskSource;
 use sastrugi_schemas::study::{Files, FitItem, RouteItem};
+use sastrugi_store::mask::reading_bytes;
 use sastrugi_texture::noise::{self, ReferenceNoise};
 use std::path::Path;
 
@@ -22,6 +23,14 @@ pub struct Mask {
     release_path: String,
     /// Its entry in the fit file.
     pub source: MaskSource,
+    /// Approximate memory for reading it, besides the cells that it selects, bytes.
+    pub reading_bytes: u64,
+}
+
+/// Memory for the cells that a mask or obstacles select on a surface, bytes: one byte per cell of the complete raster while they are read,
+/// and one for those inside a polygon.
+pub fn selection_bytes(field: &Heightfield) -> u64 {
+    2 * field.raster_cells.unwrap_or(field.cells)
 }
 
 /// Adds the copies of the mask files of a fit, and records their keys so that the released study can refer to the copies.
@@ -81,10 +90,12 @@ impl Mask {
         (file, excludes): (String, bool),
     ) -> Result<Self, BuildError> {
         let copy = Original::of(&format!("mask/{id}"), &builder.study.folder, &file)?;
+        let path = builder.study.folder.join(&file);
+        let reading_bytes = reading_bytes(&path).map_err(|e| BuildError::Input(format!("{}: {e}", path.display())))?;
         let (release_path, sha256) = (copy.release_path().to_owned(), copy.sha256().to_owned());
         let node = copy.node(MASK_STAGE, id);
         let source = MaskSource { file: original::name(&release_path).to_owned(), sha256, excludes };
-        let mask = Self { item: node.item.clone(), release_path: release_path.clone(), source };
+        let mask = Self { item: node.item.clone(), release_path: release_path.clone(), source, reading_bytes };
         builder.inputs.push(InputPlace { key, release_path });
         builder.node(node)?;
         Ok(mask)
@@ -152,4 +163,66 @@ pub fn add_marked(
         given.add_blocked(cells);
     }
     Ok(())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::jobs;
+    use crate::registry::section_names;
+    use crate::study::Study;
+    use serde_json::Value;
+
+    /// Memory of an item of a study with a DEM of 9 cells, `site`, and another one, `large`.
+    fn memory_bytes(folder: &Path, tables: &str, item: &ItemRef) -> u64 {
+        let text = format!(
+            "[study]\nname = \"masks\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"site\"\nfile = \"site.asc\"\n\
+             [[dem]]\nid = \"large\"\nfile = \"large.asc\"\n{tables}"
+        );
+        let (study, errors) = Study::read(&text, folder, &section_names()).unwrap();
+        let mut builder = Builder::new(&study, errors);
+        jobs::dem::add(&mut builder).unwrap();
+        jobs::fit::add(&mut builder).unwrap();
+        jobs::route::add(&mut builder).unwrap();
+        builder.check().unwrap();
+        let position = builder.graph.find(item).unwrap();
+        builder.graph.node(position).job.memory_bytes()
+    }
+
+    /// A DEM of 9 cells takes little, but not what is read with it: 2^26 cells according to a header, or a million corners.
+    #[test]
+    fn val_masks_obstacles_and_other_rasters_count_as_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        let corners = "[0,1],".repeat(1_000_000);
+        write("corners.geojson", &format!("{{\"type\": \"Polygon\", \"coordinates\": [[{corners}[0,0]]]}}"));
+        let placed = "xllcorner 0\nyllcorner 0\ncellsize 1";
+        write("site.asc", &format!("ncols 3\nnrows 3\n{placed}\n1 2 3 4 5 6 7 8 9\n"));
+        write("large.asc", &format!("ncols 8192\nnrows 8192\n{placed}\n1\n"));
+        let (heights, raster, polygon) = (8_u64 << 26, 16_u64 << 26, 5_000_000 * size_of::<Value>() as u64);
+        let fit = |keys: &str| {
+            let table = format!("[[fit]]\nid = \"f\"\ndem = \"site\"\nouter_scale_m = 2.0\n{keys}\n");
+            memory_bytes(folder.path(), &table, &ItemRef::new(jobs::fit::STAGE, "f"))
+        };
+        let route = |keys: &str| {
+            let table = format!("[[route]]\nid = \"r\"\nterrains = [\"site\"]\nmethod = \"grid\"\n{keys}\n");
+            memory_bytes(folder.path(), &table, &ItemRef::new(jobs::route::STAGE, "r@site"))
+        };
+        assert!(fit("") < 300 << 20 && route("") < 100 << 20, "{} {}", fit(""), route(""));
+        for (keys, least) in [
+            ("mask = \"large.asc\"", raster),
+            ("exclude = [\"corners.geojson\"]", polygon),
+            ("noise_reference = \"large.asc\"", raster),
+            ("minus = \"large\"", heights),
+        ] {
+            assert!(fit(keys) > least, "{keys}: {}", fit(keys));
+        }
+        for (keys, least) in [
+            ("obstacles = \"corners.geojson\"", polygon),
+            ("obstacles = [\"large.asc\", \"corners.geojson\"]", raster + polygon),
+            ("cost = \"raster\"\ncost_raster = \"large\"", heights),
+        ] {
+            assert!(route(keys) > least, "{keys}: {}", route(keys));
+        }
+    }
 }

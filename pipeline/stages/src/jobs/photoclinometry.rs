@@ -134,6 +134,7 @@ fn add_one(
         streams: Some(job.streams.clone()),
         release_path: job.released("tif"),
         cells: job.cells,
+        raster_cells: None,
         cell_m: job.settings.cell_m,
         geometry: None,
         expected: None,

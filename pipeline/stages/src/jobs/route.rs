@@ -78,6 +78,8 @@ struct RouteSearch {
     vehicle: Option<Vehicle>,
     obstacles: Vec<Mask>,
     cost_raster: Option<ItemRef>,
+    /// Number of cells of the cost raster; 0 without one.
+    cost_cells: u64,
     pairs: Pairs,
     roughness: RoughnessSection,
 }
@@ -120,7 +122,8 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     entry.check_keys::<RouteItem>(&params, &schema())?;
     let terrains = terrains(builder, entry, &envelope.terrains)?;
     let cost_raster = envelope.cost_raster.as_deref().map(|id| builder.surface(entry, "cost_raster", id));
-    let cost_raster = cost_raster.transpose()?.map(|field| field.item.clone());
+    let cost_raster = cost_raster.transpose()?.map(|field| (field.item.clone(), field.cells));
+    let (cost_raster, cost_cells) = cost_raster.map_or((None, 0), |(item, cells)| (Some(item), cells));
     let vehicle = envelope.vehicle.as_deref().map(|name| registry::vehicle(name, &Map::new()));
     let vehicle = vehicle.transpose().map_err(|e| entry.refuse(e))?;
     let obstacles = mask::add_obstacles(builder, entry, &envelope)?;
@@ -140,6 +143,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             vehicle: vehicle.clone(),
             obstacles: obstacles.clone(),
             cost_raster: cost_raster.clone(),
+            cost_cells,
             pairs: pairs(entry, &envelope, rules)?,
             roughness: builder.study.roughness.clone(),
         };
@@ -267,9 +271,12 @@ impl RouteSearch {
     }
 
     /// Peak working memory on a terrain, bytes.
-    fn memory_bytes(&self, cells: u64) -> u64 {
+    fn memory_bytes(&self, field: &Heightfield) -> u64 {
+        // Polygons of all files are kept, and are part of what reading a file takes.
+        let obstacles: u64 = self.obstacles.iter().map(|file| file.reading_bytes).sum();
+        let selection = if self.obstacles.is_empty() { 0 } else { mask::selection_bytes(field) };
         // Heights twice, masks, factors, clearance; the search's costs, parents and marks.
-        (64 << 20) + 150 * cells
+        (64 << 20) + 150 * field.cells + 8 * self.cost_cells + obstacles + selection
     }
 }
 
@@ -462,7 +469,7 @@ impl Job for RouteJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        self.search.memory_bytes(self.field.cells)
+        self.search.memory_bytes(&self.field)
     }
 
     fn estimate(&self) -> Estimate {

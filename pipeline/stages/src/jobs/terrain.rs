@@ -125,6 +125,7 @@ fn add_one(builder: &mut Builder<'_>, item: &TerrainItem, made: &Arc<Made>, one:
         streams: Some(streams.clone()),
         release_path: format!("terrain/{}.tif", one.id),
         cells: geometry.len() as u64,
+        raster_cells: None,
         cell_m: Some(geometry.cell.into_iter().fold(f64::INFINITY, f64::min)),
         geometry: Some(geometry),
         expected: Some(geometry),

@@ -201,6 +201,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                     (Some(Base { cells, .. }), _) | (None, Some(Heightfield { cells, .. })) => *cells,
                     (None, None) => synthesis.geometry().len() as u64,
                 },
+                raster_cells: None,
                 cell_m: Some(synthesis.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
                 geometry: (base.is_none() && fill.is_none()).then(|| synthesis.geometry()),
                 expected: match (&base, &fill) {

@@ -51,6 +51,10 @@ use std::path::Path;
 
 /// Number of leading bytes read to recognise a format before the rest of the file.
 const FIRST_BYTES: u64 = 4;
+/// Memory of a raster while it is read, bytes per cell: its heights, decoded and in their final order.
+const BYTES_PER_CELL: u64 = 16;
+/// The same for a point cloud that is gridded to means: sums, counts and heights.
+const BYTES_PER_CELL_OF_POINTS: u64 = 24;
 
 /// Reads a raster.
 ///
@@ -105,6 +109,21 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
         }
     };
     checked(dem).map_err(|refusal| refusal.about(path))
+}
+
+/// Approximate memory that [`read`] needs, bytes, from the header and the size of the file.
+///
+/// # Errors
+/// A file that cannot be opened.
+pub fn reading_bytes(path: &Path) -> io::Result<u64> {
+    let bytes = crate::file::open(path)?.metadata()?.len();
+    // Other formats take at least one byte per cell.
+    let claimed = claimed(path, &ReadOptions::default()).unwrap_or_else(|| Claimed::size(bytes, 0, None));
+    let cells = match claimed.points {
+        0 => BYTES_PER_CELL * claimed.cells,
+        _ => points::SEARCH_BYTES + BYTES_PER_CELL_OF_POINTS * claimed.cells,
+    };
+    Ok(2 * bytes + cells)
 }
 
 /// Opens a file and returns it, positioned after its first bytes, with those bytes.

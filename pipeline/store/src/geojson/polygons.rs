@@ -4,6 +4,10 @@
 //! accepted, and its last position is joined to the first: it needs at least 3 corners.
 
 use serde_json::Value;
+use std::io::{self, BufRead};
+
+/// Size of a value of a parsed text, bytes.
+const VALUE: u64 = size_of::<Value>() as u64;
 
 /// Fewest corners of a ring, without the repetition of the first.
 const CORNERS_MIN: usize = 3;
@@ -23,6 +27,30 @@ pub fn parse(bytes: &[u8]) -> Result<Vec<Polygon>, String> {
         return Err("contains no polygons".to_owned());
     }
     Ok(polygons)
+}
+
+/// Approximate memory that [`parse`] needs, bytes: the text, its values and the polygons. The values are counted by the characters that
+/// separate them, whether or not the text is GeoJSON.
+///
+/// # Errors
+/// A text that cannot be read.
+pub fn parsing_bytes(text: impl BufRead) -> io::Result<u64> {
+    text.bytes().map(|byte| byte.map(bytes_at)).sum()
+}
+
+/// Memory that a character of a text stands for, bytes: itself, itself again as part of a string, and the value that it begins.
+fn bytes_at(byte: u8) -> u64 {
+    2 + match byte {
+        // The next value of a list, which may have been allocated for twice as many.
+        b',' => 2 * VALUE,
+        // A list is allocated for four values at least; if it is a position, its two numbers are copied.
+        b'[' => 5 * VALUE,
+        // Entries and index of an object.
+        b'{' => 8 * VALUE,
+        // Half of the allocation of a string.
+        b'"' => 32,
+        _ => 0,
+    }
 }
 
 fn object(value: &Value, polygons: &mut Vec<Polygon>) -> Result<(), String> {

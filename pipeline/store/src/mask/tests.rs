@@ -207,6 +207,26 @@ fn rings() -> impl Strategy<Value = Polygon> {
     prop::collection::vec(prop::collection::vec(position, 3..9), 1..4)
 }
 
+/// Memory for reading a mask is known before: two numbers in a list of four for each position of a text, with the place of that list and the
+/// position itself, and at most three times as much; 16 bytes for each cell that a header states, or for each byte without one.
+#[test]
+fn val_memory_for_reading_is_known_before() {
+    let folder = tempfile::tempdir().unwrap();
+    let needed = |name: &str, text: &str| {
+        let path = folder.path().join(name);
+        fs::write(&path, text).unwrap();
+        reading_bytes(&path).unwrap()
+    };
+    let ring = |corners: usize| polygon_text(&format!("[{}[0,1]]", "[0,1],".repeat(corners - 1)));
+    let more = needed("large.geojson", &ring(3000)) - needed("small.geojson", &ring(1000));
+    let least = 2000 * (5 * size_of::<serde_json::Value>() as u64 + 16);
+    assert!((least..3 * least).contains(&more), "{more} {least}");
+    let grid = "ncols 4096\nnrows 2048\nxllcorner 0\nyllcorner 0\ncellsize 1\n1\n";
+    assert_eq!(needed("a.asc", grid), 16 * 4096 * 2048 + 2 * grid.len() as u64);
+    assert_eq!(needed("a.tif", &"damaged".repeat(100)), 18 * 700);
+    assert!(reading_bytes(&folder.path().join("none.tif")).is_err());
+}
+
 proptest! {
     #![proptest_config(ProptestConfig::with_cases(300))]
 

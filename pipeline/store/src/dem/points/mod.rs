@@ -59,6 +59,9 @@ const PLANNED_CELLS_PER_POINT: u64 = 4;
 /// Fewest cells for which memory is planned: a few points may need more than four each.
 const PLANNED_CELLS_MIN: u64 = 1 << 10;
 
+/// Memory of the search for a cell size, bytes.
+pub(super) const SEARCH_BYTES: u64 = 64 << 20;
+
 /// A gridded cloud.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Gridded {
