@@ -9,15 +9,18 @@
 //! * Lines that start with `#` and empty lines are skipped.
 //! * A missing sigma is 0: the point counts as exact. A missing coordinate is an error.
 //!
-//! Memory: the text and 32 bytes per point.
+//! Memory: the text and 32 bytes per point ([`reading_bytes`]).
 
 use crate::dem::{DemError, Refusal};
 use crate::transect::fields;
+use std::io;
 use std::path::Path;
 
 #[cfg(test)]
 mod tests;
 
+/// Most memory for each byte of a text, bytes: itself, and 32 for each point of at least 6, in a list allocated for up to twice as many.
+const BYTES_PER_BYTE: u64 = 12;
 /// Column names; the last column may be missing.
 const NAMES: [&str; 4] = ["x", "y", "z", "sigma"];
 
@@ -39,6 +42,14 @@ const NAMES: [&str; 4] = ["x", "y", "z", "sigma"];
 pub fn read(path: &Path) -> Result<Vec<[f64; 4]>, DemError> {
     let bytes = crate::file::read(path).map_err(|e| DemError::reading(path, e))?;
     parse(&bytes).map_err(|refusal| refusal.about(path))
+}
+
+/// Most memory that [`read`] needs, bytes, from the size of the file.
+///
+/// # Errors
+/// A file that cannot be opened.
+pub fn reading_bytes(path: &Path) -> io::Result<u64> {
+    Ok(BYTES_PER_BYTE * crate::file::open(path)?.metadata()?.len())
 }
 
 fn parse(bytes: &[u8]) -> Result<Vec<[f64; 4]>, Refusal> {

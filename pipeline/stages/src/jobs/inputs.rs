@@ -10,8 +10,8 @@ use crate::operations::inputs::{check_systems, kept, read};
 use crate::study::Entry;
 use sastrugi_numeric::Geometry;
 use sastrugi_schemas::study::TerrainItem;
-use sastrugi_store::atomic;
 use sastrugi_store::dem::{self, Crs, Format, ReadOptions};
+use sastrugi_store::{altimetry, atomic};
 use sastrugi_terrain::{Generator, Holds, Input, MAPS, NamedInput};
 use serde_json::Value;
 use std::collections::BTreeMap;
@@ -27,8 +27,8 @@ pub struct Source {
     file: String,
     /// Path in the release, for messages about a file.
     release_path: Option<String>,
-    /// Number of cells, if known before the run; otherwise 0.
-    cells: u64,
+    /// Approximate memory for reading it, bytes.
+    reading_bytes: u64,
     /// Shape and position of a raster, if known before the run.
     place: Option<Geometry>,
 }
@@ -70,9 +70,9 @@ impl Sources {
         params
     }
 
-    /// Total number of cells.
-    pub fn cells(&self) -> u64 {
-        self.0.iter().map(|s| s.cells).sum()
+    /// Approximate memory for reading them, bytes.
+    pub fn reading_bytes(&self) -> u64 {
+        self.0.iter().map(|s| s.reading_bytes).sum()
     }
 
     /// Shape and position of each input, if known before the run.
@@ -132,7 +132,7 @@ fn of_item(builder: &Builder<'_>, entry: &Entry<'_>, named: &NamedInput) -> Resu
         item: field.item.clone(),
         file,
         release_path: None,
-        cells: field.cells,
+        reading_bytes: 8 * field.cells,
         place: field.expected,
     };
     match named.holds {
@@ -174,7 +174,6 @@ fn of_file(
         return Err(entry.error("sweep", message).into());
     }
     let claimed = dem::claimed(&path, &ReadOptions::default()).filter(|_| named.holds != Holds::Points);
-    let cells = claimed.map_or(0, |claimed| claimed.cells);
     // Rasters in degrees are refused when the file is read.
     let place = claimed.filter(|claimed| !claimed.geographic).and_then(|claimed| claimed.geometry);
     let (copy, release_path) = match copies.get(&named.name) {
@@ -190,11 +189,46 @@ fn of_file(
             made
         }
     };
+    let reading_bytes = match named.holds {
+        Holds::Points => altimetry::reading_bytes(&path),
+        Holds::Heights | Holds::Values => dem::reading_bytes(&path),
+    };
+    let reading_bytes = reading_bytes.map_err(|e| BuildError::Input(format!("{}: {e}", path.display())))?;
     let key = entry.path_of_dotted(&named.key);
     let stated = InputPlace { key, release_path: release_path.clone() };
     if !builder.inputs.contains(&stated) {
         builder.inputs.push(stated);
     }
     let file = original::name(&release_path).to_owned();
-    Ok(Source { named, item: copy, file, release_path: Some(release_path), cells, place })
+    Ok(Source { named, item: copy, file, release_path: Some(release_path), reading_bytes, place })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::study::Study;
+
+    /// Files count as memory before the run: a raster by its header, or by its bytes if the header cannot be read; points by their bytes.
+    #[test]
+    fn val_files_count_as_memory() {
+        let folder = tempfile::tempdir().unwrap();
+        let write = |name: &str, text: &str| std::fs::write(folder.path().join(name), text).unwrap();
+        let large = "ncols 8192\nnrows 8192\nxllcorner 0\nyllcorner 0\ncellsize 1\n1\n";
+        write("large.asc", large);
+        write("damaged.tif", &"damaged".repeat(100));
+        write("laser.csv", "0 0 0\n1 0 0\n");
+        let text =
+            "[study]\nname = \"a\"\nseed = 1\ndate = \"2026-01-01\"\n[[terrain]]\nid = \"a\"\nkind = \"planetary\"\n";
+        let (study, errors) = Study::read(text, folder.path(), &["terrain"]).unwrap();
+        let entry = study.entries("terrain").unwrap().remove(0);
+        let (item, _): (TerrainItem, Value) = entry.read().unwrap();
+        let (mut builder, mut copies) = (Builder::new(&study, errors), Copies::new());
+        let mut needed = |name: &str, holds: Holds| {
+            let named = NamedInput { key: "potential".to_owned(), name: name.to_owned(), holds };
+            of_file(&mut builder, (&entry, &item), named, &mut copies).unwrap().reading_bytes
+        };
+        assert_eq!(needed("large.asc", Holds::Values), (16 << 26) + 2 * large.len() as u64);
+        assert_eq!(needed("damaged.tif", Holds::Values), 18 * 700);
+        assert_eq!(needed("laser.csv", Holds::Points), 12 * 12);
+    }
 }

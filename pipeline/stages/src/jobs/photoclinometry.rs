@@ -18,7 +18,7 @@ use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{GeoTiff, PhotoclinometryItem};
 use sastrugi_schemas::tables::{PhotoclinometryBandRow, PhotoclinometryRow};
-use sastrugi_store::{dem, digest};
+use sastrugi_store::{altimetry, dem, digest};
 use serde_json::{Value, json};
 use std::collections::BTreeSet;
 use std::sync::Arc;
@@ -63,6 +63,8 @@ struct PhotoclinometryJob {
 struct Altimetry {
     item: ItemRef,
     release_path: String,
+    /// Most memory for reading it, bytes.
+    reading_bytes: u64,
 }
 
 /// Adds the items of `[[photoclinometry]]`, and the fits to the surfaces they recover.
@@ -205,7 +207,10 @@ fn altimetry(
     let copy = Original::of(&format!("input/{id}"), &builder.study.folder, file)?;
     let release_path = copy.release_path().to_owned();
     let node = copy.node(INPUT_STAGE, &id);
-    let made = Altimetry { item: node.item.clone(), release_path: release_path.clone() };
+    let path = builder.study.folder.join(file);
+    let reading_bytes =
+        altimetry::reading_bytes(&path).map_err(|e| BuildError::Input(format!("{}: {e}", path.display())))?;
+    let made = Altimetry { item: node.item.clone(), release_path: release_path.clone(), reading_bytes };
     builder.node(node)?;
     builder.inputs.push(InputPlace { key: entry.path_of("altimetry"), release_path });
     Ok(Some(made))
@@ -249,7 +254,7 @@ impl PhotoclinometryJob {
 
     /// The measured points. Messages are part of the release, so they use the file's path in the release.
     fn points(&self, work: &Work<'_>) -> Result<Vec<HeightPoint>, JobError> {
-        let Some(Altimetry { item, release_path }) = &self.altimetry else { return Ok(Vec::new()) };
+        let Some(Altimetry { item, release_path, .. }) = &self.altimetry else { return Ok(Vec::new()) };
         let path = work.parent(item, original::name(release_path))?;
         read_points(&path).map_err(|e| e.reworded(|words| words.replace(&path.display().to_string(), release_path)))
     }
@@ -361,7 +366,8 @@ impl Job for PhotoclinometryJob {
 
     fn memory_bytes(&self) -> u64 {
         let map = self.cells * (BYTES_PER_CELL + BYTES_PER_SAMPLE * self.images.len() as u64);
-        (32 << 20) + map + BYTES_PER_TRUE_CELL * self.truth_cells
+        let points = self.altimetry.as_ref().map_or(0, |points| points.reading_bytes);
+        (32 << 20) + map + BYTES_PER_TRUE_CELL * self.truth_cells + points
     }
 
     fn estimate(&self) -> Estimate {

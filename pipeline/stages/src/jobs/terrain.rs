@@ -209,7 +209,7 @@ impl Job for TerrainJob {
     fn memory_bytes(&self) -> u64 {
         let cells = self.made.generator.geometry().len() as u64;
         let after = dem::writing_bytes(cells).max(self.made.exports.memory_bytes(cells));
-        self.made.generator.memory_bytes() + 8 * self.made.inputs.cells() + after
+        self.made.generator.memory_bytes() + self.made.inputs.reading_bytes() + after
     }
 
     fn estimate(&self) -> Estimate {
