@@ -4,7 +4,7 @@
 //!   is kept if its centre lies inside. A ring has at least 3 corners; the first may be repeated as the last.
 //! * A raster of any format that [`dem::read`] supports: a cell is kept if the mask cell under its centre holds a finite number
 //!   other than 0; cells beyond the mask are dropped. A raster without georeferencing (.npy, .png, plain TIFF) must have the
-//!   DEM's shape, and is applied cell by cell.
+//!   DEM's shape, and is applied cell by cell. A point cloud is gridded, to at most four cells per point ([`dem::read_as_claimed`]).
 
 mod polygons;
 
@@ -94,7 +94,7 @@ pub fn read_with(path: &Path, geometry: &Geometry, options: &MaskOptions) -> Res
         geojson::polygons::parse(&bytes).map(|found| polygons::inside(&found, geometry)).map_err(unusable)?
     } else {
         drop(bytes);
-        of_raster(&dem::read(path)?, geometry).map_err(unusable)?
+        of_raster(&dem::read_as_claimed(path)?, geometry).map_err(unusable)?
     };
     if options.invert {
         keep.iter_mut().for_each(|keep| *keep = !*keep);
@@ -129,7 +129,7 @@ pub fn read_obstacles(path: &Path, geometry: &Geometry) -> Result<Obstacles, Mas
         return geojson::polygons::parse(&bytes).map(Obstacles::Polygons).map_err(unusable);
     }
     drop(bytes);
-    of_raster(&dem::read(path)?, geometry).map(Obstacles::Cells).map_err(unusable)
+    of_raster(&dem::read_as_claimed(path)?, geometry).map(Obstacles::Cells).map_err(unusable)
 }
 
 /// Approximate memory that reading a mask or obstacles needs besides the cells of the grid, bytes: from the header of a raster, or by

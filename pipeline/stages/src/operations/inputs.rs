@@ -29,7 +29,7 @@ pub fn read(named: &NamedInput, path: &Path) -> Result<Loaded, JobError> {
 
 /// Reads heights.
 fn read_heights(path: &Path) -> Result<Loaded, JobError> {
-    let read = dem::read(path).map_err(input_error)?;
+    let read = dem::read_as_claimed(path).map_err(input_error)?;
     Ok(Loaded { input: read.grid.into(), crs: Some(read.info.crs) })
 }
 

@@ -111,7 +111,18 @@ pub fn read_gridded(path: &Path, options: &ReadOptions, settings: &GridSettings)
     checked(dem).map_err(|refusal| refusal.about(path))
 }
 
-/// Approximate memory that [`read`] needs, bytes, from the header and the size of the file.
+/// Reads a raster whose memory was planned by [`reading_bytes`]. As [`read`], but refuses a point cloud that covers more cells than were
+/// planned from its header ([`points`]).
+///
+/// # Errors
+/// As [`read`].
+pub fn read_as_claimed(path: &Path) -> Result<Dem, DemError> {
+    let options = ReadOptions::default();
+    let planned_cells = claimed(path, &options).map(|claimed| claimed.cells);
+    read_gridded(path, &options, &GridSettings { planned_cells, ..GridSettings::default() })
+}
+
+/// Approximate memory that [`read_as_claimed`] needs, bytes, from the header and the size of the file.
 ///
 /// # Errors
 /// A file that cannot be opened.

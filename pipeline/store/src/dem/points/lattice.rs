@@ -54,7 +54,7 @@ impl Lattice {
         }
         Err(Refusal::new(format!(
             "its {points} points lie in a box of {rows} x {cols} cells of {} m, more than the {planned} cells planned for them; set \
-             `cell_m`",
+             `cell_m` of its [[dem]], or convert it to a raster",
             shown(self.cell_m)
         )))
     }

@@ -323,7 +323,8 @@ fn val_cells_hold_the_points_that_numpy_finds() {
 }
 
 /// Points 50 mm apart in a strip across a box of 60 m, of which it fills a tenth: 1200 x 1200 cells for 141 540 points. Memory is planned for
-/// four cells per point, at least 1024. More are refused only where memory was planned and no cell size is given.
+/// four cells per point, at least 1024. More are refused only where memory was planned and no cell size is given: also of masks, obstacles and
+/// inputs of terrains, which have none.
 #[test]
 fn val_a_strip_across_its_box_takes_no_more_cells_than_planned() {
     let across = |i: i32| (i - 60).max(0)..=(i + 60).min(1199);
@@ -336,8 +337,16 @@ fn val_a_strip_across_its_box_takes_no_more_cells_than_planned() {
     let limited = |planned: u64| GridSettings { planned_cells: Some(planned), ..GridSettings::default() };
     let error = read(&path, &limited(planned)).unwrap_err();
     let words = "strip.las: its 141540 points lie in a box of 1200 x 1200 cells of 0.05 m, more than the 566160 cells planned for them; \
-                 set `cell_m`";
+                 set `cell_m` of its [[dem]], or convert it to a raster";
     assert!(error.unusable_input() && error.to_string().ends_with(words), "{error}");
+    let square = Geometry::square(60, 60, 1.0);
+    for refused in [
+        dem::read_as_claimed(&path).unwrap_err().to_string(),
+        crate::mask::read(&path, &square).unwrap_err().to_string(),
+        crate::mask::read_obstacles(&path, &square).unwrap_err().to_string(),
+    ] {
+        assert!(refused.ends_with(words), "{refused}");
+    }
     for settings in [GridSettings::default(), limited(1_440_000), GridSettings { cell_m: Some(0.5), ..limited(1) }] {
         assert!(read(&path, &settings).is_ok(), "{settings:?}");
     }
