@@ -536,7 +536,7 @@ pub struct RouteItem {
     /// Goal, `[x, y]` in the terrain's coordinates, m; default: drawn at random.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub goal: Option<[f64; 2]>,
-    /// Number of start-goal pairs to draw on each terrain; default 1. All route stages with the same rules draw the same pairs.
+    /// Number of start-goal pairs to draw on each terrain, 1 to 9999; default 1. All route stages with the same rules draw the same pairs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pairs: Option<u32>,
     /// Areas to avoid, as a file or list of files relative to the study file: GeoJSON polygons in the terrain's coordinates, or the
@@ -557,6 +557,11 @@ pub struct RouteItem {
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
 }
 
+impl RouteItem {
+    /// Maximum number of pairs on a terrain: the ids of their routes have four digits.
+    pub const PAIRS_MAX: u32 = 9999;
+}
+
 /// `[[navigate]]`: a team that follows planned routes in formation.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -565,7 +570,7 @@ pub struct NavigateItem {
     pub id: String,
     /// Id of the routes to follow.
     pub route: String,
-    /// Number of runs along each route, `<id>-0001-01`, `<id>-0001-02` ..., which differ in their random draws; default 1.
+    /// Number of runs along each route, 1 to 9999; default 1: `<id>-0001-01`, `<id>-0001-02` ..., which differ in their random draws.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub count: Option<u32>,
     /// Explicit seed instead of the study's.
@@ -574,6 +579,11 @@ pub struct NavigateItem {
     /// One stage per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+impl NavigateItem {
+    /// Maximum number of runs along a route, as many as of missions on a terrain.
+    pub const COUNT_MAX: u32 = 9999;
 }
 
 /// `[[rover]]`: rovers that find their own way with limited sensing.

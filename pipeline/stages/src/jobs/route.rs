@@ -180,8 +180,10 @@ fn pairs(entry: &Entry<'_>, envelope: &RouteItem, rules: PairParameters) -> Resu
             "`start` and `goal` cannot be combined with `pairs`, `distance_min_m` or `border_m`, which apply only to drawn pairs",
         )),
         (None, None) => match envelope.pairs.unwrap_or(1) {
-            0 => Err(entry.error("pairs", "`pairs` is 0; it must be 1 or more")),
-            count => Ok(Pairs::Drawn { rules, count: count as usize }),
+            count @ 1..=RouteItem::PAIRS_MAX => Ok(Pairs::Drawn { rules, count: count as usize }),
+            other => {
+                Err(entry.error("pairs", format!("`pairs` is {other}; it must be 1 to {}", RouteItem::PAIRS_MAX)))
+            }
         },
         (Some(_), None) => Err(entry.error("start", "`start` is given without `goal`; give both, or neither to draw them")),
         (None, Some(_)) => Err(entry.error("goal", "`goal` is given without `start`; give both, or neither to draw them")),

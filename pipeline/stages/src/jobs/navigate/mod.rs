@@ -87,21 +87,18 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         return Err(unknown_id(entry, "route", &envelope.route, builder.routes.keys()).into());
     };
     one_search(entry, &routes)?;
-    if envelope.count == Some(0) {
-        return Err(entry.error("count", "`count` is 0; it must be 1 or more").into());
+    let count = envelope.count.unwrap_or(1);
+    if !(1..=NavigateItem::COUNT_MAX).contains(&count) {
+        let message = format!("`count` is {count}; it must be 1 to {}", NavigateItem::COUNT_MAX);
+        return Err(entry.error("count", message).into());
     }
     for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
         entry.check_keys::<NavigateItem>(&one.params, &schema_of::<TeamParameters>())?;
         builder.claim(entry, STAGE, &one.id)?;
         let parameters: TeamParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
         parameters.check().map_err(|e| entry.refuse(e))?;
-        let lead = Arc::new(Lead {
-            id: one.id,
-            variant: one.sweep,
-            parameters,
-            count: envelope.count.unwrap_or(1),
-            head: builder.study.head.clone(),
-        });
+        let lead =
+            Arc::new(Lead { id: one.id, variant: one.sweep, parameters, count, head: builder.study.head.clone() });
         routes.iter().try_for_each(|routes| add_one(builder, &envelope, &lead, routes))?;
     }
     Ok(())
