@@ -44,6 +44,28 @@ fn val_studies_to_start_from_can_be_run() {
     assert!(std::fs::read_to_string(path.join("my-rover.toml")).unwrap().contains("sojourner_like"));
 }
 
+/// What is not a file is not a schema of the program either: it is not read, which could block for ever, and not replaced.
+#[cfg(unix)]
+#[test]
+fn val_pipes_and_folders_are_not_schemas() {
+    use std::os::unix::fs::FileTypeExt;
+    let folder = area();
+    let path = folder.path();
+    let refused = |folder: &str| {
+        let call = sastrugi_in(path, &["init", "-o", &format!("{folder}/study.toml")]);
+        let words = "study.schema.json is not a schema of this program; move it";
+        assert!(call.code == 2 && call.stderr.contains(words), "{folder}: {} {}", call.code, call.stderr);
+        assert!(!path.join(folder).join("study.toml").exists());
+    };
+    std::fs::create_dir_all(path.join("folder/study.schema.json")).unwrap();
+    refused("folder");
+    std::fs::create_dir(path.join("pipe")).unwrap();
+    let pipe = path.join("pipe/study.schema.json");
+    assert!(std::process::Command::new("mkfifo").arg(&pipe).status().unwrap().success());
+    refused("pipe");
+    assert!(std::fs::metadata(&pipe).unwrap().file_type().is_fifo());
+}
+
 /// The terrains of the first study have a relief that a vehicle would notice and could drive on.
 #[test]
 fn val_the_first_study_gives_plausible_terrains() {

@@ -7,8 +7,9 @@ use crate::output::print;
 use sastrugi_stages::Error;
 use sastrugi_stages::schema::{is_own, study_schema};
 use sastrugi_stages::starting::{SCHEMA, STARTING};
-use sastrugi_store::atomic;
+use sastrugi_store::{atomic, file};
 use serde_json::json;
+use std::io::ErrorKind;
 
 /// `init`.
 pub fn init(args: &Init, common: &Common) -> Verdict {
@@ -24,8 +25,14 @@ pub fn init(args: &Init, common: &Common) -> Verdict {
     if path.exists() {
         return Err(Failure::usage(format!("{} already exists; choose another name with -o", path.display())));
     }
-    // A schema of the program may be from an earlier version, and is replaced.
-    if std::fs::read(&schema).is_ok_and(|text| !is_own(&text)) {
+    // A schema of the program may be from an earlier version, and is replaced. Pipes and folders are not schemas.
+    let is_foreign = match file::read(&schema) {
+        Ok(text) => !is_own(&text),
+        Err(e) if e.kind() == ErrorKind::NotFound => false,
+        Err(e) if matches!(e.kind(), ErrorKind::InvalidInput | ErrorKind::IsADirectory) => true,
+        Err(e) => return Err(Error::at(&schema, e).into()),
+    };
+    if is_foreign {
         let message = "is not a schema of this program; move it, or write the study to another folder with -o";
         return Err(Failure::usage(format!("{} {message}", schema.display())));
     }

@@ -23,6 +23,7 @@ pub use features::{Feature, Kind, Shape, Values};
 pub use stats::Stats;
 
 use crate::atomic;
+use crate::file;
 use crate::parquet::{TableError, element};
 use crate::release::{ReleaseError, Staging, sync_tree};
 use arrow_array::{ArrayRef, Float64Array, Int64Array, StringArray};
@@ -141,7 +142,8 @@ pub fn check_folder(folder: &Path) -> Result<(), LerobotError> {
 }
 
 fn is_ours(folder: &Path) -> bool {
-    let info: Value = serde_json::from_slice(&fs::read(folder.join(INFO)).unwrap_or_default()).unwrap_or_default();
+    let info = file::read(&folder.join(INFO)).unwrap_or_default();
+    let info: Value = serde_json::from_slice(&info).unwrap_or_default();
     info["codebase_version"] == CODEBASE_VERSION && info[OWN].is_object()
 }
 

@@ -227,6 +227,18 @@ fn val_other_files_are_left_alone() {
     assert_eq!(fs::read(notes.join("a.txt")).unwrap(), b"kept");
 }
 
+/// A pipe in place of the description of a dataset is not read, which could block for ever.
+#[cfg(unix)]
+#[test]
+fn val_pipes_are_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let info = folder.path().join(INFO);
+    fs::create_dir_all(info.parent().unwrap()).unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(&info).status().unwrap().success());
+    let error = check_folder(folder.path()).unwrap_err();
+    assert!(matches!(error, LerobotError::Occupied { .. }), "{error}");
+}
+
 /// A writer that is dropped leaves nothing.
 #[test]
 fn val_an_unfinished_dataset_vanishes() {

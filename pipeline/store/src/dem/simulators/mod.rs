@@ -24,6 +24,7 @@ mod tests;
 use super::mesh::{self, Decimation, MeshLimits};
 use super::raster::{DemError, Refusal};
 use crate::atomic::{self, AtomicFile, Draft, FinishedFile};
+use crate::file;
 use parts::Parts;
 use posts::Posts;
 use sastrugi_numeric::{Geometry, Grid};
@@ -203,7 +204,7 @@ fn is_vacant(folder: &Path) -> io::Result<bool> {
 /// True for a folder whose `import.json` was written by any version of this program for this simulator.
 fn holds(folder: &Path, simulator: Simulator) -> bool {
     let name = |program: &str| program.split('/').next().map(str::to_owned);
-    let text = fs::read(folder.join(IMPORT)).unwrap_or_default();
+    let text = file::read(&folder.join(IMPORT)).unwrap_or_default();
     let found: Value = serde_json::from_slice(&text).unwrap_or_default();
     let program = found["program"].as_str().and_then(name);
     program == name(crate::PROGRAM) && found["target"] == simulator.name()

@@ -271,6 +271,16 @@ fn val_failed_exports_leave_the_earlier_one() {
     assert_eq!(fs::read_dir(&out).unwrap().count(), new.files.len() + 1);
 }
 
+/// A pipe in place of the description of an export is not read, which could block for ever.
+#[cfg(unix)]
+#[test]
+fn val_pipes_are_not_read() {
+    let folder = tempfile::tempdir().unwrap();
+    assert!(std::process::Command::new("mkfifo").arg(folder.path().join(IMPORT)).status().unwrap().success());
+    let refused = check_folder(folder.path(), Simulator::Isaac).unwrap_err().to_string();
+    assert!(refused.ends_with("the folder has files but no export for isaac; choose a new folder"), "{refused}");
+}
+
 /// A folder is reused only for the same simulator, and never if it has unrelated files.
 #[test]
 fn val_folders_with_other_files_are_refused() {
