@@ -130,7 +130,7 @@ fn release_path(place: &str, file: &str, extension: &str) -> String {
 
 /// The .prj file next to an ESRI ASCII grid, which states whether its coordinates are geographic.
 fn sidecar(path: &Path, extension: &str) -> Option<PathBuf> {
-    Some(path.with_extension("prj")).filter(|prj| extension == "asc" && prj.is_file())
+    Some(path.with_extension("prj")).filter(|prj| extension == "asc" && prj.exists())
 }
 
 impl Job for Original {
@@ -234,5 +234,10 @@ mod tests {
         let bare = inputs("c.asc");
         std::fs::write(folder.path().join("c.prj"), b"geographic").unwrap();
         assert_eq!((bare.len(), inputs("c.asc").len()), (1, 2));
+        // What is not a file is refused, rather than left out.
+        std::fs::write(folder.path().join("d.asc"), b"x").unwrap();
+        std::fs::create_dir(folder.path().join("d.prj")).unwrap();
+        let refused = Original::of("dem/site", folder.path(), "d.asc").err().unwrap().to_string();
+        assert!(refused.ends_with("d.prj is a folder, not a file"), "{refused}");
     }
 }

@@ -6,6 +6,7 @@ use super::crs::Crs;
 use super::raster::{Claimed, Dem, DemInfo, Format, NO_DATA, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
 use std::fmt::Write;
+use std::io::ErrorKind;
 use std::iter::Peekable;
 use std::path::Path;
 
@@ -15,6 +16,19 @@ const ARC_SECONDS: [f64; 10] = [1.0 / 9.0, 1.0 / 3.0, 1.0, 2.0, 3.0, 5.0, 6.0, 1
 
 /// Bytes of a file that are searched for its header.
 const HEADER_BYTES_MAX: u64 = 1 << 12;
+
+/// Bytes of a `.prj` file that are read.
+const PRJ_BYTES_MAX: u64 = 1 << 16;
+
+/// Beginnings of systems in well-known text, and whether they are in degrees. Those of a plane without a place on the globe count as projected.
+const SYSTEMS: [(&str, bool); 6] = [
+    ("PROJ", false),
+    ("LOCAL_CS", false),
+    ("ENGCRS", false),
+    ("ENGINEERINGCRS", false),
+    ("GEOG", true),
+    ("GEOD", true),
+];
 
 /// True for the text of an ESRI ASCII grid: its first word is a header key.
 pub(crate) fn looks_like(bytes: &[u8]) -> bool {
@@ -139,7 +153,7 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
         return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
     }
     let (values, integers) = read_values(words, cells, header.nodata)?;
-    let (crs, notes) = crs_of(path, &geometry);
+    let (crs, notes) = crs_of(path, &geometry)?;
     let dtype = if integers { "int32" } else { "float32" };
     let info = DemInfo {
         format: Format::EsriAscii,
@@ -162,13 +176,23 @@ pub(super) fn claimed(path: &Path) -> Option<Claimed> {
     // If nothing follows the header, the bytes read may end in the middle of a number.
     words.peek()?;
     let geometry = header.geometry().ok()?;
-    Some(Claimed::raster(geometry, crs_of(path, &geometry).0.geographic))
+    Some(Claimed::raster(geometry, crs_of(path, &geometry).ok()?.0.geographic))
 }
 
-/// The system of a grid: that of its `.prj` file, or a guess.
-fn crs_of(path: &Path, geometry: &Geometry) -> (Crs, Vec<String>) {
-    let projection = crate::file::read_text(&path.with_extension("prj")).ok();
-    projection.as_deref().and_then(named_crs).unwrap_or_else(|| guess_crs(geometry))
+/// The system of a grid: that of its `.prj` file, or a guess without one.
+fn crs_of(path: &Path, geometry: &Geometry) -> Result<(Crs, Vec<String>), Refusal> {
+    let prj = path.with_extension("prj");
+    let refused = |why: &str| {
+        let name = prj.file_name().unwrap_or_default().to_string_lossy();
+        Refusal::new(format!("the file {name} beside it {why}; correct it, or remove it if the grid is in metres"))
+    };
+    match crate::file::head(&prj, PRJ_BYTES_MAX) {
+        Ok(text) => named_crs(&String::from_utf8_lossy(&text))
+            .map(|crs| (crs, vec![]))
+            .ok_or_else(|| refused("states neither a projected nor a geographic coordinate system")),
+        Err(e) if e.kind() == ErrorKind::NotFound => Ok(guess_crs(geometry)),
+        Err(e) => Err(refused(&format!("cannot be read ({e})"))),
+    }
 }
 
 fn read_values<'a>(
@@ -192,15 +216,27 @@ fn read_values<'a>(
     Ok((values, integers))
 }
 
-/// Kind and name of the system in a `.prj` file (well-known text).
-fn named_crs(text: &str) -> Option<(Crs, Vec<String>)> {
-    let name = text.split('"').nth(1)?.to_owned();
-    let crs = match text.trim_start().get(..4)?.to_ascii_uppercase().as_str() {
-        "GEOG" => Crs { name, ..Crs::wgs84() },
-        "PROJ" => Crs { name, ..Crs::default() },
-        _ => return None,
+/// Kind and name of the system in a `.prj` file: well-known text, or the older form that begins with a line such as `Projection UTM`.
+fn named_crs(text: &str) -> Option<Crs> {
+    let text = text.trim_start_matches('\u{feff}');
+    let of_kind = |name: &str, geographic: bool| {
+        let crs = if geographic { Crs::wgs84() } else { Crs::default() };
+        Crs { name: name.to_owned(), ..crs }
     };
-    Some((crs, vec![]))
+    let mut words = text.split_whitespace();
+    if words.next()?.eq_ignore_ascii_case("projection") {
+        return words.next().map(|name| of_kind(name, name.eq_ignore_ascii_case("geographic")));
+    }
+    let parts: Vec<&str> = text.split('"').collect();
+    let outside: String = parts.iter().step_by(2).map(|part| part.to_ascii_uppercase()).collect();
+    let count = |brackets: [char; 2]| outside.matches(brackets).count();
+    // A truncated text.
+    if parts.len() < 3 || parts.len().is_multiple_of(2) || count(['[', '(']) != count([']', ')']) {
+        return None;
+    }
+    // A projected system contains a geographic one.
+    let found = SYSTEMS.iter().filter_map(|(word, geographic)| Some((outside.find(word)?, *geographic)));
+    found.min().map(|(_, geographic)| of_kind(parts[1], geographic))
 }
 
 /// The format has no reference system; coordinates on the globe with a common arc-second spacing are treated as degrees.

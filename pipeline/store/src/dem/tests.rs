@@ -145,6 +145,45 @@ fn val_degrees_are_recognised_in_ascii_grids() {
     assert!(of(-105.55, 0.5));
 }
 
+/// A `.prj` file states the kind of system in either form of well-known text, also within a compound system, or in the older form. One that
+/// states none, is truncated or cannot be read is refused: a guess could take degrees for metres.
+#[test]
+fn val_prj_files_state_a_system_or_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.asc");
+    let prj = path.with_extension("prj");
+    std::fs::write(&path, "ncols 2\nnrows 1\nxllcorner 7\nyllcorner 40\ncellsize 0.5\n1 2\n").unwrap();
+    let of = |text: &[u8]| {
+        std::fs::write(&prj, text).unwrap();
+        read(&path).map(|dem| (dem.info.crs.geographic, dem.info.crs.name)).map_err(|e| e.to_string())
+    };
+    for (text, geographic, name) in [
+        (&b"\xef\xbb\xbfPROJCS[\"R\xe9seau\",GEOGCS[\"RGF93\"]]"[..], false, "R\u{fffd}seau"),
+        (b"projcrs(\"plane\", basegeogcrs(\"globe\"))", false, "plane"),
+        (b"GEODCRS[\"globe\",CS[ellipsoidal,2]]\n", true, "globe"),
+        (b"COMPD_CS[\"PROJ of both\",GEOGCS[\"globe\"],VERT_CS[\"height\"]]", true, "PROJ of both"),
+        (b"LOCAL_CS[\"site\",UNIT[\"metre\",1]]", false, "site"),
+        (b"Projection    GEOGRAPHIC\r\nDatum WGS84\r\n", true, "GEOGRAPHIC"),
+        (b"PROJECTION UTM\nZone 32\n", false, "UTM"),
+    ] {
+        assert_eq!(of(text), Ok((geographic, name.to_owned())), "{}", String::from_utf8_lossy(text));
+    }
+    for text in
+        [&b""[..], b"\x00\xff", b"Projection", b"PROJCS[\"plane", b"GEOGCS[\"globe\",DATUM[", b"VERT_CS[\"height\"]"]
+    {
+        let refused = of(text).unwrap_err();
+        let words = "a.asc: the file a.prj beside it states neither a projected nor a geographic coordinate system; correct it, or remove \
+                     it if the grid is in metres";
+        assert!(refused.ends_with(words), "{refused}");
+        assert_eq!(claimed(&path, &ReadOptions::default()), None);
+    }
+    std::fs::remove_file(&prj).unwrap();
+    std::fs::create_dir(&prj).unwrap();
+    let error = read(&path).unwrap_err();
+    let words = "the file a.prj beside it cannot be read (is a folder, not a file)";
+    assert!(error.unusable_input() && error.to_string().contains(words), "{error}");
+}
+
 /// A tile holds big-endian posts from the north-west; the post of the south-west corner is on the whole degree that the name gives.
 #[test]
 fn val_a_tile_starts_in_the_north_west() {
