@@ -168,6 +168,42 @@ fn val_all_errors_of_a_table_are_told_at_once() {
     told("[[missions]]", &both, &["`fit` names \"other\"", "in tables with errors: f"]);
 }
 
+/// What a refused table would have defined is missed by all tables that depend on it. That is not told, but their own errors are, in the same call.
+#[test]
+fn val_errors_behind_a_refused_table_are_told_at_once() {
+    let folder = area();
+    let text = "[study]\nname = \"wrong\"\nseed = 1\ndate = \"2026-01-01\"\n\n\
+        [[terrain]]\nid = \"t\"\nkind = \"gap\"\ncell_m = -1.0\n\n\
+        [[fit]]\nid = \"f\"\ndem = \"t\"\nouter_scale_m = -1.0\n\n\
+        [[texture]]\nid = \"x\"\nfit = \"f\"\nsize_m = [5.0, 5.0]\ncell_m = 0.1\namplitude = -1.0\n\n\
+        [[image]]\nid = \"i\"\nsurface = \"t\"\nsamples = 0\n\n\
+        [[photoclinometry]]\nid = \"p\"\nimages = [\"i\"]\nrounds = 99\n\n\
+        [[missions]]\nid = \"m\"\nterrains = [\"t\"]\nlength_m = -1.0\n\n\
+        [[missions]]\nid = \"w\"\nkind = \"routed\"\nof = \"m\"\nvehicle = \"tank\"\n\n\
+        [[traverse]]\nid = \"d\"\nmissions = \"m\"\nspeed_m_s = -1.0\n\n\
+        [[route]]\nid = \"r\"\nterrains = [\"t\"]\npairs = 0\n\n\
+        [[navigate]]\nid = \"n\"\nroute = \"r\"\ncount = 0\n\n\
+        [[rover]]\nid = \"v\"\nkind = \"sojourner_like\"\nterrains = [\"t\"]\nrovers = 0\n";
+    write(folder.path(), "study.toml", text);
+    let call = sastrugi_in(folder.path(), &["plan", "study.toml"]);
+    assert!(call.code == 2 && call.stderr.contains("invalid study: 11 errors"), "{} {}", call.code, call.stderr);
+    for key in [
+        "cell_m",
+        "outer_scale_m",
+        "amplitude",
+        "samples",
+        "rounds",
+        "length_m",
+        "speed_m_s",
+        "pairs",
+        "count",
+        "rovers",
+    ] {
+        assert!(call.stderr.contains(&format!("`{key}`")), "`{key}` is not in: {}", call.stderr);
+    }
+    assert!(call.stderr.contains("tank") && !call.stderr.contains("names \""), "{}", call.stderr);
+}
+
 /// A claim that so few terrains cannot support, and a vehicle that cannot be meant, are told before the run.
 #[test]
 fn val_doubts_are_told_before_the_run() {

@@ -15,7 +15,7 @@ use crate::operations::place::{PLACE, Place};
 use crate::operations::{coregistration, masks};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use crate::study::Entry;
+use crate::study::{Entry, Expanded, StudyError};
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::coregistration::Minus;
@@ -203,26 +203,19 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
         return Ok(());
     }
     entry.check_keys::<FitItem>(&params, &schema_of::<FitParameters>())?;
+    check_noise_reference(item.noise_reference.is_some(), item.minus.is_some()).map_err(|e| entry.refuse(e))?;
+    let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
+    let settings = expanded.iter().map(|one| settings_of(entry, &item, one)).collect::<Result<Vec<_>, _>>()?;
     let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
         return Err(unknown_id(entry, "dem", &item.dem, builder.heightfields.keys()).into());
     };
-    check_noise_reference(item.noise_reference.is_some(), item.minus.is_some()).map_err(|e| entry.refuse(e))?;
-    let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
     expanded.iter().try_for_each(|one| builder.claim(entry, STAGE, &one.id))?;
     let masks = mask::add(builder, entry, &item)?;
     let noise_reference = mask::add_noise_reference(builder, entry, &item)?;
     let mask_sources = masks.iter().map(|m| m.source.clone()).collect();
     let source = Source { masks: mask_sources, ..builder.source_of(&item.dem, &field) };
     let minus = item.minus.as_ref().map(|id| Subtrahend::of(builder, entry, id)).transpose()?;
-    for one in expanded {
-        let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
-        let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
-        if noise_reference.is_some() {
-            // The noise itself is known only when the reference is read; whether the settings accept one can be checked now.
-            settings
-                .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
-                .map_err(|e| entry.refuse(e))?;
-        }
+    for (one, settings) in expanded.into_iter().zip(settings) {
         builder
             .prospects
             .insert(one.id.clone(), settings.prospect(field.expected.map(|place| place.cell), field.cells));
@@ -258,6 +251,19 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
         builder.fits.push(one.id);
     }
     Ok(())
+}
+
+/// The settings of a fit.
+fn settings_of(entry: &Entry<'_>, item: &FitItem, one: &Expanded) -> Result<FitSettings, StudyError> {
+    let raw: FitParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+    let settings = FitSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
+    if item.noise_reference.is_some() {
+        // The noise itself is known only when the reference is read; whether the settings accept one can be checked now.
+        settings
+            .with_noise(&Noise { white_sigma_m: f64::MIN_POSITIVE, ..Noise::default() })
+            .map_err(|e| entry.refuse(e))?;
+    }
+    Ok(settings)
 }
 
 impl Job for FitJob {

@@ -7,8 +7,8 @@ use crate::operations::dem::input_error;
 use crate::operations::images::{self, Files, Ground, Made};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use crate::study::Entry;
-use crate::study::entry::{Expanded, joined};
+use crate::study::entry::joined;
+use crate::study::{Entry, Expanded, StudyError};
 use sastrugi_imaging::RenderParameters;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::Kind;
@@ -62,24 +62,30 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let (envelope, params): (ImageItem, Value) = entry.read()?;
     entry.check_keys::<ImageItem>(&params, &schema_of::<RenderParameters>())?;
-    let surfaces = builder.family(entry, "surface", &envelope.surface)?;
     let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
-    for (k, one) in expanded.iter().enumerate() {
-        let parameters: RenderParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
-        parameters.check().map_err(|e| entry.refuse(e))?;
+    let rendered = expanded.iter().map(|one| parameters_of(entry, one)).collect::<Result<Vec<_>, _>>()?;
+    let surfaces = builder.family(entry, "surface", &envelope.surface)?;
+    for (k, (one, parameters)) in expanded.iter().zip(&rendered).enumerate() {
         for (j, surface) in surfaces.iter().enumerate() {
             let id = if surfaces.len() == 1 { one.id.clone() } else { format!("{}-{surface}", one.id) };
             builder.claim(entry, STAGE, &id)?;
             // Every image has its own noise, even within one sweep and with an explicit seed.
             let number = (k * surfaces.len() + j) as u64;
             let streams = builder.streams(STAGE, &id, envelope.seed, number);
-            let pixels = pixels(builder.surface(entry, "surface", surface)?, &parameters) as u64;
+            let pixels = pixels(builder.surface(entry, "surface", surface)?, parameters) as u64;
             let image =
                 Image { item: ItemRef::new(STAGE, &id), id, pixels, surface: surface.clone(), sun: parameters.sun };
             add_one(builder, entry, &envelope, one, (image, parameters.clone(), streams))?;
         }
     }
     Ok(())
+}
+
+/// The parameters of an image.
+fn parameters_of(entry: &Entry<'_>, one: &Expanded) -> Result<RenderParameters, StudyError> {
+    let parameters: RenderParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+    parameters.check().map_err(|e| entry.refuse(e))?;
+    Ok(parameters)
 }
 
 fn add_one(

@@ -10,8 +10,8 @@ use crate::operations::dem::input_error;
 use crate::operations::photoclinometry::{self, Beside, Made, Map, read_description, read_image, read_points, refusal};
 use crate::revision::Room;
 use crate::runner::graph::Node;
-use crate::study::Entry;
-use crate::study::entry::{Expanded, joined};
+use crate::study::entry::joined;
+use crate::study::{Entry, Expanded, StudyError};
 use sastrugi_imaging::photoclinometry::{Coarse, HeightPoint, Settings, check_lights};
 use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::Kind;
@@ -79,16 +79,15 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let (item, params): (PhotoclinometryItem, Value) = entry.read()?;
     entry.check_keys::<PhotoclinometryItem>(&params, &schema_of::<Settings>())?;
+    let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
+    let inverted = expanded.iter().map(|one| settings_of(entry, one)).collect::<Result<Vec<_>, _>>()?;
     let by_surface = images_by_surface(builder, entry, &item)?;
     let coarse = coarse(builder, entry, &item)?;
     let altimetry = altimetry(builder, entry, &item)?;
-    let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
     let mut ids = Vec::new();
-    for (k, one) in expanded.iter().enumerate() {
-        let settings: Settings = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
-        settings.check().map_err(|e| entry.refuse(e))?;
+    for (k, (one, settings)) in expanded.iter().zip(&inverted).enumerate() {
         for (j, (surface, images)) in by_surface.iter().enumerate() {
-            check_suns(entry, images, &settings)?;
+            check_suns(entry, images, settings)?;
             let id = if by_surface.len() == 1 { one.id.clone() } else { format!("{}-{surface}", one.id) };
             builder.claim(entry, STAGE, &id)?;
             let number = (k * by_surface.len() + j) as u64;
@@ -103,7 +102,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 images: images.clone(),
                 coarse: coarse.clone(),
                 altimetry: altimetry.clone(),
-                cells: cells(&field, &settings, images),
+                cells: cells(&field, settings, images),
                 truth_cells: field.cells,
                 settings: settings.clone(),
                 streams,
@@ -115,6 +114,13 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     }
     builder.name_family(entry, &item.id, ids)?;
     Ok(())
+}
+
+/// The settings of an inversion.
+fn settings_of(entry: &Entry<'_>, one: &Expanded) -> Result<Settings, StudyError> {
+    let settings: Settings = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+    settings.check().map_err(|e| entry.refuse(e))?;
+    Ok(settings)
 }
 
 /// Adds a surface to the graph and to the heightfields.

@@ -11,7 +11,7 @@ use crate::operations::routes::{self, Given, Outcome as Found, Site};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
-use crate::study::{Entry, StudyError, keys};
+use crate::study::{Entry, Expanded, StudyError, keys};
 use sastrugi_mobility::registry;
 use sastrugi_mobility::vehicle::Vehicle;
 use sastrugi_navigation::SlopeCost;
@@ -120,22 +120,18 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let (envelope, params): (RouteItem, Value) = entry.read()?;
     entry.check_keys::<RouteItem>(&params, &schema())?;
+    let vehicle = envelope.vehicle.as_deref().map(|name| registry::vehicle(name, &Map::new()));
+    let vehicle = vehicle.transpose().map_err(|e| entry.refuse(e))?;
+    let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
+    let searches = expanded.iter().map(|one| parameters_of(entry, &envelope, one)).collect::<Result<Vec<_>, _>>()?;
     let terrains = terrains(builder, entry, &envelope.terrains)?;
     let cost_raster = envelope.cost_raster.as_deref().map(|id| builder.surface(entry, "cost_raster", id));
     let cost_raster = cost_raster.transpose()?.map(|field| (field.item.clone(), field.cells));
     let (cost_raster, cost_cells) = cost_raster.map_or((None, 0), |(item, cells)| (Some(item), cells));
-    let vehicle = envelope.vehicle.as_deref().map(|name| registry::vehicle(name, &Map::new()));
-    let vehicle = vehicle.transpose().map_err(|e| entry.refuse(e))?;
     let obstacles = mask::add_obstacles(builder, entry, &envelope)?;
     let mut family = Vec::new();
-    for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
-        entry.check_keys::<RouteItem>(&one.params, &schema())?;
+    for (one, (parameters, pairs)) in expanded.into_iter().zip(searches) {
         builder.claim(entry, STAGE, &one.id)?;
-        let (parameters, rules): (RouteParameters, PairParameters) =
-            keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
-        parameters.check().map_err(|e| entry.refuse(e))?;
-        let given = parameters.check_given(vehicle.is_some(), cost_raster.is_some());
-        given.map_err(|e| entry.refuse(e))?;
         let search = RouteSearch {
             id: one.id.clone(),
             variant: one.sweep,
@@ -144,7 +140,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             obstacles: obstacles.clone(),
             cost_raster: cost_raster.clone(),
             cost_cells,
-            pairs: pairs(entry, &envelope, rules)?,
+            pairs,
             roughness: builder.study.roughness.clone(),
         };
         let routes = add_search(builder, &envelope, Arc::new(search), &terrains)?;
@@ -153,6 +149,21 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     }
     builder.routes.insert(envelope.id, family);
     Ok(())
+}
+
+/// The parameters of a search, with its starts and goals.
+fn parameters_of(
+    entry: &Entry<'_>,
+    envelope: &RouteItem,
+    one: &Expanded,
+) -> Result<(RouteParameters, Pairs), BuildError> {
+    entry.check_keys::<RouteItem>(&one.params, &schema())?;
+    let (parameters, rules): (RouteParameters, PairParameters) =
+        keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
+    parameters.check().map_err(|e| entry.refuse(e))?;
+    let given = parameters.check_given(envelope.vehicle.is_some(), envelope.cost_raster.is_some());
+    given.map_err(|e| entry.refuse(e))?;
+    Ok((parameters, pairs(entry, envelope, rules)?))
 }
 
 /// Ids of the terrains that a key `terrains` names.

@@ -8,7 +8,7 @@ use crate::operations::rovers::{self, Grounds, Oracle};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
-use crate::study::{Entry, StudyError, keys};
+use crate::study::{Entry, Expanded, StudyError, keys};
 use rayon::prelude::*;
 use sastrugi_mobility::rover::{
     Navigator, PlannerEyes, PlannerMap, PlannerParameters, PlannerSensor, Recorder, RoverParameters,
@@ -207,14 +207,18 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         Ok(entry.check_keys::<RoverItem>(params, &schema)?)
     };
     check_keys(&params)?;
-    let terrains = terrains(builder, entry, &envelope.terrains)?;
     let sample_m = envelope.sample_m.unwrap_or(SAMPLE_M);
     let record = envelope.record.unwrap_or(RECORD) as usize;
     ParameterError::not_negative("sample_m", sample_m).map_err(|e| entry.refuse(e))?;
-    for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
+    let prepared = |one: &Expanded| -> Result<_, BuildError> {
         check_keys(&one.params)?;
+        Ok(prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?)
+    };
+    let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
+    let trials = expanded.iter().map(prepared).collect::<Result<Vec<_>, _>>()?;
+    let terrains = terrains(builder, entry, &envelope.terrains)?;
+    for (one, (navigator, parameters)) in expanded.into_iter().zip(trials) {
         builder.claim(entry, STAGE, &one.id)?;
-        let (navigator, parameters) = prepare(&envelope.kind, &one.params).map_err(|e| entry.refuse(e))?;
         rover_designs::add(builder, entry, &envelope, &one, &terrains)?;
         let (id, variant, head) = (one.id, one.sweep, builder.study.head.clone());
         let trial = Arc::new(Trial { id, variant, navigator, parameters, sample_m, record, head });

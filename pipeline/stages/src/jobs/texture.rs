@@ -136,16 +136,18 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let kinds = kinds();
     let (item, params): (TextureItem, Value) = entry.read()?;
-    let matched = matched(builder, entry, &item)?;
-    let prospect = matched.parent().and_then(|fit| builder.prospects.get(&fit.id)).copied();
-    let methods = methods(entry, &item, &kinds, prospect.is_some_and(|fit| fit.has_statistics))?;
+    let matched = matched(builder, entry, &item);
+    let fit = matched.as_ref().ok().and_then(Matched::parent);
+    let prospect = fit.and_then(|fit| builder.prospects.get(&fit.id)).copied();
+    let methods = methods(entry, &item, &kinds, matched.is_err() || prospect.is_some_and(|fit| fit.has_statistics))?;
     if item.methods.is_none() {
         sastrugi_texture::check_keys(&item.method, &params).map_err(|e| entry.refuse(e))?;
     }
     entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
+    check_purpose(entry, &item, &params)?;
+    let matched = matched?;
     let site = matched.parent().and_then(|fit| builder.sites.get(&fit.id)).cloned();
     let exemplar_of = |method: &str| site.clone().filter(|_| needs(method) == Some(Needs::Residual));
-    check_purpose(entry, &item, &params)?;
     let base = item.onto.as_ref().map(|onto| Base::of(builder, entry, onto, &matched)).transpose()?;
     let fill = item.fill.as_deref().map(|id| builder.surface(entry, "fill", id).cloned()).transpose()?;
     let modulation = modulation(builder, entry, &item)?;

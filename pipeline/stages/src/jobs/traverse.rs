@@ -11,7 +11,7 @@ use crate::operations::drawn::Lines;
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
-use crate::study::{Entry, StudyError, keys};
+use crate::study::{Entry, Expanded, StudyError, keys};
 use rayon::prelude::*;
 use sastrugi_mobility::metrics::{Differentiator, MissionLabels, mission_row, replicate_row, sample_rows};
 use sastrugi_mobility::missions::{Difficulty, Mission, ReplicateParameters, ReplicateSettings};
@@ -127,6 +127,8 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let (envelope, params): (TraverseItem, Value) = entry.read()?;
     entry.check_keys::<TraverseItem>(&params, &schema())?;
+    let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
+    let prepared = expanded.iter().map(|one| Prepared::of(entry, one)).collect::<Result<Vec<_>, _>>()?;
     let Some(drawn) = builder.missions.get(&envelope.missions).cloned() else {
         return Err(unknown_id(entry, "missions", &envelope.missions, builder.missions.keys()).into());
     };
@@ -134,12 +136,8 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         raster(builder, entry, "wheel_friction_raster", envelope.wheel_friction_raster.as_deref())?,
         raster(builder, entry, "rolling_resistance_raster", envelope.rolling_resistance_raster.as_deref())?,
     ];
-    for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
-        entry.check_keys::<TraverseItem>(&one.params, &schema())?;
+    for (one, Prepared { raw, starts, vehicle, settings }) in expanded.into_iter().zip(prepared) {
         builder.claim(entry, STAGE, &one.id)?;
-        let (raw, starts): (TraverseParameters, ReplicateParameters) =
-            keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
-        let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
         let doubts = registry::doubts(&raw.vehicle, &raw.vehicle_changes);
         for doubt in doubts.into_iter().map(|doubt| format!("traverse \"{}\": {doubt}", envelope.id)) {
             // The values of a sweep share one vehicle, so each doubt is listed once.
@@ -172,6 +170,24 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         drawn.lines.iter().try_for_each(|lines| add_one(builder, entry, &envelope.id, &drive, lines))?;
     }
     Ok(())
+}
+
+/// The parameters of a run, checked as far as they do not depend on its missions.
+struct Prepared {
+    raw: TraverseParameters,
+    starts: ReplicateParameters,
+    vehicle: Vehicle,
+    settings: TraverseSettings,
+}
+
+impl Prepared {
+    fn of(entry: &Entry<'_>, one: &Expanded) -> Result<Self, BuildError> {
+        entry.check_keys::<TraverseItem>(&one.params, &schema())?;
+        let (raw, starts): (TraverseParameters, ReplicateParameters) =
+            keys::read_both(&one.params).map_err(|e| entry.refuse(e))?;
+        let (vehicle, settings) = raw.prepare().map_err(|e| entry.refuse(e))?;
+        Ok(Self { raw, starts, vehicle, settings })
+    }
 }
 
 /// The item that produces a raster of the surface.

@@ -93,14 +93,14 @@ pub fn add(
     }
     entry.check_keys::<MissionsItem>(params, &schema_of::<RoutedParameters>())?;
     let raw: RoutedParameters = read_parameters(params).map_err(|e| entry.refuse(e))?;
-    let Some(straight) = builder.missions.get(of).cloned() else {
-        return Err(unknown_id(entry, "of", of, builder.missions.keys()).into());
-    };
     raw.route.check().map_err(|e| entry.refuse(e.within("route")))?;
     let vehicle = raw.vehicle.as_deref().map(|name| registry::vehicle(name, &Map::new())).transpose();
     let vehicle = vehicle.map_err(|e| entry.refuse(e))?;
     let given = raw.route.check_given(vehicle.is_some(), false);
     given.map_err(|e| entry.refuse(e.within("route")))?;
+    let Some(straight) = builder.missions.get(of).cloned() else {
+        return Err(unknown_id(entry, "of", of, builder.missions.keys()).into());
+    };
     let plan = Plan { parameters: raw.route.clone(), vehicle, roughness: builder.study.roughness.clone() };
     let plan = Arc::new(plan);
     let (mut all, mut rules) = (Vec::new(), None);

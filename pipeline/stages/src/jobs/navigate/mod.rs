@@ -12,7 +12,7 @@ use crate::operations::routes::distances_m;
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
-use crate::study::{Entry, StudyError};
+use crate::study::{Entry, Expanded, StudyError};
 use rayon::prelude::*;
 use recorded::{Recorder, recording};
 use sastrugi_navigation::formation::draws::draw;
@@ -83,25 +83,32 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
     let (envelope, params): (NavigateItem, Value) = entry.read()?;
     entry.check_keys::<NavigateItem>(&params, &schema_of::<TeamParameters>())?;
-    let Some(routes) = builder.routes.get(&envelope.route).cloned() else {
-        return Err(unknown_id(entry, "route", &envelope.route, builder.routes.keys()).into());
-    };
-    one_search(entry, &routes)?;
     let count = envelope.count.unwrap_or(1);
     if !(1..=NavigateItem::COUNT_MAX).contains(&count) {
         let message = format!("`count` is {count}; it must be 1 to {}", NavigateItem::COUNT_MAX);
         return Err(entry.error("count", message).into());
     }
-    for one in entry.expand(&envelope.id, None, &envelope.sweep, &params)? {
-        entry.check_keys::<NavigateItem>(&one.params, &schema_of::<TeamParameters>())?;
+    let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
+    let teams = expanded.iter().map(|one| parameters_of(entry, one)).collect::<Result<Vec<_>, _>>()?;
+    let Some(routes) = builder.routes.get(&envelope.route).cloned() else {
+        return Err(unknown_id(entry, "route", &envelope.route, builder.routes.keys()).into());
+    };
+    one_search(entry, &routes)?;
+    for (one, parameters) in expanded.into_iter().zip(teams) {
         builder.claim(entry, STAGE, &one.id)?;
-        let parameters: TeamParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
-        parameters.check().map_err(|e| entry.refuse(e))?;
         let lead =
             Arc::new(Lead { id: one.id, variant: one.sweep, parameters, count, head: builder.study.head.clone() });
         routes.iter().try_for_each(|routes| add_one(builder, &envelope, &lead, routes))?;
     }
     Ok(())
+}
+
+/// The parameters of a team.
+fn parameters_of(entry: &Entry<'_>, one: &Expanded) -> Result<TeamParameters, BuildError> {
+    entry.check_keys::<NavigateItem>(&one.params, &schema_of::<TeamParameters>())?;
+    let parameters: TeamParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
+    parameters.check().map_err(|e| entry.refuse(e))?;
+    Ok(parameters)
 }
 
 /// Refuses the id of a swept route, which refers to several searches.
