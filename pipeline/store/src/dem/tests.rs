@@ -50,51 +50,6 @@ fn val_shipped_dems_read_as_rasterio_reads_them() {
     }
 }
 
-/// The same of measured DEMs of many other formats, types, compressions and no-data values, which do not ship with the product; and
-/// row by row.
-#[test]
-#[ignore = "needs ../shared/data: ./test --full"]
-fn val_measured_dems_read_as_rasterio_reads_them() {
-    type Row = (&'static str, usize, usize, &'static str, usize, [f64; 2], &'static str);
-    #[rustfmt::skip]
-    let table: [Row; 11] = [
-        ("N44W072.hgt", 1201, 1201, "int16", 1442401, [-72.00041666666667, 43.999583333333334],
-         "0c6a3e852d92f1f4e6331a9f52dd9cd39178020a4b7a848a3d480b537554489e"),
-        ("N44W072_i16_tiled.tif", 1201, 1201, "int16", 1442401, [-72.00041666666667, 43.999583333333334],
-         "0c6a3e852d92f1f4e6331a9f52dd9cd39178020a4b7a848a3d480b537554489e"),
-        ("akl_lidar.tif", 860, 600, "float32", 516000, [2667405.0, 6478705.0],
-         "0981990e07ca777aa09eadb38e89518be111e91fcff0333b4c9e17b2a81af2d8"),
-        ("avaAlr.tif", 915, 417, "float64", 264711, [255202.0828, 377305.9942],
-         "5677cc6c7c98197613cea5055e5e9699e7ce101965ad9e360024f215ff4daba6"),
-        ("mars_hirise_1m.npy", 120, 70, "float32", 8400, [0.0, 0.0],
-         "144b8e4728ecbe68442239a886774097d6264d578862adcaff70c8e57bf0850b"),
-        ("otira_grid_2cm.tif", 331, 423, "float32", 78190, [19.16, 13.2],
-         "f6eef2ca3075b5110cc61c3c13432a661197b5728867a26018cebe092d89c212"),
-        ("pozo_blanca_grid_50cm.tif", 561, 542, "float32", 205209, [238933.0, 3765101.0],
-         "5484dfc84a5816f178eb2feecaa92392f8c99279d89235e591b3c53190342e1d"),
-        ("ryggfonn_dhm.asc", 633, 459, "float32", 290547, [408397.75, 6870084.11],
-         "93d3c8b399c0c75eb3458c42a2a6d4a1b39608ba872dc271deb7b830a7c36d06"),
-        ("srtmgl3_boulder.asc", 144, 240, "int32", 34560, [-105.550416666684, 40.090416666671],
-         "ce50f30a3080465339d3f8b590bae59b1f165c89d08ae02546269603c178a716"),
-        ("wbt_DEM.tif", 188, 237, "float32", 44556, [664692.0589773272, 4878903.550863004],
-         "a32ddb269a3fe8cb7ef844a5483daf4d5b4c6d18becb79687eb0cee7ce9cfcc1"),
-        ("xdem_longyearbyen_1995.tif", 985, 1332, "float32", 1312020, [502810.0, 8654330.0],
-         "c0c4c3c9e54f8221f7809ce12b718eb8a28d4170a5fa12052dea66f5c6ee423f"),
-    ];
-    for (name, rows, cols, dtype, valid, origin, sha256) in table {
-        let Some(path) = sastrugi_fixtures::measured(name) else {
-            eprintln!("SKIPPED: ../shared/data/{name} is absent");
-            continue;
-        };
-        let dem = read(&path).unwrap();
-        let g = dem.grid.geometry;
-        assert_eq!((g.rows, g.cols, dem.info.dtype, dem.grid.finite_count()), (rows, cols, dtype, valid), "{name}");
-        assert_eq!(crate::digest::heights(&dem.grid), sha256, "{name}");
-        assert!((0..2).all(|a| (g.origin[a] - origin[a]).abs() <= 1e-8), "{name}: {:?}", g.origin);
-        blocks_agree(&path);
-    }
-}
-
 /// A raster of points in a local system that only has a name: read as rasterio 1.4.4 reads the same file, with the first post half a
 /// cell from the north-western corner, and written with the same keys.
 #[test]

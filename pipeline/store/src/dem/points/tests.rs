@@ -366,38 +366,6 @@ fn val_claims_of_a_cloud() {
     assert_eq!((unsized_claim.points, unsized_claim.cells, unsized_claim.cell_m), (120_000, 480_000, None));
 }
 
-/// Cell sizes, shapes and cell means agree with an independent gridding of two measured clouds, which do not ship with the product. Its
-/// gaps were filled by another rule, so filled cells are not compared. Its raster is in single precision. Points per cell as counted by
-/// laspy 2.7.0 (lazrs 0.8.2) and numpy 2.4.6: hashes printed by `tests/interop/check_points.py`.
-#[test]
-#[ignore = "needs ../shared/data: ./test --full"]
-fn val_gridding_of_measured_clouds() {
-    #[rustfmt::skip]
-    let table = [
-        ("Otira_1cm_grains_G3POINT.laz", "otira_grid_2cm.tif", 0.02, 48_878, 1e-6, None,
-         "65f3fac0680ed4b23e280bba25669431431e5a3ac1b9a28bd127e7281f83b918"),
-        ("pozo_blanca.laz", "pozo_blanca_grid_50cm.tif", 0.5, 190_596, 2e-5, Some(26911),
-         "9ddaeadfe1e544d212085baa047a183083738c77f25fc39f73254fc1c6cdcc9f"),
-    ];
-    for (cloud, raster, cell, held, tolerance, epsg, sha256) in table {
-        let [Some(cloud), Some(raster)] = [cloud, raster].map(sastrugi_fixtures::measured) else {
-            eprintln!("SKIPPED: ../shared/data/{cloud} or {raster} is absent");
-            continue;
-        };
-        let Gridded { dem: ours, counts, .. } = read(&cloud, &GridSettings::default()).unwrap();
-        let theirs = dem::read(&raster).unwrap();
-        let (g, other) = (ours.grid.geometry, theirs.grid.geometry);
-        assert_eq!((g.rows, g.cols, g.cell), (other.rows, other.cols, [cell; 2]));
-        assert!((0..2).all(|a| (g.origin[a] - other.origin[a]).abs() < 1e-9), "{:?} {:?}", g.origin, other.origin);
-        assert_eq!((ours.grid.finite_count(), ours.info.crs.epsg), (held, epsg));
-        let worst = ours.grid.values.iter().zip(&theirs.grid.values).filter(|(a, _)| a.is_finite());
-        let worst = worst.map(|(a, b)| (a - b).abs()).max_by(f64::total_cmp).unwrap();
-        assert!(worst <= tolerance, "{worst}");
-        let counts: Vec<u8> = counts.values.iter().flat_map(|n| n.to_le_bytes()).collect();
-        assert_eq!(crate::digest::of_bytes(&counts), sha256);
-    }
-}
-
 #[test]
 fn val_clouds_are_read_like_rasters() {
     let folder = tempfile::tempdir().unwrap();
