@@ -159,7 +159,7 @@ fn answers(record: &Value) -> Vec<&str> {
 /// A release against itself, against the study with another seed, and against the study on rougher ground.
 ///
 /// Null of the second comparison: labels of releases mean nothing, as terrains of both are drawn alike. The permutation tests
-/// are exact and adjusted by Holm over all figures, so that "different" comes up with probability 0.05 at most, once for the
+/// are exact and adjusted by Holm over all metrics, so that "different" comes up with probability 0.05 at most, once for the
 /// seeds written here. Rougher ground: rms heights in the ratio of 3, which 12 terrains against 12 show for certain.
 #[test]
 fn stat_releases_are_compared_by_terrain() {
@@ -184,7 +184,7 @@ fn stat_releases_are_compared_by_terrain() {
     assert!(answers(&wide).iter().all(|answer| *answer == "same"), "{wide}");
 
     let rough = json(path, &["compare", "one", "rough", "--fail-on-difference"], 4);
-    let height = &rough["quantities"].as_array().unwrap().iter().find(|q| q["figure"] == "rms_height_m").unwrap();
+    let height = &rough["quantities"].as_array().unwrap().iter().find(|q| q["name"] == "rms_height_m").unwrap();
     // Same random draws, so that terrains are pairs.
     assert_eq!((&height["answer"], &height["paired"]), (&"different".into(), &true.into()));
     assert!(height["difference"].as_f64().unwrap() > 0.0 && height["p_adjusted"].as_f64().unwrap() <= 0.05);
@@ -198,7 +198,7 @@ fn stat_releases_are_compared_by_terrain() {
     }
 }
 
-/// Other bytes with the same heights are packaging; releases of other versions are compared by their figures only.
+/// Other bytes with the same heights are packaging; releases of other versions are compared by their metrics only.
 #[test]
 fn val_packaging_and_versions_of_releases() {
     let folder = area();

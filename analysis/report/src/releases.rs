@@ -52,7 +52,7 @@ pub struct Quantity {
     /// Label of the group, with the variant, and with the run if there are several.
     pub group: String,
     /// Column, or `success`.
-    pub figure: &'static str,
+    pub name: &'static str,
     /// Unit of the column.
     pub unit: &'static str,
     /// Number of terrains in A and B that were compared.
@@ -99,22 +99,22 @@ struct Place {
     run: Option<String>,
 }
 
-/// Values of a quantity.
+/// Values of a metric.
 #[derive(Clone, Debug)]
-struct Figure {
+struct Metric {
     unit: &'static str,
     /// Scale of the margin, if it is not the mean.
     scale: Option<f64>,
     by_terrain: BTreeMap<String, Mean>,
 }
 
-/// Quantities by column.
-type ByFigure = BTreeMap<&'static str, Figure>;
+/// Metrics by column.
+type ByMetric = BTreeMap<&'static str, Metric>;
 
-/// Quantities of a release, summed row by row: memory grows with the terrains, not with the missions.
+/// Metrics of a release, summed row by row: memory grows with the terrains, not with the missions.
 #[derive(Clone, Debug, Default)]
-pub struct Figures {
-    values: BTreeMap<Place, ByFigure>,
+pub struct Metrics {
+    values: BTreeMap<Place, ByMetric>,
     /// Label, hash of the heights and name of the random stream of every terrain.
     terrains: BTreeMap<String, Terrain>,
 }
@@ -126,13 +126,13 @@ struct Terrain {
     stream: Option<String>,
 }
 
-impl Figures {
+impl Metrics {
     /// Adds a terrain, with the hash of its heights if the release states it. Must precede the missions on it.
     pub fn add_terrain(&mut self, row: &TerrainRow, content: Option<&str>) {
         let (table, label) = (TerrainRow::TABLE.name, crate::data::label(row).to_owned());
         let place = Place { table, label: label.clone(), variant: row.variant.clone(), run: None };
-        for (figure, scale, value) in OF_TERRAINS {
-            self.add(&place, (figure, unit::<TerrainRow>(figure), scale), &row.terrain_id, value(row));
+        for (metric, scale, value) in OF_TERRAINS {
+            self.add(&place, (metric, unit::<TerrainRow>(metric), scale), &row.terrain_id, value(row));
         }
         let (content, stream) = (content.map(str::to_owned), row.stream.clone());
         self.terrains.insert(row.terrain_id.clone(), Terrain { label, content, stream });
@@ -145,28 +145,28 @@ impl Figures {
         let (variant, run) = (row.variant.as_ref().map(String::from), Some(String::from(&row.traverse_id)));
         let place = Place { table: Mission::TABLE.name, label, variant, run };
         for statistic in Statistic::ALL {
-            let figure = statistic.column();
+            let metric = statistic.column();
             let (unit, scale) = match statistic {
                 Statistic::Success => ("%", Some(100.0)),
-                _ => (unit::<Mission>(figure), None),
+                _ => (unit::<Mission>(metric), None),
             };
-            self.add(&place, (figure, unit, scale), &row.terrain_id, row.of(statistic));
+            self.add(&place, (metric, unit, scale), &row.terrain_id, row.of(statistic));
         }
     }
 
     fn add(
         &mut self,
         place: &Place,
-        (figure, unit, scale): (&'static str, &'static str, Option<f64>),
+        (metric, unit, scale): (&'static str, &'static str, Option<f64>),
         terrain: &str,
         value: f64,
     ) {
         if !self.values.contains_key(place) {
-            self.values.insert(place.clone(), ByFigure::new());
+            self.values.insert(place.clone(), ByMetric::new());
         }
-        let Some(figures) = self.values.get_mut(place).filter(|_| value.is_finite()) else { return };
-        let none = || Figure { unit, scale, by_terrain: BTreeMap::new() };
-        let by_terrain = &mut figures.entry(figure).or_insert_with(none).by_terrain;
+        let Some(metrics) = self.values.get_mut(place).filter(|_| value.is_finite()) else { return };
+        let none = || Metric { unit, scale, by_terrain: BTreeMap::new() };
+        let by_terrain = &mut metrics.entry(metric).or_insert_with(none).by_terrain;
         match by_terrain.get_mut(terrain) {
             Some((sum, count)) => (*sum, *count) = (*sum + value, *count + 1),
             None => drop(by_terrain.insert(terrain.to_owned(), (value, 1))),
@@ -180,10 +180,10 @@ impl Figures {
         places.len() < self.values.len()
     }
 
-    /// Quantities by place, without the run unless `with_runs`.
-    fn by_place(&self, with_runs: bool) -> BTreeMap<Place, &ByFigure> {
+    /// Metrics by place, without the run unless `with_runs`.
+    fn by_place(&self, with_runs: bool) -> BTreeMap<Place, &ByMetric> {
         let of = |place: &Place| Place { run: place.run.clone().filter(|_| with_runs), ..place.clone() };
-        self.values.iter().map(|(place, figures)| (of(place), figures)).collect()
+        self.values.iter().map(|(place, metrics)| (of(place), metrics)).collect()
     }
 
     /// True when a terrain is the same in both, or comes from the same random draws.
@@ -203,27 +203,27 @@ impl Place {
 }
 
 /// Every quantity that both releases have, and the groups that only A and only B has.
-pub fn compare(a: &Figures, b: &Figures, settings: Settings, streams: &Streams) -> (Vec<Quantity>, [Vec<String>; 2]) {
+pub fn compare(a: &Metrics, b: &Metrics, settings: Settings, streams: &Streams) -> (Vec<Quantity>, [Vec<String>; 2]) {
     let with_runs = a.has_several_runs() || b.has_several_runs();
     let (of_a, of_b) = (a.by_place(with_runs), b.by_place(with_runs));
     let mut compared = Vec::new();
-    for (place, figures) in &of_a {
+    for (place, metrics) in &of_a {
         let Some(others) = of_b.get(place) else { continue };
-        let terrains = |figures: &ByFigure| -> BTreeSet<String> {
-            figures.values().flat_map(|figure| figure.by_terrain.keys().cloned()).collect()
+        let terrains = |metrics: &ByMetric| -> BTreeSet<String> {
+            metrics.values().flat_map(|metric| metric.by_terrain.keys().cloned()).collect()
         };
-        let (here, there) = (terrains(figures), terrains(others));
+        let (here, there) = (terrains(metrics), terrains(others));
         let shared: BTreeSet<&String> = here.intersection(&there).filter(|t| a.shares_ground(b, t)).collect();
         let paired = !shared.is_empty() && shared.len() == here.len().min(there.len());
-        for (name, first) in *figures {
+        for (name, first) in *metrics {
             if let Some(second) = others.get(name) {
                 compared.push((place, *name, first, Sides::of(first, second, paired.then_some(&shared))));
             }
         }
     }
     let draws = permutation::draws(compared.len(), settings.alpha);
-    let of = |(place, name, figure, sides): &(&Place, _, &Figure, Sides)| {
-        quantity(place, (*name, *figure), sides, settings, draws, streams)
+    let of = |(place, name, metric, sides): &(&Place, _, &Metric, Sides)| {
+        quantity(place, (*name, *metric), sides, settings, draws, streams)
     };
     let mut quantities: Vec<Quantity> = compared.iter().map(of).collect();
     judge(&mut quantities, settings.alpha);
@@ -243,7 +243,7 @@ struct Sides {
 }
 
 impl Sides {
-    fn of(a: &Figure, b: &Figure, shared: Option<&BTreeSet<&String>>) -> Self {
+    fn of(a: &Metric, b: &Metric, shared: Option<&BTreeSet<&String>>) -> Self {
         let mean = |(sum, n): &Mean| sum / *n as f64;
         let (a, b) = (&a.by_terrain, &b.by_terrain);
         let Some(shared) = shared else {
@@ -266,7 +266,7 @@ fn unit<R: Record>(column: &str) -> &'static str {
 /// A quantity without its answer, which needs all of them.
 fn quantity(
     place: &Place,
-    (name, figure): (&'static str, &Figure),
+    (name, metric): (&'static str, &Metric),
     sides: &Sides,
     settings: Settings,
     draws: usize,
@@ -281,7 +281,7 @@ fn quantity(
         false => Difference::apart(first, second, 1.0 - settings.alpha, draws, &mut stream),
     };
     let equal = !first.is_empty() && first == second && *left_out == [0; 2];
-    let scale = figure.scale.unwrap_or_else(|| sums::mean(first).abs());
+    let scale = metric.scale.unwrap_or_else(|| sums::mean(first).abs());
     let margin = Some(settings.margin * scale).filter(|margin| *margin > 0.0);
     let known = |p: f64| Some(p).filter(|p| !p.is_nan());
     let three = |i: Interval| [i.estimate, i.low, i.high];
@@ -291,8 +291,8 @@ fn quantity(
     Quantity {
         table,
         group,
-        figure: name,
-        unit: figure.unit,
+        name,
+        unit: metric.unit,
         terrains: [first.len(), second.len()],
         paired: *paired,
         left_out: *left_out,
@@ -331,22 +331,22 @@ mod tests {
     const COLUMNS: [&str; 4] = ["a", "b", "c", "d"];
 
     /// Normal values with mean 10 of four quantities, on terrains whose random streams are named by `seed`, raised by `shift`.
-    fn drawn(terrains: usize, seed: u64, shift: f64) -> Figures {
+    fn drawn(terrains: usize, seed: u64, shift: f64) -> Metrics {
         let mut stream = Streams::for_seed(seed, "drawn").stream("values");
-        let mut figures = Figures::default();
+        let mut metrics = Metrics::default();
         let place = Place { table: "missions", label: "g".to_owned(), variant: None, run: None };
         for k in 0..terrains {
             let terrain = format!("t-{k:04}");
-            for figure in COLUMNS {
-                figures.add(&place, (figure, "m", None), &terrain, 10.0 + shift + stream.normal());
+            for metric in COLUMNS {
+                metrics.add(&place, (metric, "m", None), &terrain, 10.0 + shift + stream.normal());
             }
             let of = Terrain { label: "g".into(), content: None, stream: Some(seed.to_string()) };
-            figures.terrains.insert(terrain, of);
+            metrics.terrains.insert(terrain, of);
         }
-        figures
+        metrics
     }
 
-    fn compared(a: &Figures, b: &Figures) -> Vec<Quantity> {
+    fn compared(a: &Metrics, b: &Metrics) -> Vec<Quantity> {
         compare(a, b, Settings { margin: 0.05, alpha: 0.05 }, &Streams::for_seed(1, "compare")).0
     }
 
@@ -371,8 +371,8 @@ mod tests {
         assert!(all(compared(&a, &a), Answer::Same));
         let raised = |by: f64| {
             let mut b = drawn(20, 1, 0.0);
-            let figures = b.values.values_mut().flat_map(BTreeMap::values_mut);
-            let means = figures.flat_map(|figure| figure.by_terrain.values_mut());
+            let metrics = b.values.values_mut().flat_map(BTreeMap::values_mut);
+            let means = metrics.flat_map(|metric| metric.by_terrain.values_mut());
             means.enumerate().for_each(|(k, (sum, _))| *sum += by + 1e-3 * (k % 7) as f64);
             b
         };
@@ -395,19 +395,19 @@ mod tests {
         let mut data = crate::tests::made_up::full(1, 24);
         let (terrain, mission) = (data.terrains.swap_remove(0), data.missions.swap_remove(0));
         let mission = Mission { variant: None, ..mission };
-        let figures = |pitch: [f64; 3]| {
-            let mut figures = Figures::default();
-            figures.add_terrain(&terrain, Some("hash"));
+        let metrics = |pitch: [f64; 3]| {
+            let mut metrics = Metrics::default();
+            metrics.add_terrain(&terrain, Some("hash"));
             for (outcome, rms_pitch_rate_deg_s) in ["success", "success", "stuck"].into_iter().zip(pitch) {
                 let (terrain_id, outcome, group) =
                     (terrain.terrain_id.as_str().into(), outcome.into(), Some("g".into()));
                 let row = Mission { terrain_id, outcome, group, rms_pitch_rate_deg_s, ..mission.clone() };
-                figures.add_mission(&row);
+                metrics.add_mission(&row);
             }
-            figures
+            metrics
         };
-        let of = |quantities: &[Quantity], name: &str| quantities.iter().find(|q| q.figure == name).unwrap().clone();
-        let same = compared(&figures([10.0, 20.0, 90.0]), &figures([10.0, 20.0, 30.0]));
+        let of = |quantities: &[Quantity], name: &str| quantities.iter().find(|q| q.name == name).unwrap().clone();
+        let same = compared(&metrics([10.0, 20.0, 90.0]), &metrics([10.0, 20.0, 30.0]));
         assert!(same.iter().all(|q| q.equal && q.answer == Answer::Same), "{same:?}");
         let (success, pitch) = (of(&same, "success"), of(&same, "rms_pitch_rate_deg_s"));
         assert!((success.a - 200.0 / 3.0).abs() < 1e-12 && (pitch.a - 15.0).abs() < 1e-12, "{success:?} {pitch:?}");
@@ -416,7 +416,7 @@ mod tests {
         let relief = of(&same, "relief_m");
         assert_eq!((relief.table, relief.a, relief.unit), ("terrains", terrain.relief_m, "m"));
         // Differences are B minus A.
-        let pitch = of(&compared(&figures([10.0, 20.0, 0.0]), &figures([16.0, 20.0, 0.0])), "rms_pitch_rate_deg_s");
+        let pitch = of(&compared(&metrics([10.0, 20.0, 0.0]), &metrics([16.0, 20.0, 0.0])), "rms_pitch_rate_deg_s");
         assert!((pitch.difference - 3.0).abs() < 1e-12 && pitch.terrains == [1, 1] && pitch.paired && !pitch.equal);
     }
 
@@ -430,8 +430,8 @@ mod tests {
             assert_eq!((q.p, q.p_equivalence, q.answer), (Some(1.0), Some(1.0 / 4096.0), Answer::Same));
         }
         let mut without = drawn(12, 1, 0.0);
-        let figures = without.values.values_mut().flat_map(BTreeMap::values_mut);
-        figures.take(1).for_each(|figure| assert!(figure.by_terrain.remove("t-0003").is_some()));
+        let metrics = without.values.values_mut().flat_map(BTreeMap::values_mut);
+        metrics.take(1).for_each(|metric| assert!(metric.by_terrain.remove("t-0003").is_some()));
         let found: Vec<(bool, usize, bool)> =
             compared(&few, &without).iter().map(|q| (q.paired, q.terrains[0], q.equal)).collect();
         assert_eq!(found, [(true, 11, false), (true, 12, true), (true, 12, true), (true, 12, true)]);
@@ -449,8 +449,8 @@ mod tests {
     #[test]
     fn val_a_constant_difference_within_the_margin_counts_as_the_same() {
         let (a, mut b) = (drawn(20, 1, 0.0), drawn(20, 1, 0.0));
-        for figure in b.values.values_mut().flat_map(BTreeMap::values_mut) {
-            figure.by_terrain.values_mut().for_each(|(sum, _)| *sum += 0.05);
+        for metric in b.values.values_mut().flat_map(BTreeMap::values_mut) {
+            metric.by_terrain.values_mut().for_each(|(sum, _)| *sum += 0.05);
         }
         for q in compared(&a, &b) {
             assert!(q.p.is_some_and(|p| p < 1e-3) && q.answer == Answer::Same, "{q:?}");
@@ -461,10 +461,10 @@ mod tests {
     #[test]
     fn val_several_runs_are_kept_separate() {
         let renamed = |run: &str| {
-            let mut figures = drawn(5, 1, 0.0);
-            let old = std::mem::take(&mut figures.values);
-            figures.values = old.into_iter().map(|(p, f)| (Place { run: Some(run.to_owned()), ..p }, f)).collect();
-            figures
+            let mut metrics = drawn(5, 1, 0.0);
+            let old = std::mem::take(&mut metrics.values);
+            metrics.values = old.into_iter().map(|(p, f)| (Place { run: Some(run.to_owned()), ..p }, f)).collect();
+            metrics
         };
         let (one, mut two) = (renamed("husky"), renamed("jackal"));
         assert!(compared(&one, &two).iter().all(|q| q.group == "g" && q.equal));

@@ -105,7 +105,7 @@ fn row_of_releases(q: &releases::Quantity) -> Vec<String> {
         if q.paired { format!("{} pairs", q.terrains[0]) } else { format!("{}, {}", q.terrains[0], q.terrains[1]) };
     vec![
         q.group.clone(),
-        q.figure.to_owned(),
+        q.name.to_owned(),
         terrains,
         number(Some(q.a)),
         number(Some(q.b)),

@@ -7,7 +7,7 @@ use crate::error::Error;
 use sastrugi_numeric::Streams;
 use sastrugi_report::data::Mission;
 pub use sastrugi_report::releases::Quantity;
-use sastrugi_report::releases::{self, Figures, Settings};
+use sastrugi_report::releases::{self, Metrics, Settings};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::manifest::Artifact;
 use sastrugi_schemas::tables::TerrainRow;
@@ -145,7 +145,7 @@ pub fn compare(a: &Path, b: &Path, parameters: &Value, seed: u64) -> Result<Comp
     parameters::check_schema(parameters, &schema_of::<Parameters>(), STAGE)?;
     let parameters = read_parameters::<Parameters>(parameters)?.check()?;
     let releases = [open(a)?, open(b)?];
-    let [of_a, of_b] = [figures(&releases[0])?, figures(&releases[1])?];
+    let [of_a, of_b] = [metrics(&releases[0])?, metrics(&releases[1])?];
     let settings = Settings { margin: parameters.margin, alpha: parameters.alpha };
     let (quantities, alone) = releases::compare(&of_a, &of_b, settings, &Streams::for_seed(seed, STAGE));
     let [one, other] = releases.each_ref().map(Release::manifest);
@@ -192,15 +192,15 @@ impl Side {
 }
 
 /// The metrics of one release.
-fn figures(release: &Release) -> Result<Figures, Error> {
-    let mut figures = Figures::default();
+fn metrics(release: &Release) -> Result<Metrics, Error> {
+    let mut metrics = Metrics::default();
     let contents: BTreeMap<&str, Option<&str>> =
         release.manifest().artifacts.iter().map(|a| (a.path.as_str(), a.origin.content_sha256.as_deref())).collect();
     let content = |path: &str| contents.get(path).copied().flatten();
     release
-        .for_each_row(|row: TerrainRow| figures.add_terrain(&row, content(&row.path)))
-        .and_then(|()| release.for_each_row(|row: Mission| figures.add_mission(&row)))?;
-    Ok(figures)
+        .for_each_row(|row: TerrainRow| metrics.add_terrain(&row, content(&row.path)))
+        .and_then(|()| release.for_each_row(|row: Mission| metrics.add_mission(&row)))?;
+    Ok(metrics)
 }
 
 fn answer(quantities: &[Quantity]) -> Answer {
@@ -220,7 +220,7 @@ fn sentence(quantities: &[Quantity], answer: Answer) -> String {
         Answer::Same => format!("all {n} metrics are the same within the margin"),
         Answer::Different => {
             let names = quantities.iter().filter(|q| q.answer == Answer::Different);
-            let names: Vec<String> = names.map(|q| format!("{} of {}", q.figure, q.group)).collect();
+            let names: Vec<String> = names.map(|q| format!("{} of {}", q.name, q.group)).collect();
             format!("{} of {n} metrics differ: {}", names.len(), names.join("; "))
         }
         Answer::CannotTell => format!(

@@ -7,7 +7,7 @@ use super::comparison::values::words;
 use crate::ReportError;
 use crate::content::{Block, Numbers, TableBlock, number, text};
 use crate::data::{Against, Data};
-use crate::releases::{self, Figures, MARGIN, Quantity, Settings};
+use crate::releases::{self, MARGIN, Metrics, Quantity, Settings};
 use crate::render::number as set;
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::study::Statistic;
@@ -21,7 +21,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     // The same streams as in the verb `compare`, so that both give the same answer.
     let streams = Streams::for_seed(0, releases::STREAMS);
     let settings = Settings { margin: MARGIN, alpha: ALPHA };
-    let (quantities, alone) = releases::compare(&figures(&other.data), &figures(data), settings, &streams);
+    let (quantities, alone) = releases::compare(&metrics(&other.data), &metrics(data), settings, &streams);
     let mut blocks = vec![Block::Text(introduction(other))];
     let only: Vec<String> = alone.concat();
     if !only.is_empty() {
@@ -36,13 +36,13 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-fn figures(data: &Data) -> Figures {
-    let mut figures = Figures::default();
+fn metrics(data: &Data) -> Metrics {
+    let mut metrics = Metrics::default();
     for row in &data.terrains {
-        figures.add_terrain(row, data.contents.get(&row.path).map(String::as_str));
+        metrics.add_terrain(row, data.contents.get(&row.path).map(String::as_str));
     }
-    data.missions.iter().for_each(|row| figures.add_mission(row));
-    figures
+    data.missions.iter().for_each(|row| metrics.add_mission(row));
+    metrics
 }
 
 /// Query for the rows from which the comparison is computed, in each of the releases.
@@ -100,8 +100,8 @@ fn introduction(other: &Against) -> String {
 
 /// Name and unit of a quantity: as on the page for missions, the column for terrains.
 fn name(q: &Quantity) -> (&'static str, &'static str) {
-    let of_missions = Statistic::ALL.into_iter().find(|s| q.table == "missions" && s.column() == q.figure);
-    of_missions.map_or((q.figure, if q.unit == "1" { "" } else { q.unit }), words)
+    let of_missions = Statistic::ALL.into_iter().find(|s| q.table == "missions" && s.column() == q.name);
+    of_missions.map_or((q.name, if q.unit == "1" { "" } else { q.unit }), words)
 }
 
 fn table(quantities: &[Quantity]) -> TableBlock {
