@@ -50,7 +50,7 @@
 //!
 //! # Uncertainty
 //! Standard errors come from the delete-one jackknife over 4 x 4 blocks of the raster. They cover only sampling of the plot, and
-//! are valid only if a block is wider than the surface's correlation length; the spread between formulas is usually larger.
+//! are valid only if a block is wider than the range of the surface's covariance; the spread between formulas is usually larger.
 //!
 //! # Limits
 //! * Roughness finer than a cell is not resolved, and lambda_f and f rise as cells shrink: compare z0 only at equal cells.
