@@ -741,7 +741,7 @@ fn val_traverse_makes_a_release_of_its_own() {
     let coarse = sastrugi_fixtures::jacksboro();
     let refused = sastrugi_in(path, &["traverse", coarse.to_str().unwrap(), "-o", "no", "--quiet"]);
     assert_ne!(refused.code, 0);
-    assert!(refused.stderr.contains("elaborate") || refused.stderr.contains("cell"), "{}", refused.stderr);
+    assert!(refused.stderr.contains("elaborate") && refused.stderr.contains("cells of"), "{}", refused.stderr);
 }
 
 #[test]
