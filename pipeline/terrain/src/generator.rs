@@ -13,6 +13,51 @@ pub(crate) fn rounded_coordinate(coordinate_m: f64) -> f64 {
 const SECONDS_PER_CELL: f64 = 6e-8;
 
 /// A generator with checked parameters.
+///
+/// Generators of this crate come from [`crate::prepare`]; any other ground needs six methods:
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+/// use sastrugi_terrain::{Generator, Input, Terrain, TerrainError};
+/// use serde_json::{Value, json};
+///
+/// /// A ramp that rises by 0.1 m from column to column.
+/// struct Ramp(Geometry);
+///
+/// impl Generator for Ramp {
+///     fn kind(&self) -> &'static str {
+///         "ramp"
+///     }
+///
+///     fn geometry(&self) -> Geometry {
+///         self.0
+///     }
+///
+///     fn parameters(&self) -> Value {
+///         json!({ "size_px": [self.0.cols, self.0.rows], "cell_m": self.0.cell[0] })
+///     }
+///
+///     fn memory_bytes(&self) -> u64 {
+///         8 * self.0.len() as u64
+///     }
+///
+///     fn notes(&self) -> Vec<String> {
+///         Vec::new()
+///     }
+///
+///     fn generate(&self, _streams: &Streams, _inputs: &[Input]) -> Result<Terrain, TerrainError> {
+///         let heights = (0..self.0.len()).map(|k| 0.1 * (k % self.0.cols) as f64).collect();
+///         Ok(Terrain::from(Grid::new(self.0, heights)))
+///     }
+/// }
+///
+/// # fn main() -> Result<(), TerrainError> {
+/// let ramp: Box<dyn Generator> = Box::new(Ramp(Geometry::square(4, 11, 0.5)));
+/// let terrain = ramp.generate_checked(&Streams::for_seed(1, "terrain"), &[])?;
+/// assert_eq!(terrain.heights.range(), Some((0.0, 1.0)));
+/// # Ok(())
+/// # }
+/// ```
 pub trait Generator: Send + Sync {
     /// Name in `kind = "..."`.
     fn kind(&self) -> &'static str;

@@ -3,6 +3,28 @@
 use crate::planetary::{Patch, Request, World};
 
 /// Ground of which any window can be generated. Samples are pure functions of their lattice point and of the bound on features.
+///
+/// ```
+/// use sastrugi_numeric::Streams;
+/// use sastrugi_terrain::Windows;
+/// use sastrugi_terrain::planetary::{Planetary, RawPlanetary, Request, Window};
+/// use serde_json::json;
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// let processes = json!([{ "kind": "texture" }, { "kind": "rocks", "coverage": 0.1 }]);
+/// let raw: RawPlanetary = serde_json::from_value(json!({ "basic_spacing_m": 0.01, "processes": processes }))?;
+/// let world = Planetary::try_from(raw)?.world_of(&Streams::for_seed(1, "terrain"), |_| true)?;
+/// assert!(world.has_rocks() && !world.has_albedo());
+///
+/// // A window, and the part of it that begins five columns farther east.
+/// let window = Window { zoom: 0, west: 100, south: 7, cols: 12, rows: 3, centred: false };
+/// let east = Window { west: 105, cols: 7, ..window };
+/// let request = |window| Request { window, feature_min_m: 0.0, cancel: None };
+/// let [whole, part] = [window, east].map(|window| Windows::patch_for(&world, &request(window)).unwrap());
+/// assert_eq!(part.heights[..7], whole.heights[5..12]);
+/// # Ok(())
+/// # }
+/// ```
 pub trait Windows: Send + Sync {
     /// The requested samples, computed on this thread; `None` if the request was cancelled. Heights are NaN where there is no ground.
     fn patch_for(&self, request: &Request<'_>) -> Option<Patch>;
