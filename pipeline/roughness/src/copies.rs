@@ -39,6 +39,25 @@ pub struct Copies {
 }
 
 /// Copies in `surface` of neighbourhoods of `source`; both have cells of one size.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, Streams};
+/// use sastrugi_roughness::copies;
+///
+/// let noise = |seed| {
+///     let mut stream = Streams::for_seed(seed, "example").stream("noise");
+///     Grid::new(Geometry::square(40, 40, 0.1), (0..1600).map(|_| stream.normal()).collect())
+/// };
+/// let (site, other) = (noise(1), noise(2));
+/// // Twenty columns of the site, laid at the same place of the other surface.
+/// let mut quilt = other.clone();
+/// for row in 0..40 {
+///     quilt.values[40 * row..][..20].copy_from_slice(&site.values[40 * row..][..20]);
+/// }
+/// assert_eq!(copies(&other, &site).share, 0.0);
+/// let found = copies(&quilt, &site);
+/// assert!(found.share > 0.2 && found.share < 0.6 && found.longest_run_cells >= 18, "{found:?}");
+/// ```
 pub fn copies(surface: &Grid, source: &Grid) -> Copies {
     find(surface, source, |_, _| true)
 }

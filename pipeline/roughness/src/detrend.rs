@@ -104,6 +104,17 @@ impl WaveBand {
     ///
     /// # Errors
     /// Lengths that are not positive and finite, or a tyre radius of at least twice the wheelbase.
+    ///
+    /// ```
+    /// use sastrugi_roughness::WaveBand;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let band = WaveBand::of_vehicle(0.5, 0.2)?;
+    /// assert_eq!((band.min_m(), band.max_m()), (0.2, 1.0));
+    /// assert!(WaveBand::of_vehicle(0.5, 1.1).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn of_vehicle(wheelbase_m: f64, tyre_radius_m: f64) -> Result<Self, BandError> {
         for (name, value_m) in [("wheelbase", wheelbase_m), ("tyre radius", tyre_radius_m)] {
             if !(value_m > 0.0 && value_m.is_finite()) {

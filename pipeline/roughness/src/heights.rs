@@ -53,6 +53,17 @@ pub struct HistogramBin {
 
 /// Histogram with `bins` bins of equal width from the lowest to the highest height (which belongs to the last bin). Empty
 /// if no cell has data or all heights are equal.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::histogram;
+///
+/// let dem = Grid::new(Geometry::square(1, 5, 1.0), vec![0.0, 1.0, 1.0, 4.0, f64::NAN]);
+/// let bins = histogram(&dem, 2);
+/// assert_eq!((bins[0].low_m, bins[0].high_m, bins[0].cells, bins[1].cells), (0.0, 2.0, 3, 1));
+/// // Three of the four cells with data, on 2 m of height.
+/// assert_eq!(bins[0].density_per_m, 0.375);
+/// ```
 pub fn histogram(dem: &Grid, bins: usize) -> Vec<HistogramBin> {
     let Some((low, high)) = dem.range().filter(|(low, high)| high > low) else { return Vec::new() };
     let edge = |k: usize| low + (high - low) * (k as f64 / bins as f64);

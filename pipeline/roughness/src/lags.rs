@@ -50,6 +50,19 @@ impl PairSum {
 
 impl LagSums {
     /// Pair sums of a surface centred on zero; `max_lag` is limited to the grid.
+    ///
+    /// ```
+    /// use sastrugi_numeric::{Geometry, Grid};
+    /// use sastrugi_roughness::LagSums;
+    ///
+    /// let board = Grid::new(Geometry::square(2, 2, 1.0), vec![1.0, -1.0, -1.0, 1.0]);
+    /// let sums = LagSums::of(&board, [1, 1]);
+    /// // Two pairs of neighbours from west to east, each of opposite heights; one pair along the diagonal, of equal heights.
+    /// let (east, south_east) = (sums.at(0, 1), sums.at(1, 1));
+    /// assert_eq!((east.pairs, south_east.pairs), (2.0, 1.0));
+    /// assert!((east.covariance() + 1.0).abs() < 1e-12 && (east.increment() - 4.0).abs() < 1e-12);
+    /// assert!(south_east.increment().abs() < 1e-12);
+    /// ```
     pub fn of(dem: &Grid, max_lag: [usize; 2]) -> Self {
         let max_lag = [max_lag[0].min(dem.rows().saturating_sub(1)), max_lag[1].min(dem.cols().saturating_sub(1))];
         let padded = Padded::new(dem, max_lag);

@@ -36,6 +36,19 @@ pub struct Minkowski {
 }
 
 /// Minkowski functionals of the sets of cells higher than each of `levels` (rising, m; at most 254).
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::minkowski;
+///
+/// // One cell of 1 m stands 2 m above 5 x 5 others: it is in the set above 1 m, and no cell in that above 3 m.
+/// let mut dem = Grid::filled(Geometry::square(5, 5, 1.0), 0.0);
+/// dem.values[12] = 2.0;
+/// let found = minkowski(&dem, &[1.0, 3.0]);
+/// assert!(found.boundary_per_m[0] > 0.0 && found.boundary_per_m[1] == 0.0);
+/// // One region in the 16 m2 between the outer cell centres.
+/// assert!((found.euler_per_m2[0] - 1.0 / 16.0).abs() < 1e-12);
+/// ```
 pub fn minkowski(z: &Grid, levels: &[f64]) -> Minkowski {
     // The number of levels below a cell: it is in the sets of exactly these.
     let rank = |z: &f64| if z.is_nan() { NO_DATA } else { levels.partition_point(|level| level < z) as u8 };

@@ -54,6 +54,15 @@ fn totals<const N: usize>(dem: &Grid, terms: impl Fn(f64, f64, f64) -> [f64; N] 
 }
 
 /// Heights above the least-squares plane; cells without data are NaN. A planar surface gives exact zeros.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_roughness::level;
+///
+/// let geometry = Geometry::square(4, 6, 0.5);
+/// let slope = Grid::new(geometry, (0..24).map(|k| 7.0 + 0.1 * geometry.x(k % 6) - 0.3 * geometry.y(k / 6)).collect());
+/// assert!(level(&slope).values.iter().all(|z| *z == 0.0));
+/// ```
 pub fn level(dem: &Grid) -> Grid {
     let plane = Plane::of(dem);
     let cols = dem.cols();

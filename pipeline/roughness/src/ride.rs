@@ -38,6 +38,27 @@ impl Ride {
     ///
     /// # Errors
     /// Cells that are too large; a surface shorter than four times the longest wavelength.
+    ///
+    /// # Examples
+    /// ```
+    /// use sastrugi_numeric::{Geometry, Grid};
+    /// use sastrugi_roughness::{Detrender, Ride, WaveBand};
+    /// use std::f64::consts::TAU;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// // Waves along x, 2 m long and 2 cm high above the mean, on 40 x 20 m in cells of 10 cm.
+    /// let geometry = Geometry::square(200, 400, 0.1);
+    /// let heights = (0..geometry.len()).map(|k| 0.02 * (TAU * geometry.x(k % 400) / 2.0).sin()).collect();
+    /// let dem = Grid::new(geometry, heights);
+    /// let ride = Ride::of(&dem, &WaveBand::new(1.0, 4.0)?, Detrender::Band, false)?;
+    /// // A profile along x has the RMS of a sine, one along y none.
+    /// assert!((ride.rms_along_m[0] / (0.02 / 2_f64.sqrt()) - 1.0).abs() < 0.02);
+    /// assert!(ride.rms_along_m[1] < 1e-9);
+    /// // Waves shorter than two cells cannot be seen.
+    /// assert!(Ride::of(&dem, &WaveBand::new(0.15, 4.0)?, Detrender::Band, false).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn of(dem: &Grid, band: &WaveBand, detrender: Detrender, allow_coarse: bool) -> Result<Self, BandError> {
         let [dx, dy] = dem.geometry.cell;
         if !allow_coarse {

@@ -13,6 +13,13 @@ const VON_KARMAN: f64 = 0.4;
 
 /// `z0 = 0.5 h* lambda_f`, m (Lettau 1969), for obstacles of height `height_m` with a frontal area per ground area of
 /// `frontal_area_index`.
+///
+/// ```
+/// use sastrugi_roughness::lettau_z0_m;
+///
+/// // Hummocks of 20 cm that show the wind a tenth of their ground as frontal area.
+/// assert!((lettau_z0_m(0.2, 0.1) - 0.01).abs() < 1e-15);
+/// ```
 pub fn lettau_z0_m(height_m: f64, frontal_area_index: f64) -> f64 {
     LETTAU * height_m * frontal_area_index
 }
