@@ -36,6 +36,15 @@ impl Travelled {
     pub const NONE: Self = Self { cost: 0.0, length_m: 0.0, horizontal_m: 0.0, steepest: [0.0; 2] };
 
     /// Appends another line.
+    ///
+    /// ```
+    /// use sastrugi_navigation::Travelled;
+    ///
+    /// let climb = Travelled { cost: 7.0, length_m: 5.0, horizontal_m: 4.0, steepest: [0.75, 0.0] };
+    /// let descent = Travelled { cost: 4.0, length_m: 13.0, horizontal_m: 12.0, steepest: [0.0, 5.0 / 12.0] };
+    /// let both = Travelled::NONE.then(climb).then(descent);
+    /// assert_eq!((both.cost, both.length_m, both.steepest), (11.0, 18.0, [0.75, 5.0 / 12.0]));
+    /// ```
     pub fn then(self, next: Self) -> Self {
         let steepest = [0, 1].map(|k| self.steepest[k].max(next.steepest[k]));
         Self {

@@ -74,6 +74,18 @@ impl SlopeLimits {
     ///
     /// # Errors
     /// A limit out of range.
+    ///
+    /// ```
+    /// use sastrugi_navigation::SlopeLimits;
+    ///
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// let limits = SlopeLimits::new(20.0, 30.0)?;
+    /// // Rise over run in the direction of travel: 26.6 degrees is too steep to climb, but not to descend.
+    /// assert!(!limits.allow(0.5) && limits.allow(-0.5));
+    /// assert!(SlopeLimits::new(20.0, 90.0).is_err());
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn new(up_deg: f64, down_deg: f64) -> Result<Self, ParameterError> {
         for (key, value) in [("max_up_deg", up_deg), ("max_down_deg", down_deg)] {
             if !(value > 0.0 && value < 90.0) {

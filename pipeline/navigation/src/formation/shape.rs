@@ -59,6 +59,18 @@ impl Pattern {
     }
 
     /// Slots of a team of this size. With four members they are those of the thesis.
+    ///
+    /// ```
+    /// use sastrugi_navigation::formation::shape::Pattern;
+    ///
+    /// let wedge = Pattern::Wedge.slots(4, 2.0);
+    /// let place = |k: usize| (wedge[k].id, wedge[k].predecessor, wedge[k].depth_m, wedge[k].width_m);
+    /// assert_eq!(place(0), (1, None, 0.0, 0.0));
+    /// // To the left of the leader, to its right, and behind the one on the left.
+    /// assert_eq!(place(1), (2, Some(1), 2.0, -2.0));
+    /// assert_eq!(place(2), (3, Some(1), 2.0, 2.0));
+    /// assert_eq!(place(3), (4, Some(2), 2.0, -2.0));
+    /// ```
     pub fn slots(self, members: u32, spacing_m: f64) -> Vec<SlotParameters> {
         let slot = |id: u32| {
             // Slot 2 is to the left and 3 to the right; each later one follows the one two before.
