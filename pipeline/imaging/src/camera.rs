@@ -55,6 +55,15 @@ pub struct ParallelCamera {
 impl ParallelCamera {
     /// A camera in the direction `azimuth_deg` (clockwise from north) and `elevation_deg` (90: straight above) as seen from the ground. The
     /// centre of its image shows `centre_m`; a pixel measures `pixel_m` perpendicular to the rays.
+    ///
+    /// ```
+    /// use sastrugi_imaging::{Camera, ParallelCamera};
+    ///
+    /// // From straight above, with pixels of half a metre: a map with north up.
+    /// let camera = Camera::Parallel(ParallelCamera::new([0.0, 90.0], [10.0, 20.0, 0.0], 0.5, [30, 40]));
+    /// let [col, row] = camera.project([12.0, 21.0, 5.0]).unwrap();
+    /// assert!((col - 24.0).abs() < 1e-12 && (row - 13.0).abs() < 1e-12);
+    /// ```
     pub fn new(
         [azimuth_deg, elevation_deg]: [f64; 2],
         centre_m: Vector,
@@ -82,6 +91,15 @@ pub struct PinholeCamera {
 impl PinholeCamera {
     /// A camera at `position_m` that looks at `target_m`; the width of its image spans `field_of_view_deg`. The top of the image is up, or
     /// north if it looks straight down.
+    ///
+    /// ```
+    /// use sastrugi_imaging::{Camera, PinholeCamera};
+    ///
+    /// // 10 m above the ground, looking down; 90 deg over 40 columns are 20 m of ground.
+    /// let camera = Camera::Pinhole(PinholeCamera::new([0.0, 0.0, 10.0], [0.0; 3], 90.0, [40, 40]));
+    /// let [col, row] = camera.project([5.0, 0.0, 0.0]).unwrap();
+    /// assert!((col - 30.0).abs() < 1e-9 && (row - 20.0).abs() < 1e-9);
+    /// ```
     pub fn new(position_m: Vector, target_m: Vector, field_of_view_deg: f64, [rows, cols]: [usize; 2]) -> Self {
         let back = unit(minus(position_m, target_m));
         let vertical = [0.0, 0.0, 1.0];
@@ -127,6 +145,16 @@ impl Camera {
     }
 
     /// The ray of a position in the image, column and row in pixels from the upper left corner.
+    ///
+    /// ```
+    /// use sastrugi_imaging::{Camera, PinholeCamera};
+    ///
+    /// let camera = Camera::Pinhole(PinholeCamera::new([0.0, 0.0, 10.0], [0.0; 3], 90.0, [40, 40]));
+    /// let ray = camera.ray([30.0, 20.0]);
+    /// // It meets the ground after 10 m of descent.
+    /// let ground = [0, 1, 2].map(|k| ray.origin_m[k] - 10.0 / ray.direction[2] * ray.direction[k]);
+    /// assert!((ground[0] - 5.0).abs() < 1e-9 && ground[1].abs() < 1e-9 && ground[2].abs() < 1e-9);
+    /// ```
     pub fn ray(&self, [col, row]: [f64; 2]) -> Ray {
         let [rows, cols] = self.shape();
         let (right, top) = (col - 0.5 * cols as f64, 0.5 * rows as f64 - row);

@@ -26,6 +26,13 @@ impl Noise {
     }
 
     /// Standard deviation at a brightness.
+    ///
+    /// ```
+    /// use sastrugi_imaging::Noise;
+    ///
+    /// let noise = Noise { relative: 0.01, absolute: 0.004 };
+    /// assert!((noise.deviation(0.3) - 0.005).abs() < 1e-12);
+    /// ```
     #[inline]
     pub fn deviation(&self, brightness: f64) -> f64 {
         let relative = self.relative * brightness;

@@ -33,6 +33,15 @@ impl Sun {
     }
 
     /// Unit vector towards the sun.
+    ///
+    /// ```
+    /// use sastrugi_imaging::Sun;
+    ///
+    /// let sun = Sun { azimuth_deg: 90.0, elevation_deg: 30.0 };
+    /// let [east, north, up] = sun.direction();
+    /// assert!((east - 0.75_f64.sqrt()).abs() < 1e-12 && north.abs() < 1e-12 && (up - 0.5).abs() < 1e-12);
+    /// assert!(Sun { elevation_deg: -5.0, ..sun }.check().is_err());
+    /// ```
     pub fn direction(&self) -> Vector {
         direction(self.azimuth_deg, self.elevation_deg)
     }
