@@ -22,6 +22,21 @@ pub struct Difficulty {
 impl Difficulty {
     /// The ground of `dem` (heights, m) and `classes` (codes of [`RoughnessClass`], same geometry) under a mission; moving
     /// average over `window_m`.
+    ///
+    /// ```
+    /// use sastrugi_mobility::missions::{Difficulty, Mission};
+    /// use sastrugi_numeric::{Geometry, Grid};
+    /// use sastrugi_schemas::RoughnessClass;
+    ///
+    /// // A slope of 1 : 4 to the east, of low roughness in the west and high roughness in the east.
+    /// let geometry = Geometry::square(20, 40, 0.5);
+    /// let dem = Grid::new(geometry, (0..geometry.len()).map(|k| 0.25 * geometry.x(k % 40)).collect());
+    /// let code = |k: usize| if k % 40 < 20 { RoughnessClass::Low as u8 } else { RoughnessClass::High as u8 };
+    /// let classes = Grid { geometry, values: (0..geometry.len()).map(code).collect() };
+    /// let ground = Difficulty::along(&dem, &classes, &Mission::between(0, [5.0, 5.0], [15.0, 5.0]), 0.5);
+    /// assert_eq!(ground.shares, [0.5, 0.0, 0.5]);
+    /// assert!((ground.max_slope - 0.25).abs() < 1e-9 && ground.band_rms_m < 1e-9);
+    /// ```
     pub fn along(dem: &Grid, classes: &Grid<u8>, mission: &Mission, window_m: f64) -> Self {
         let cell_m = dem.geometry.cell[0].min(dem.geometry.cell[1]);
         let intervals = (2.0 * mission.course_length_m() / cell_m).ceil().max(1.0);

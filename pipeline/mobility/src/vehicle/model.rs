@@ -108,6 +108,16 @@ impl Vehicle {
 
     /// Half the diagonal of the rectangle around chassis and wheels in plan, m: the radius that the vehicle sweeps when it
     /// turns on the spot.
+    ///
+    /// ```
+    /// use sastrugi_mobility::registry::vehicle;
+    /// use serde_json::Map;
+    ///
+    /// let husky = vehicle("husky_a200", &Map::new()).unwrap();
+    /// assert_eq!(husky.name(), "husky_a200");
+    /// // It is longer than its wheelbase of 0.512 m, and sweeps less than a metre.
+    /// assert!(husky.half_diagonal_m() > 0.256 && husky.half_diagonal_m() < 1.0);
+    /// ```
     pub fn half_diagonal_m(&self) -> f64 {
         let (wheels, size) = (&self.parameters.wheels, self.parameters.chassis.size_m);
         let length = size[0].max(self.wheelbase_m() + 2.0 * wheels.radius_m);

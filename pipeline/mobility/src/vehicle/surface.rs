@@ -250,6 +250,20 @@ impl SurfaceMap {
     ///
     /// # Errors
     /// A raster with a negative or infinite value.
+    ///
+    /// ```
+    /// use sastrugi_mobility::vehicle::{SurfaceLayers, SurfaceMap, SurfaceParameters};
+    /// use sastrugi_numeric::{Geometry, Grid};
+    ///
+    /// // Ice on one cell of the study's ground.
+    /// let mut friction = Grid::filled(Geometry::square(4, 4, 1.0), f64::NAN);
+    /// friction.values[5] = 0.1;
+    /// let layers = |friction| SurfaceLayers { wheel_friction: Some(friction), ..SurfaceLayers::default() };
+    /// assert!(SurfaceMap::new(&SurfaceParameters::default(), layers(friction.clone())).is_ok());
+    /// friction.values[5] = -0.1;
+    /// let error = SurfaceMap::new(&SurfaceParameters::default(), layers(friction)).unwrap_err();
+    /// assert_eq!((error.what, error.value, error.x_m, error.y_m), ("wheel friction", -0.1, 1.5, 2.5));
+    /// ```
     pub fn new(parameters: &SurfaceParameters, layers: SurfaceLayers) -> Result<Self, SurfaceError> {
         check_layer("wheel friction", layers.wheel_friction.as_ref())?;
         check_layer("rolling resistance", layers.rolling_resistance.as_ref())?;
