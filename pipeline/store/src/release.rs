@@ -132,6 +132,36 @@ impl Release {
     /// # Errors
     /// [`ReleaseError::NotARelease`] if the folder has no sastrugi manifest, or if that lists an invalid path, a path twice, or paths out of
     /// order.
+    ///
+    /// ```
+    /// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+    /// use sastrugi_schemas::manifest::Origin;
+    /// use sastrugi_schemas::tables::MissionRow;
+    /// use sastrugi_store::digest;
+    /// use sastrugi_store::release::{Head, Release, ReleaseBuilder};
+    ///
+    /// let folder = tempfile::tempdir()?;
+    /// let dest = folder.path().join("demo");
+    /// let study = "[study]\n";
+    /// let head = Head {
+    ///     name: "demo".to_owned(),
+    ///     study_sha256: digest::of_bytes(study.as_bytes()),
+    ///     seed: 7,
+    ///     version: "0.1.0".to_owned(),
+    ///     license: "CC-BY-4.0".to_owned(),
+    /// };
+    /// let mut builder = ReleaseBuilder::beside(&dest, head)?;
+    /// builder.write_text("study.toml", study, Origin::default())?;
+    /// builder.seal(&dest)?;
+    ///
+    /// let release = Release::open(&dest)?;
+    /// assert_eq!((release.manifest().name.as_str(), release.manifest().seed), ("demo", 7));
+    /// assert_eq!(std::fs::read_to_string(release.sealed("study.toml")?)?, study);
+    /// // Nothing was driven.
+    /// assert!(release.rows::<MissionRow>()?.is_empty());
+    /// # Ok(())
+    /// # }
+    /// ```
     pub fn open(folder: &Path) -> Result<Self, ReleaseError> {
         let path = folder.join(MANIFEST);
         let text = crate::file::read(&path).map_err(unread(folder, &path))?;

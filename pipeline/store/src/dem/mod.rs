@@ -201,6 +201,23 @@ pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
 ///
 /// # Errors
 /// [`DemError::Unfit`] if the format cannot represent the grid, [`DemError::Io`] if the file cannot be written.
+///
+/// # Examples
+/// ```
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// use sastrugi_numeric::{Geometry, Grid};
+/// use sastrugi_store::dem::{Crs, WriteOptions, read, write};
+///
+/// let folder = tempfile::tempdir()?;
+/// let path = folder.path().join("a.tif");
+/// let grid = Grid::new(Geometry::square(2, 3, 0.5), vec![1.5, 2.0, f64::NAN, -0.25, 0.0, 7.0]);
+/// write(&path, &grid, &Crs::default(), &WriteOptions::default())?;
+/// let again = read(&path)?.grid;
+/// assert_eq!((again.geometry, again.at(1, 0)), (grid.geometry, -0.25));
+/// assert!(again.at(0, 2).is_nan());
+/// # Ok(())
+/// # }
+/// ```
 pub fn write<'a>(
     target: impl Into<Target<'a>>,
     grid: &Grid,
