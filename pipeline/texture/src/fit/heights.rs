@@ -47,6 +47,19 @@ impl Profiles {
     ///
     /// # Errors
     /// No transect with a height.
+    ///
+    /// ```
+    /// use sastrugi_texture::{Heights, Profiles};
+    ///
+    /// let profiles = Profiles::new(0.1, &[vec![0.0, 0.02, 0.01], vec![0.03, 0.01]]).unwrap();
+    /// let geometry = profiles.geometry();
+    /// assert_eq!((geometry.rows, geometry.cols, geometry.cell[0]), (2, 3, 0.1));
+    /// // The shorter one ends with no data.
+    /// let mut heights = Vec::new();
+    /// profiles.read(1..2, 0..3, &mut heights).unwrap();
+    /// assert!(heights[..2] == [0.03, 0.01] && heights[2].is_nan());
+    /// assert!(Profiles::new(0.1, &[]).is_err());
+    /// ```
     pub fn new(spacing_m: f64, heights_m: &[Vec<f64>]) -> Result<Self, FitError> {
         let cols = heights_m.iter().map(Vec::len).max().unwrap_or(0);
         if cols == 0 {

@@ -144,6 +144,25 @@ pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> 
 ///
 /// # Errors
 /// As [`fit()`], as far as the residual is concerned.
+///
+/// # Examples
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, Streams, sums};
+/// use sastrugi_texture::{FitParameters, residual};
+///
+/// # fn main() -> Result<(), Box<dyn std::error::Error>> {
+/// // Noise of 2 cm on a slope of 1 : 10, and windows of 11 x 11 cells.
+/// let geometry = Geometry::square(80, 80, 0.1);
+/// let mut stream = Streams::for_seed(1, "example").stream("noise");
+/// let heights = (0..geometry.len()).map(|k| 0.1 * geometry.x(k % 80) + 0.02 * stream.normal()).collect();
+/// let settings = FitParameters { outer_scale_m: 1.1, ..FitParameters::default() }.try_into()?;
+/// let found = residual(&Grid::new(geometry, heights), &settings)?;
+/// // The slope is background.
+/// let rms_m = sums::variance(&sums::finite(&found.values)).sqrt();
+/// assert!((rms_m / 0.02 - 1.0).abs() < 0.1, "{rms_m}");
+/// # Ok(())
+/// # }
+/// ```
 pub fn residual(heights: &dyn Heights, settings: &FitSettings) -> Result<Grid, FitError> {
     // The search for objects depends on how the raster is cut into strips, and that on the lags of the fit.
     let case = Case::new(heights, settings)?;
