@@ -86,6 +86,16 @@ pub fn height_patch(surface: &impl Surface, position_m: [f64; 2], heading_rad: f
 }
 
 /// As [`height_patch`], relative to the height of the surface at the position: all `NaN` if it has none there.
+///
+/// ```
+/// use sastrugi_numeric::{Geometry, Grid, PatchShape, relative_height_patch};
+///
+/// let values = (0..5).flat_map(|_| [0.5, 1.5, 2.5, 3.5, 4.5]).collect();
+/// let plane = Grid::new(Geometry::square(5, 5, 1.0), values);
+/// let shape = PatchShape::new([2.0, 2.0], 1.0).unwrap();
+/// assert_eq!(relative_height_patch(&plane, [2.5, 2.5], 0.0, &shape), [0.5, 0.5, -0.5, -0.5]);
+/// assert!(relative_height_patch(&plane, [9.0, 9.0], 0.0, &shape).iter().all(|height| height.is_nan()));
+/// ```
 pub fn relative_height_patch(
     surface: &impl Surface,
     position_m: [f64; 2],

@@ -18,6 +18,14 @@ pub fn mean(values: &[f64]) -> f64 {
 }
 
 /// Mean of squared deviations from the mean (divided by n); NaN for no values.
+///
+/// ```
+/// use sastrugi_numeric::sums::{finite, mean, variance};
+///
+/// let values = finite(&[1.0, f64::NAN, 3.0, 5.0]);
+/// assert_eq!((mean(&values), variance(&values)), (3.0, 8.0 / 3.0));
+/// assert!(mean(&[]).is_nan());
+/// ```
 pub fn variance(values: &[f64]) -> f64 {
     let centre = mean(values);
     let squares: Vec<f64> = values.iter().map(|v| (v - centre) * (v - centre)).collect();
