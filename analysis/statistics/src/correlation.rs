@@ -22,6 +22,14 @@ pub fn pearson(x: &[f64], y: &[f64]) -> f64 {
 }
 
 /// Spearman's (1904) rank correlation: Pearson's correlation of the ranks, with mean ranks for ties.
+///
+/// ```
+/// use sastrugi_statistics::correlation::{ranks, spearman};
+///
+/// assert_eq!(ranks(&[5.0, 2.0, 5.0, 9.0]), [2.5, 1.0, 2.5, 4.0]);
+/// // Any rising curve has rank correlation 1.
+/// assert!((spearman(&[1.0, 2.0, 3.0, 4.0], &[1.0, 8.0, 27.0, 64.0]) - 1.0).abs() < 1e-12);
+/// ```
 pub fn spearman(x: &[f64], y: &[f64]) -> f64 {
     let n = x.len().min(y.len());
     pearson(&ranks(&x[..n]), &ranks(&y[..n]))

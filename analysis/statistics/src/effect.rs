@@ -79,6 +79,15 @@ pub fn shift(first: &[f64], second: &[f64]) -> f64 {
 }
 
 /// Delta from the first group to the second; NaN if either is empty.
+///
+/// ```
+/// use sastrugi_statistics::effect::{delta, shift};
+///
+/// let (first, second) = ([1.0, 2.0, 3.0], [2.0, 3.0, 4.0]);
+/// // Of the nine pairs, six rise, one falls and two are equal.
+/// assert!((delta(&first, &second) - 5.0 / 9.0).abs() < 1e-12);
+/// assert_eq!(shift(&first, &second), 1.0);
+/// ```
 pub fn delta(first: &[f64], second: &[f64]) -> f64 {
     let second = sorted(second);
     let above_less_below = |x: &f64| {

@@ -41,6 +41,13 @@ const DRAWS_MAX: f64 = 1e5;
 
 /// Number of random arrangements for each of several tests that are adjusted together at level `alpha`; if there are no more than these,
 /// all are enumerated.
+///
+/// ```
+/// use sastrugi_statistics::permutation::draws;
+///
+/// // More tests need more arrangements, for the least p that the first of them can have after adjustment.
+/// assert!(draws(100_000, 0.05) > draws(1, 0.05));
+/// ```
 pub fn draws(tests: usize, alpha: f64) -> usize {
     DRAWS.max((DRAWS_PER_TEST * tests as f64 / alpha).min(DRAWS_MAX) as usize)
 }
