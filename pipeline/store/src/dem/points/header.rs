@@ -8,7 +8,9 @@
 //! Each is checked here against what the file can hold.
 
 use crate::dem::raster::Refusal;
+use crate::guard::unless_panicking;
 use laz::LazVlr;
+use laz::laszip::ChunkTable;
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// Longest header of a supported version, bytes.
@@ -296,7 +298,7 @@ impl DeclaredSize {
         }
         let end = self.chunk_table(file)?;
         if layered {
-            self.check_layers(file, end)?;
+            self.check_layers(file, end, &description)?;
         }
         Ok(Compression { description, chunks: if layered { Chunks::Layered } else { Chunks::Many }, end })
     }
@@ -334,9 +336,10 @@ impl DeclaredSize {
     }
 
     /// Walks the chunks of point formats 6 to 10 up to the chunk table: an uncompressed point, the number of points, the bytes
-    /// of each layer, the layers.
-    fn check_layers(&self, file: &mut (impl Read + Seek), table: u64) -> Result<(), Refusal> {
+    /// of each layer, the layers. The decoder must find the points that it wants in chunks that were walked.
+    fn check_layers(&self, file: &mut (impl Read + Seek), table: u64, description: &LazVlr) -> Result<(), Refusal> {
         let mut sizes = vec![0; 4 * laszip_layers(self.format, self.point_bytes)];
+        let mut decoded = self.decoded_points(file, description)?.into_iter();
         let (mut at, mut points) = (self.data_start + 8, 0);
         while at < table {
             let start = at + u64::from(self.point_bytes);
@@ -347,12 +350,22 @@ impl DeclaredSize {
             if at > table {
                 return Err(Refusal::new(format!("is damaged after {points} of its {} points", self.points)));
             }
-            points += in_chunk;
+            points += in_chunk.min(decoded.next().unwrap_or(0));
         }
         if points < self.points {
             return Err(Refusal::new(format!("claims {} points, but its chunks hold {points}", self.points)));
         }
         Ok(())
+    }
+
+    /// Numbers of points after which the decoder goes on to the next chunk, whatever the chunks state. It reads the chunk table in the same way, and
+    /// decodes whatever follows where it cannot.
+    fn decoded_points(&self, file: &mut (impl Read + Seek), description: &LazVlr) -> Result<Vec<u64>, Refusal> {
+        file.seek(SeekFrom::Start(self.data_start)).map_err(|e| unreadable(&e))?;
+        match unless_panicking(|| ChunkTable::read_from(&mut *file, description)) {
+            Some(Ok(table)) => Ok(table.into_iter().map(|chunk| chunk.point_count).collect()),
+            _ => Err(Refusal::new("is damaged: its chunk table cannot be read")),
+        }
     }
 }
 
