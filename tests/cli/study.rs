@@ -168,7 +168,7 @@ fn val_all_errors_of_a_table_are_told_at_once() {
     told("[[missions]]", &both, &["`fit` names \"other\"", "in tables with errors: f"]);
 }
 
-/// What a refused table would have defined is missed by all tables that depend on it. That is not told, but their own errors are, in the same call.
+/// Tables that refer to a refused table lack what it would define. That is not reported, but their own errors are, in the same call.
 #[test]
 fn val_errors_behind_a_refused_table_are_told_at_once() {
     let folder = area();
