@@ -386,6 +386,41 @@ fn val_class_maps_name_the_radius() {
     assert!(said(&data).contains("class map, not closed, over"));
 }
 
+/// Where no mission failed, the page says so in the summary and in place of curves; where some failed, it says neither, and names the groups
+/// without failures.
+#[test]
+fn val_releases_without_failures_say_so() {
+    let mut data = made_up::full(2, 24);
+    data.missions.retain(|m| m.variant.is_none());
+    data.terrains.retain(|t| t.variant.is_none());
+    let told = |data: &Data| {
+        let (files, summary) = report(data);
+        assert_sound(&files);
+        let page = &files["index.html"];
+        let in_summary = page.split("<section id=\"summary\">").nth(1).unwrap().split("</section>").next().unwrap();
+        let curves = summary.figures.iter().filter(|figure| figure.starts_with("incidence-")).count();
+        let words = [in_summary.contains("reached the goal; none failed."), page.contains("<p>No mission failed.</p>")];
+        (words, curves, page.contains("No failures in 2.30 (16 missions)."))
+    };
+    assert_eq!(told(&data), ([false; 2], 3, false));
+    let steep = |m: &Mission| m.terrain_id.starts_with("d2.30");
+    data.missions.iter_mut().filter(|m| steep(m)).for_each(|m| m.outcome = "success".into());
+    assert_eq!(told(&data), ([false; 2], 2, true));
+    data.missions.iter_mut().for_each(|m| m.outcome = "success".into());
+    assert_eq!(told(&data), ([true; 2], 0, false));
+}
+
+/// Class maps are closed, but the classes along a mission are not: its caption says so.
+#[test]
+fn val_captions_of_missions_name_the_raw_classes() {
+    let (files, summary) = report(&made_up::full(1, 24));
+    let missions = summary.figures.iter().filter(|figure| figure.starts_with("mission-d2.")).count();
+    assert!(missions > 0, "{:?}", summary.figures);
+    let words =
+        "the roughness class under the vehicle, cell by cell before the class map was closed. Recording: mcap/d2.";
+    assert_eq!(files["index.html"].matches(words).count(), missions);
+}
+
 /// A map of each kind is drawn if it has more than one value; the colours of a relief include holes far below the other 99 % of the ground.
 #[test]
 fn val_maps_and_sparse_holes_are_drawn() {

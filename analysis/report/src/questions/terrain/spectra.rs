@@ -143,6 +143,33 @@ mod tests {
         assert_eq!(rounded, [0, 7, 99, 100, 110, 1200, 1300, 99_000]);
     }
 
+    /// The band of a slope is stated. Its line is drawn only where the spectra reach both ends of the band; where they do not, the caption says so.
+    #[test]
+    fn val_slopes_are_drawn_where_the_spectrum_covers_their_band() {
+        let data = |covers: &dyn Fn(f64) -> bool| {
+            let mut data = crate::tests::made_up::full(1, 24);
+            data.psd.retain(|row| covers(row.frequency_cycles_m));
+            data
+        };
+        let told = |data: &Data| {
+            let figure = spectra(data, &data.terrain_groups()).swap_remove(0);
+            let svg = figure.svg.finish(&figure.id, &figure.title, &figure.description);
+            (figure.caption, svg.contains(">slope \u{2212}3.60<"))
+        };
+        // A side of 50.4 m with cells of 2.1 m: 4 cycles to half the Nyquist frequency.
+        let ends = "0.079 to 0.12 cycles/m";
+        let (caption, is_drawn) = told(&data(&|_| true));
+        assert!(caption.ends_with(&format!("; dashed: the median of their slopes, fitted from {ends}.")), "{caption}");
+        assert!(is_drawn);
+        // A spectrum may end a factor of 1.5 within the band: its bins leave that much free.
+        for (covered, expected) in [(0.0..0.07, false), (0.15..1.0, false), (0.0..0.085, true), (0.1..1.0, true)] {
+            let (caption, is_drawn) = told(&data(&|f| covered.contains(&f)));
+            let words =
+                format!("does not cover the band in which its slope is fitted, {ends}, so the slope is not drawn.");
+            assert_eq!((is_drawn, !caption.ends_with(&words)), (expected, expected), "{caption}");
+        }
+    }
+
     /// Of a group with many terrains, lines are of a sample and medians of all; both are named as what they are.
     #[test]
     fn val_lines_of_a_sample_and_medians_of_all_are_told_apart() {
