@@ -417,4 +417,44 @@ mod tests {
         let shared = "\n  shared cache: 0 items copied from it, 2 published to it, changed in the work area and computed again: 1\n";
         assert!(told(&summary, "2 s").contains(shared));
     }
+
+    /// Of each fit the verdict, which is its first note, before the other notes; of many fits the first five, and the rest is counted.
+    #[test]
+    fn val_a_run_ends_with_the_verdicts_on_its_fits() {
+        let note = |stage: &str, item: &str, note: &str| ItemNote {
+            stage: stage.to_owned(),
+            item: item.to_owned(),
+            note: note.to_owned(),
+        };
+        let of_fits = [
+            note("fit", "bar", "roughness of short range"),
+            note("fit", "bar", "0.2 of the cells are masked"),
+            note("fit", "snow", "the fit cannot tell"),
+        ];
+        let summary = |notes: Vec<ItemNote>| RunSummary {
+            output: PathBuf::from("no-such-release"),
+            items: 9,
+            computed: 9,
+            failures: Vec::new(),
+            notes,
+            failed_in: Default::default(),
+            cache: None,
+        };
+        let of_dem = note("dem", "d", "rows were flipped");
+        let few = summary([of_dem].into_iter().chain(of_fits).collect());
+        let lines = [
+            "no-such-release: 9 items, 9 computed, 0 failed, 2 s",
+            "notes:",
+            "  fit/bar: roughness of short range",
+            "  fit/snow: the fit cannot tell",
+            "  dem/d: rows were flipped",
+            "  fit/bar: 0.2 of the cells are masked",
+        ];
+        assert_eq!(told(&few, "2 s"), lines.join("\n"));
+        let many = summary((0..9).map(|k| note("fit", &format!("f{k}"), &format!("verdict {k}"))).collect());
+        let shown: String = (0..VERDICTS_MAX).map(|k| format!("\n  fit/f{k}: verdict {k}")).collect();
+        let left = 9 - VERDICTS_MAX;
+        let text = format!("notes:{shown}\n  {left} notes on items: see `notes` in manifest.json");
+        assert!(told(&many, "2 s").ends_with(&text), "{}", told(&many, "2 s"));
+    }
 }
