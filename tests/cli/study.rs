@@ -130,6 +130,35 @@ fn val_all_errors_are_told_at_once() {
     }
 }
 
+/// An error far to the right in a line is given by line and column, and a long line beside one is not drawn: columns are counted in 16 bits where
+/// lines are drawn, and such a line fills the screen.
+#[test]
+fn val_errors_in_long_lines_are_told_by_line_and_column() {
+    let folder = area();
+    let blanks = " ".repeat(70_000);
+    let head =
+        "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n";
+    for (lines, words) in [
+        (
+            format!("high = {{{blanks}fractal_dimesion = 2.3}}\n"),
+            "unknown key `high.fractal_dimesion` in terrain (line 9, column 70009)",
+        ),
+        (format!("size_px = [{blanks}64, 64] x\n"), "(line 9, column 70020)"),
+        (format!("size_px = [{blanks}64, 64]\nsize_xp = 3\n"), "unknown key `size_xp` in terrain (line 10, column 1)"),
+        (format!("size_xp = 3\nsize_px = [{blanks}64, 64]\n"), "unknown key `size_xp` in terrain (line 9, column 1)"),
+    ] {
+        write(folder.path(), "study.toml", &format!("{head}{lines}"));
+        for arguments in [&["plan", "study.toml"][..], &["run", "study.toml", "-o", "release"]] {
+            let call = sastrugi_in(folder.path(), arguments);
+            assert_eq!(call.code, 2, "{}", call.stderr);
+            let said: String = call.stderr.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+            assert!(said.contains(words), "\"{words}\" is not in: {said}");
+            assert!(call.stderr.len() < 1000 && !call.stderr.contains("panicked"), "{} bytes", call.stderr.len());
+        }
+    }
+    assert!(!folder.path().join("release").exists());
+}
+
 /// A table is read on without what is refused in it, so that its keys and its values are told in one call; suggestions are those of the table.
 #[test]
 fn val_all_errors_of_a_table_are_told_at_once() {

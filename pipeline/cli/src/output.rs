@@ -9,7 +9,7 @@ use serde_json::Value;
 use std::io::{BufWriter, IsTerminal, Write};
 use std::ops::Range;
 
-/// Places farther right are given by line and column only: drawing such a long line is useless, and `miette` counts columns in 16 bits.
+/// Places in or beside a longer line are given by line and column only: drawing it is useless, and `miette` counts columns in 16 bits.
 const COLUMNS_SHOWN: usize = 1000;
 
 /// Maximum number of errors that are drawn; a file that is not a study would give thousands.
@@ -93,10 +93,12 @@ fn drawn(name: &str, text: &str, error: &StudyError) -> String {
     }
 }
 
-/// Whether the lines of a span are short enough to draw.
+/// Whether the lines of a span are short enough to draw, and the lines before and after it, which are drawn as well.
 fn is_narrow(text: &str, span: &Range<usize>) -> bool {
-    let start = text.get(..span.start).map_or(0, |before| span.start - last_line(before).len());
-    let end = text.get(span.end..).and_then(|rest| rest.find('\n')).map_or(text.len(), |length| span.end + length);
+    let before = text.get(..span.start).and_then(|before| before.rmatch_indices('\n').nth(1));
+    let after = text.get(span.end..).and_then(|after| after.match_indices('\n').nth(1));
+    let start = before.map_or(0, |(at, _)| at + 1);
+    let end = after.map_or(text.len(), |(at, _)| span.end + at);
     text.get(start..end).is_some_and(|lines| lines.lines().all(|line| line.len() <= COLUMNS_SHOWN))
 }
 
@@ -152,11 +154,13 @@ mod tests {
 
     #[test]
     fn val_only_short_lines_are_drawn() {
-        let text = format!("a = 1\nb = \"{}\" x\nc = 2\n", "y".repeat(70_000));
-        let end = text.find(" x").unwrap() + 1;
-        assert!(is_narrow(&text, &(0..1)) && is_narrow(&text, &(text.len() - 2..text.len())));
-        assert!(!is_narrow(&text, &(end..end + 1)) && !is_narrow(&text, &(0..text.len())));
-        assert!(!is_narrow(&text, &(0..text.len() + 9)));
+        let text = format!("a = 1\nb = 2\nc = \"{}\" x\nd = 3\ne = 4\n", "y".repeat(70_000));
+        let at = |word: &str| text.find(word).unwrap();
+        let is_drawn = |word: &str| is_narrow(&text, &(at(word)..at(word) + 1));
+        assert!(is_drawn("a =") && is_drawn("e =") && is_narrow(&text, &(text.len() - 2..text.len())));
+        // The long line itself, and its neighbours, with which it would be drawn.
+        assert!(!is_drawn("x\n") && !is_drawn("b =") && !is_drawn("d ="));
+        assert!(!is_narrow(&text, &(0..text.len())) && !is_narrow(&text, &(0..text.len() + 9)));
     }
 
     #[test]
