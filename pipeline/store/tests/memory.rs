@@ -1,8 +1,8 @@
-//! Memory limits: writing a raster stays within its documented memory, and reading a log within what its file can hold.
+//! Memory limits: writing a raster stays within its documented memory, and reading a raster or a log within what its file can hold.
 
 use peak_alloc::PeakAlloc;
 use sastrugi_numeric::{Geometry, Grid};
-use sastrugi_store::dem::{self, Compression, Crs, WriteOptions};
+use sastrugi_store::dem::{self, Compression, Crs, ReadOptions, WriteOptions};
 use sastrugi_store::mcap::{describe_file, read_log};
 use std::path::Path;
 use std::sync::Mutex;
@@ -94,6 +94,70 @@ fn val_logs_allocate_no_memory_for_claimed_texts() {
         for refused in [log.unwrap_err(), summary.unwrap_err()].map(|error| error.to_string()) {
             let words = "a record claims a string of 1919251503 bytes, but has only 4 bytes left";
             assert!(refused.ends_with(words), "opcode {opcode}: {refused}");
+        }
+    }
+}
+
+/// A TIFF of one strip of int16 cells; the file has 32 of them, whatever it claims.
+fn tiff(side: u32, is_placed: bool) -> Vec<u8> {
+    const STRIP: [u8; 64] = [1; 64];
+    let places = if is_placed { [[33550, 12, 3, 0], [33922, 12, 6, 24]].to_vec() } else { Vec::new() };
+    let after_tags = 8 + 2 + 12 * (10 + places.len() as u32) + 4;
+    let strip_at = after_tags + 72 * u32::from(is_placed);
+    // Tag, type (3 short, 4 long, 12 double), count, value or its place.
+    let mut tags: Vec<[u32; 4]> = vec![
+        [256, 4, 1, side],
+        [257, 4, 1, side],
+        [258, 3, 1, 16],
+        [259, 3, 1, 1],
+        [262, 3, 1, 1],
+        [273, 4, 1, strip_at],
+        [277, 3, 1, 1],
+        [278, 4, 1, side],
+        [279, 4, 1, STRIP.len() as u32],
+        [339, 3, 1, 2],
+    ];
+    tags.extend(places.iter().map(|[tag, kind, count, at]| [*tag, *kind, *count, after_tags + at]));
+    let mut bytes = b"II*\0\x08\0\0\0".to_vec();
+    bytes.extend((tags.len() as u16).to_le_bytes());
+    for [tag, kind, count, value] in tags {
+        [tag, kind].iter().for_each(|number| bytes.extend((*number as u16).to_le_bytes()));
+        [count, value].iter().for_each(|number| bytes.extend(number.to_le_bytes()));
+    }
+    bytes.extend([0; 4]);
+    if is_placed {
+        // Cells of 1 m; the corner of the first one is at (0, 0).
+        [1.0, 1.0, 0.0].iter().chain(&[0.0; 6]).for_each(|number: &f64| bytes.extend(number.to_le_bytes()));
+    }
+    [bytes, STRIP.to_vec()].concat()
+}
+
+/// Nor for cells that the header of a raster claims: a file of 300 bytes cannot hold them.
+#[test]
+fn val_rasters_allocate_no_memory_for_claimed_cells() {
+    let _alone = ALONE.lock().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    let options = ReadOptions::default();
+    for is_placed in [false, true] {
+        std::fs::write(&path, tiff(5, is_placed)).unwrap();
+        assert_eq!(dem::read(&path).unwrap().grid.values, [257.0; 25], "placed: {is_placed}");
+        // Beyond the memory that any file may take, beyond the most cells of a raster, and as many as can be stated.
+        for side in [10_000, 60_000, u32::MAX] {
+            let bytes = tiff(side, is_placed);
+            std::fs::write(&path, &bytes).unwrap();
+            let (peak, errors) = peak_of(|| {
+                assert_eq!(dem::claimed(&path, &options), None);
+                [dem::read(&path).err(), dem::open(&path, &options).err()]
+            });
+            println!("{side}, placed: {is_placed}: peak {:.1} MB", 1e-6 * peak as f64);
+            assert!(peak < SMALL, "{side}, placed: {is_placed}: {peak} bytes");
+            let cells = u64::from(side) * u64::from(side);
+            let words = format!("a.tif claims {cells} cells in a file of {} bytes", bytes.len());
+            for error in errors {
+                let error = error.unwrap();
+                assert!(error.unusable_input() && error.to_string().ends_with(&words), "{side}, {is_placed}: {error}");
+            }
         }
     }
 }
