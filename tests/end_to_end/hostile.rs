@@ -183,6 +183,29 @@ fn val_a_panic_of_a_decoder_is_not_printed() {
     assert_eq!(call.stderr.trim_end().lines().count(), 1, "{}", call.stderr);
 }
 
+/// A point cloud with 20 kB of 0xff amid its points: a decoder that recursed with each code overflowed its stack, which ended every verb with 134.
+#[test]
+fn val_endless_switches_of_a_cloud_are_refused() {
+    let folder = area();
+    let path = folder.path();
+    let seed = Path::new(env!("CARGO_MANIFEST_DIR")).join("../fuzz/seeds/points/endless_switches.laz");
+    let cloud = fs::read(seed).unwrap();
+    assert!(cloud.chunk_by(|a, b| a == b).any(|run| run[0] == 0xff && run.len() >= 20_000));
+    fs::write(path.join("cloud.laz"), cloud).unwrap();
+    let dem = "[[dem]]\nid = \"a\"\nfile = \"cloud.laz\"\ncell_m = [0.2, 0.2]\n";
+    write(path, "study.toml", &format!("[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n{dem}"));
+    for arguments in [
+        &["info", "cloud.laz"][..],
+        &["roughness", "cloud.laz"],
+        &["convert", "cloud.laz", "new.tif"],
+        &["fit", "cloud.laz", "--outer-scale", "2", "-o", "fit.json"],
+        &["run", "study.toml", "-o", "release", "--quiet"],
+    ] {
+        ends_with(&sastrugi_in(path, arguments), 65, "is damaged: times switch");
+    }
+    assert!(["new.tif", "fit.json", "release"].iter().all(|name| !path.join(name).exists()));
+}
+
 /// One flipped bit of a point, 16 km outside the box of the header: the grid would take gigabytes for which nothing was planned.
 #[test]
 fn val_a_point_outside_the_box_of_its_cloud_is_refused() {
