@@ -1,6 +1,6 @@
 //! No user data is lost: folders of other programs, links, full disks, good releases.
 
-use sastrugi_tests::{area, called, program, rows, sastrugi_in, small_study, sums, write};
+use sastrugi_tests::{area, called, peak_kib_with, program, rows, sastrugi_in, small_study, sums, write};
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
@@ -275,6 +275,79 @@ fn val_a_memory_limit_is_kept() {
     // Finished results need no memory.
     assert_eq!(run(path, &["--memory", "0.001"]).code, 0);
     assert_eq!(run(path, &["--memory", "0"]).code, 2);
+}
+
+/// Resident memory of a run without large items, its report included: 59 to 61 MiB measured.
+#[cfg(target_os = "linux")]
+const BASE: u64 = 72 << 20;
+
+/// glibc keeps freed buffers of up to 32 MiB for the thread that made them, unless told how large a buffer goes back to the system.
+#[cfg(target_os = "linux")]
+const RETURNED: [(&str, &str); 1] = [("MALLOC_MMAP_THRESHOLD_", "4194304")];
+
+/// Working memory of each item that a run of `study.toml` would compute, bytes.
+#[cfg(target_os = "linux")]
+fn stated(folder: &Path) -> Vec<u64> {
+    let plan = sastrugi_in(folder, &["plan", "study.toml", "-o", "release", "--json"]);
+    let plan: serde_json::Value = serde_json::from_str(&plan.stdout).unwrap();
+    plan["stale"].as_array().unwrap().iter().map(|item| item["memory_bytes"].as_u64().unwrap()).collect()
+}
+
+/// Resident memory of a run stays within `--memory` and what a run without large items takes, although four threads could each compute an item that
+/// takes nearly all of it.
+#[cfg(target_os = "linux")]
+#[test]
+fn val_resident_memory_stays_within_the_limit() {
+    let folder = area();
+    let path = folder.path();
+    let terrains =
+        "[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\nsize_px = [1000, 1000]\ncell_m = 0.05\ncount = 6\n";
+    write(path, "study.toml", &format!("[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n{terrains}"));
+    let stated = stated(path);
+    let largest = *stated.iter().max().unwrap();
+    assert!(stated.iter().filter(|bytes| 10 * **bytes > 9 * largest).count() >= 6, "{stated:?}");
+    let limit = 1.1 * largest as f64;
+    let gib = format!("{:.4}", limit / f64::from(1u32 << 30));
+    let arguments = ["run", "study.toml", "-o", "release", "--memory", &gib, "--threads", "4", "--quiet"];
+    let peak = 1024 * peak_kib_with(path, &arguments, &RETURNED);
+    println!("{:.0} MB resident, limit {:.0} MB", 1e-6 * peak as f64, 1e-6 * limit);
+    assert!(peak as f64 <= limit + BASE as f64, "{peak} bytes, limit {limit}");
+}
+
+/// The stage `roughness` and fits take the memory that `plan` states, and it states at most four times as much.
+#[cfg(target_os = "linux")]
+#[test]
+#[ignore = "slow: ./test --full"]
+fn val_roughness_and_fits_take_the_memory_that_they_state() {
+    let folder = area();
+    let path = folder.path();
+    let made = ["terrain", "multifractal", "--set", "size_px=[2000, 2000]", "--set", "cell_m=0.05", "-o", "ground.tif"];
+    assert_eq!(sastrugi_in(path, &made).code, 0);
+    let mut text =
+        "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[dem]]\nid = \"d\"\nfile = \"ground.tif\"\n"
+            .to_owned();
+    let fits = [
+        "bootstrap = 0",
+        "bootstrap = 0\nmodel = \"empirical\"",
+        "bootstrap = 0\nstatistics = true",
+        "",
+        "mode = \"paper\"",
+    ];
+    // First the DEM, whose largest item is that of its roughness; then each fit alone, since what is finished is not computed again.
+    for (number, settings) in std::iter::once("").chain(fits).enumerate() {
+        if number > 0 {
+            text += &format!("\n[[fit]]\nid = \"f{number}\"\ndem = \"d\"\nouter_scale_m = 2.0\n{settings}\n");
+        }
+        write(path, "study.toml", &text);
+        let items = stated(path);
+        fs::remove_dir_all(path.join("release")).unwrap_or_default();
+        let stated = *items.iter().max().unwrap();
+        assert!(number == 0 || items.len() == 1, "{items:?}");
+        let peak =
+            1024 * peak_kib_with(path, &["run", "study.toml", "-o", "release", "--quiet", "--threads", "2"], &RETURNED);
+        println!("{settings:?}: {:.0} MB resident, stated {:.0} MB", 1e-6 * peak as f64, 1e-6 * stated as f64);
+        assert!(peak <= stated + BASE && stated <= 4 * peak, "{settings}: {peak} bytes, stated {stated}");
+    }
 }
 
 #[test]

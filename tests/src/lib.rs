@@ -85,12 +85,20 @@ pub fn called(command: &mut Command) -> Called {
 /// # Panics
 /// When the program fails, or there is no `python3`, which measures.
 pub fn peak_kib(folder: &Path, arguments: &[&str]) -> u64 {
+    peak_kib_with(folder, arguments, &[])
+}
+
+/// The same with environment variables.
+///
+/// # Panics
+/// As [`peak_kib`].
+pub fn peak_kib_with(folder: &Path, arguments: &[&str], variables: &[(&str, &str)]) -> u64 {
     const MEASURE: &str = "import resource, subprocess, sys\n\
         subprocess.run(sys.argv[1:], check=True, stdout=subprocess.DEVNULL)\n\
         print(resource.getrusage(resource.RUSAGE_CHILDREN).ru_maxrss)";
     let mut command = Command::new("python3");
     command.args(["-c", MEASURE]).arg(program()).args(arguments).current_dir(folder);
-    let call = called(&mut command);
+    let call = called(command.envs(variables.iter().copied()));
     assert_eq!(call.code, 0, "{}", call.stderr);
     call.stdout.trim().parse().expect("a number of KiB")
 }
