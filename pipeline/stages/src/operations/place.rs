@@ -52,13 +52,23 @@ impl Place {
     /// The position written to `path` by the item of a measured DEM. Without such a file, the heights are the complete raster.
     ///
     /// # Errors
-    /// A file that cannot be read.
+    /// A file that cannot be read, or whose window is not inside its raster.
     pub fn read(path: &Path, heights: &Geometry) -> Result<Self, JobError> {
         if !path.is_file() {
             return Ok(Self::of(heights, heights));
         }
         let bytes = sastrugi_store::file::read(path).map_err(|e| JobError::at(path, e))?;
-        serde_json::from_slice(&bytes).map_err(JobError::new)
+        let place: Self = serde_json::from_slice(&bytes).map_err(JobError::new)?;
+        if !(0..2).all(|axis| place.is_inside(axis)) {
+            return Err(JobError::new(format!("{}: its window is not inside its raster", path.display())));
+        }
+        Ok(place)
+    }
+
+    /// Whether the window has cells along rows or columns, all of them of the raster.
+    fn is_inside(&self, axis: usize) -> bool {
+        let end = self.corner[axis].checked_add(self.size[axis]);
+        self.size[axis] > 0 && end.is_some_and(|end| end <= self.shape[axis])
     }
 
     /// Geometry of the complete raster.
@@ -160,5 +170,11 @@ mod tests {
         assert_eq!(Place::read(&path, &WHOLE).unwrap(), place());
         std::fs::write(&path, b"{}").unwrap();
         assert!(Place::read(&path, &WHOLE).is_err());
+        // One column or row too many, no rows, and numbers that overflow.
+        for (corner, size) in [([2, 16], [4, 5]), ([7, 3], [4, 5]), ([2, 3], [0, 5]), ([2, usize::MAX], [4, 5])] {
+            std::fs::write(&path, serde_json::to_vec(&Place { corner, size, ..place() }).unwrap()).unwrap();
+            let error = Place::read(&path, &WHOLE).unwrap_err().to_string();
+            assert!(error.contains("its window is not inside its raster"), "{error}");
+        }
     }
 }
