@@ -122,14 +122,10 @@ impl Reporter {
             state.copy_start = Some(Instant::now());
         }
         let elapsed = state.copy_start.map_or(0.0, |start| start.elapsed().as_secs_f64());
-        if elapsed < KNOWN_AFTER_S || done == 0 || done >= total {
-            return;
+        if let Some(line) = rest_of_copy(elapsed, done, total) {
+            state.copy_start = None;
+            self.say(&line);
         }
-        state.copy_start = None;
-        let (part, whole) = (done as f64, total as f64);
-        let left = crate::output::seconds(elapsed * (whole / part - 1.0));
-        let [part, whole] = [part, whole].map(crate::output::bytes);
-        self.say(&format!("{part} of {whole}, about {left} left"));
     }
 
     /// Time left, from the share of the estimated work that is done.
@@ -141,6 +137,17 @@ impl Reporter {
         let left = self.start.elapsed().as_secs_f64() * (1.0 / share - 1.0);
         format!(", about {} left", crate::output::seconds(left))
     }
+}
+
+/// How much of a copy is done and how long the rest takes at the speed so far; `None` too early to know, and at the end.
+fn rest_of_copy(elapsed_s: f64, done: u64, total: u64) -> Option<String> {
+    if elapsed_s < KNOWN_AFTER_S || done == 0 || done >= total {
+        return None;
+    }
+    let (part, whole) = (done as f64, total as f64);
+    let left = crate::output::seconds(elapsed_s * (whole / part - 1.0));
+    let [part, whole] = [part, whole].map(crate::output::bytes);
+    Some(format!("{part} of {whole}, about {left} left"))
 }
 
 impl Progress for Reporter {
@@ -210,5 +217,14 @@ mod tests {
         assert_eq!(reporter.remaining(&state(2, 8.0)), "");
         let told = reporter.remaining(&state(1, 4.0));
         assert!(told.starts_with(", about ") && told.ends_with(" left"), "{told}");
+    }
+
+    /// At 250 MB/s, after the two seconds from which on a speed can be told.
+    #[test]
+    fn val_the_rest_of_a_copy_takes_as_long_for_each_byte() {
+        let told = |elapsed_s, done| rest_of_copy(elapsed_s, done, 3_000_000_000);
+        assert_eq!(told(2.0, 500_000_000).as_deref(), Some("500.0 MB of 3.0 GB, about 10.0 s left"));
+        assert_eq!(told(11.0, 2_750_000_000).as_deref(), Some("2.8 GB of 3.0 GB, about 1.0 s left"));
+        assert_eq!([told(1.9, 475_000_000), told(2.0, 0), told(12.0, 3_000_000_000)], [None, None, None]);
     }
 }
