@@ -335,8 +335,8 @@ mod tests {
     /// The page states that a wrong yes and a wrong no have a probability of at most 5 % each. Null: two independent normal fields of 192 x 192 m
     /// with covariance exp(-h² / 16), the second 10 % higher in logarithm, so that RMS height, slope and all increments differ by their margin: either
     /// answer is at the limit of being wrong. 2000 pairs; more than 151 of either answer have a false-alarm probability of 4e-7 (binomial, p = 0.05).
-    /// An independent program found 0.5 % and 1.2 %, as the scatter errs towards "cannot tell", and 9 % and 14 % with half the scatter. The verdict
-    /// has power: of equal fields 89 % are a yes, and of those that differ by twice the margin 97 % a no; fewer than 75 % and 90 % are 10 standard
+    /// 8 and 9 were found, as the scatter errs towards "cannot tell"; an independent program found 9 % and 14 % with half the scatter. The verdict
+    /// has power: of equal fields 86 % are a yes, and of those that differ by twice the margin 96 % a no; fewer than 75 % and 90 % are 10 standard
     /// deviations away or more.
     #[test]
     #[ignore = "slow: ./test --full"]
