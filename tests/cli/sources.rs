@@ -362,7 +362,8 @@ fn val_a_strip_across_its_box_needs_a_cell_size_in_a_study() {
     write(path, "study.toml", study);
     let run = || sastrugi_in(path, &["run", "study.toml", "-o", "release", "--quiet"]);
     let call = run();
-    let words = "1200 x 1200 cells of 0.05 m, more than the 566160 cells planned for them; set `cell_m`";
+    let words = "1200 x 1200 cells of 0.05 m, more than the 566160 cells planned for them; convert it to a raster, or, if it is a \
+                 [[dem]], set its `cell_m`";
     assert!(call.code == 65 && call.stderr.contains(words), "{} {}", call.code, call.stderr);
     write(path, "study.toml", &format!("{study}cell_m = [0.2, 0.2]\n"));
     let call = run();

@@ -80,7 +80,6 @@ fn val_install_says_how_to_build_offline() {
 #[ignore = "slow: it compiles"]
 fn val_vendored_sources_build_offline() {
     assert!(!BUILT.has_registry, "cargo did not use the vendored sources alone");
-    assert!(BUILT.program.is_file(), "{}", BUILT.program.display());
 }
 
 /// A build for the CPU at hand (FMA, AVX2, AVX-512 if it has them) gives the same bytes.

@@ -184,12 +184,14 @@ fn crs_of(path: &Path, geometry: &Geometry) -> Result<(Crs, Vec<String>), Refusa
     let prj = path.with_extension("prj");
     let refused = |why: &str| {
         let name = prj.file_name().unwrap_or_default().to_string_lossy();
-        Refusal::new(format!("the file {name} beside it {why}; correct it, or remove it if the grid is in metres"))
+        Refusal::new(format!(
+            "the file {name} beside it {why}; write the system of the grid as well-known text, or move the file elsewhere if it does not describe the grid"
+        ))
     };
     match crate::file::head(&prj, PRJ_BYTES_MAX) {
         Ok(text) => named_crs(&String::from_utf8_lossy(&text))
             .map(|crs| (crs, vec![]))
-            .ok_or_else(|| refused("states neither a projected nor a geographic coordinate system")),
+            .ok_or_else(|| refused("does not state a projected or geographic coordinate system as well-known text")),
         Err(e) if e.kind() == ErrorKind::NotFound => Ok(guess_crs(geometry)),
         Err(e) => Err(refused(&format!("cannot be read ({e})"))),
     }

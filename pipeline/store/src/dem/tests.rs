@@ -127,8 +127,8 @@ fn val_prj_files_state_a_system_or_are_refused() {
         [&b""[..], b"\x00\xff", b"Projection", b"PROJCS[\"plane", b"GEOGCS[\"globe\",DATUM[", b"VERT_CS[\"height\"]"]
     {
         let refused = of(text).unwrap_err();
-        let words = "a.asc: the file a.prj beside it states neither a projected nor a geographic coordinate system; correct it, or remove \
-                     it if the grid is in metres";
+        let words = "a.asc: the file a.prj beside it does not state a projected or geographic coordinate system as well-known text; \
+                     write the system of the grid as well-known text, or move the file elsewhere if it does not describe the grid";
         assert!(refused.ends_with(words), "{refused}");
         assert_eq!(claimed(&path, &ReadOptions::default()), None);
     }

@@ -160,7 +160,8 @@ impl Length for Checked {
 impl ChunkReader for Checked {
     type T = Header;
 
-    /// The crate reads the length of the footer and page headers from what this returns, nothing else.
+    /// The crate reads the length of the footer and page headers from what this returns, nothing else. Readers are built without a page index, with
+    /// which page headers would come from `get_bytes`, unchecked.
     fn get_read(&self, start: u64) -> ParquetResult<Header> {
         let is_tail = start.checked_add(TAIL as u64) == Some(Length::len(self));
         Ok(Header { file: self.0.try_clone()?, start, is_tail, bytes: None })
@@ -194,7 +195,7 @@ impl Header {
             }
         }
         let message = format!(
-            "the file is damaged: at byte {}, a page header has fields that Parquet does not define, or claims more than {PAGE_MAX} bytes",
+            "the file is damaged: at byte {}, there is no page header that Parquet defines, or it claims more than {PAGE_MAX} bytes",
             self.start
         );
         Err(io::Error::new(ErrorKind::InvalidData, message))
@@ -364,6 +365,6 @@ mod tests {
         };
         assert_eq!(read(0).unwrap(), 0x15);
         assert_eq!(read(long.len()).unwrap(), 0x95, "the last 8 bytes are no page header");
-        assert!(read(2).unwrap_err().to_string().contains("at byte 2, a page header"));
+        assert!(read(2).unwrap_err().to_string().contains("at byte 2, there is no page header"));
     }
 }

@@ -408,7 +408,7 @@ impl Job for NavigateJob {
         let led: Result<Vec<Led>, JobError> =
             runs.into_par_iter().map(|(route, run)| self.lead(work, &site, route, run)).collect();
         let mut led = led?;
-        // Ids sort as text: 10000 comes before 9999.
+        // Ids sort as text: -100 comes before -99.
         led.sort_by(|a, b| a.row.run_id.cmp(&b.row.run_id));
         let products = led.iter_mut().flat_map(|led| std::mem::take(&mut led.products)).collect();
         let mut outcome = Outcome { products, notes: notes(&led, &planned) };

@@ -358,8 +358,8 @@ impl DeclaredSize {
         Ok(())
     }
 
-    /// Numbers of points after which the decoder goes on to the next chunk, whatever the chunks state. It reads the chunk table in the same way, and
-    /// decodes whatever follows where it cannot.
+    /// Numbers of points after which the decoder goes on to the next chunk, whatever the chunks state. The decoder reads the table in the same way;
+    /// without a readable one it would go on without these numbers.
     fn decoded_points(&self, file: &mut (impl Read + Seek), description: &LazVlr) -> Result<Vec<u64>, Refusal> {
         file.seek(SeekFrom::Start(self.data_start)).map_err(|e| unreadable(&e))?;
         match unless_panicking(|| ChunkTable::read_from(&mut *file, description)) {

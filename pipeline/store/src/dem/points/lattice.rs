@@ -53,8 +53,8 @@ impl Lattice {
             return Ok(());
         }
         Err(Refusal::new(format!(
-            "its {points} points lie in a box of {rows} x {cols} cells of {} m, more than the {planned} cells planned for them; set \
-             `cell_m` of its [[dem]], or convert it to a raster",
+            "its {points} points lie in a box of {rows} x {cols} cells of {} m, more than the {planned} cells planned for them; \
+             convert it to a raster, or, if it is a [[dem]], set its `cell_m`",
             shown(self.cell_m)
         )))
     }

@@ -337,7 +337,7 @@ fn val_a_strip_across_its_box_takes_no_more_cells_than_planned() {
     let limited = |planned: u64| GridSettings { planned_cells: Some(planned), ..GridSettings::default() };
     let error = read(&path, &limited(planned)).unwrap_err();
     let words = "strip.las: its 141540 points lie in a box of 1200 x 1200 cells of 0.05 m, more than the 566160 cells planned for them; \
-                 set `cell_m` of its [[dem]], or convert it to a raster";
+                 convert it to a raster, or, if it is a [[dem]], set its `cell_m`";
     assert!(error.unusable_input() && error.to_string().ends_with(words), "{error}");
     let square = Geometry::square(60, 60, 1.0);
     for refused in [
