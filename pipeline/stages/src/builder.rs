@@ -16,7 +16,8 @@ use sastrugi_schemas::study::Pairing;
 use sastrugi_texture::Prospect;
 use serde_json::Value;
 use std::collections::{BTreeMap, BTreeSet};
-use std::path::PathBuf;
+use std::io;
+use std::path::{Path, PathBuf};
 use std::sync::Arc;
 
 /// Suffixes that file names in a release add to an id.
@@ -35,6 +36,9 @@ const RESERVED: [&str; 12] = [
     "leaning",
 ];
 
+/// Memory of a height, bytes.
+const BYTES_PER_HEIGHT: u64 = 8;
+
 /// Sections of surfaces, whose `count` is a number of surfaces. Each of these is two items: it is generated, and its roughness measured.
 const GENERATED: [&str; 2] = [terrain::STAGE, texture::STAGE];
 
@@ -47,6 +51,17 @@ pub enum BuildError {
     /// An input file is missing or cannot be read.
     #[error("{0}")]
     Input(String),
+}
+
+impl BuildError {
+    /// For an input file that cannot be read.
+    pub fn reading(path: &Path, error: io::Error) -> Self {
+        Self::Input(match error.kind() {
+            io::ErrorKind::NotFound => format!("{}: no such file", path.display()),
+            io::ErrorKind::IsADirectory => format!("{} is a folder, not a file", path.display()),
+            _ => format!("{}: {error}", path.display()),
+        })
+    }
 }
 
 impl From<StudyError> for BuildError {
@@ -132,6 +147,11 @@ impl Heightfield {
     /// Label of its random streams.
     pub fn stream(&self) -> Option<String> {
         self.streams.as_ref().map(Streams::label)
+    }
+
+    /// Memory of its heights once they are read, bytes.
+    pub fn heights_bytes(&self) -> u64 {
+        BYTES_PER_HEIGHT * self.cells
     }
 }
 
@@ -586,16 +606,8 @@ pub fn common(replicate: u64) -> String {
 /// # Errors
 /// A file that is missing or cannot be read.
 pub fn input_file(path: PathBuf) -> Result<(u64, InputFile), BuildError> {
-    match sastrugi_store::digest::of_file(&path) {
-        Ok((bytes, sha256)) => Ok((bytes, InputFile { path, sha256 })),
-        Err(e) if e.kind() == std::io::ErrorKind::NotFound => {
-            Err(BuildError::Input(format!("{}: no such file", path.display())))
-        }
-        Err(e) if e.kind() == std::io::ErrorKind::IsADirectory => {
-            Err(BuildError::Input(format!("{} is a folder, not a file", path.display())))
-        }
-        Err(e) => Err(BuildError::Input(format!("{}: {e}", path.display()))),
-    }
+    let (bytes, sha256) = sastrugi_store::digest::of_file(&path).map_err(|e| BuildError::reading(&path, e))?;
+    Ok((bytes, InputFile { path, sha256 }))
 }
 
 #[cfg(test)]

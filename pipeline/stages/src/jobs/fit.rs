@@ -3,6 +3,7 @@
 use super::dem as measured;
 use super::mask::{self, Mask};
 use super::photoclinometry;
+use super::rasters::Raster;
 use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
@@ -76,7 +77,7 @@ impl Site {
     /// The items that it is read from, the DEM first.
     pub fn parents(&self) -> Vec<ItemRef> {
         let others = self.masks.iter().chain(&self.noise_reference).map(|m| &m.item);
-        [&self.dem].into_iter().chain(others).chain(self.minus.iter().map(|m| &m.dem)).cloned().collect()
+        [&self.dem].into_iter().chain(others).chain(self.minus.iter().map(|m| &m.dem.item)).cloned().collect()
     }
 
     /// Reads the DEM: masked, and minus another if there is one.
@@ -124,7 +125,7 @@ impl Site {
         // The noise is that of a copy of the heights.
         let masked = largest.map_or(0, |bytes| bytes + self.selection_bytes + 8 * self.cells);
         // Co-registration takes 80 bytes per cell of the first DEM, and the difference 8.
-        let subtracted = self.minus.as_ref().map_or(0, |minus| 8 * minus.cells + 88 * self.cells);
+        let subtracted = self.minus.as_ref().map_or(0, |minus| minus.dem.bytes + 88 * self.cells);
         masked.max(subtracted)
     }
 
@@ -148,9 +149,8 @@ struct FitJob {
 #[derive(Clone)]
 struct Subtrahend {
     id: String,
-    dem: ItemRef,
+    dem: Raster,
     source: Source,
-    cells: u64,
 }
 
 impl Subtrahend {
@@ -159,13 +159,13 @@ impl Subtrahend {
             return Err(unknown_id(entry, "minus", id, builder.heightfields.keys()).into());
         };
         let source = builder.source_of(id, field);
-        Ok(Self { id: id.to_owned(), dem: field.item.clone(), source, cells: field.cells })
+        Ok(Self { id: id.to_owned(), dem: field.into(), source })
     }
 
     /// The DEM of an item minus this one.
     fn subtract(&self, item: &ItemRef, dem: &Dem, work: &Work<'_>) -> Result<(Grid, Minus), JobError> {
-        let other = dem::read(&work.parent(&self.dem, HEIGHTS)?).map_err(input_error)?;
-        for (item, heights) in [(item, &dem.grid), (&self.dem, &other.grid)] {
+        let other = self.dem.read(work)?;
+        for (item, heights) in [(item, &dem.grid), (&self.dem.item, &other.grid)] {
             let place = Place::read(&work.parent(item, PLACE)?, &heights.geometry)?;
             if place.was_converted(&heights.geometry) {
                 return Err(JobError::input(format!("{}: {}", item.id, coregistration::IN_DEGREES)));

@@ -132,7 +132,7 @@ fn of_item(builder: &Builder<'_>, entry: &Entry<'_>, named: &NamedInput) -> Resu
         item: field.item.clone(),
         file,
         release_path: None,
-        reading_bytes: 8 * field.cells,
+        reading_bytes: field.heights_bytes(),
         place: field.expected,
     };
     match named.holds {
@@ -193,7 +193,7 @@ fn of_file(
         Holds::Points => altimetry::reading_bytes(&path),
         Holds::Heights | Holds::Values => dem::reading_bytes(&path),
     };
-    let reading_bytes = reading_bytes.map_err(|e| BuildError::Input(format!("{}: {e}", path.display())))?;
+    let reading_bytes = reading_bytes.map_err(|e| BuildError::reading(&path, e))?;
     let key = entry.path_of_dotted(&named.key);
     let stated = InputPlace { key, release_path: release_path.clone() };
     if !builder.inputs.contains(&stated) {

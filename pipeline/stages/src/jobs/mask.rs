@@ -91,7 +91,7 @@ impl Mask {
     ) -> Result<Self, BuildError> {
         let copy = Original::of(&format!("mask/{id}"), &builder.study.folder, &file)?;
         let path = builder.study.folder.join(&file);
-        let reading_bytes = reading_bytes(&path).map_err(|e| BuildError::Input(format!("{}: {e}", path.display())))?;
+        let reading_bytes = reading_bytes(&path).map_err(|e| BuildError::reading(&path, e))?;
         let (release_path, sha256) = (copy.release_path().to_owned(), copy.sha256().to_owned());
         let node = copy.node(MASK_STAGE, id);
         let source = MaskSource { file: original::name(&release_path).to_owned(), sha256, excludes };

@@ -7,7 +7,7 @@ use crate::builder::{BuildError, input_file};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::revision::Room;
 use crate::runner::graph::{InputFile, Node};
-use sastrugi_store::{atomic, digest};
+use sastrugi_store::{atomic, dem, digest};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
@@ -42,9 +42,8 @@ impl Original {
     /// A file that is missing or cannot be read.
     pub fn of(place: &str, folder: &Path, file: &str) -> Result<Self, BuildError> {
         let path = folder.join(file);
-        let extension = extension(file);
-        let mut files = vec![Copied::of(path.clone(), release_path(place, file, &extension))?];
-        if let Some(prj) = sidecar(&path, &extension) {
+        let mut files = vec![Copied::of(path.clone(), release_path(place, file, &extension(file)))?];
+        if let Some(prj) = dem::sidecar(&path) {
             files.push(Copied::of(prj, format!("{place}.prj"))?);
         }
         Ok(Self { files })
@@ -128,11 +127,6 @@ fn release_path(place: &str, file: &str, extension: &str) -> String {
     }
 }
 
-/// The .prj file next to an ESRI ASCII grid, which states whether its coordinates are geographic.
-fn sidecar(path: &Path, extension: &str) -> Option<PathBuf> {
-    Some(path.with_extension("prj")).filter(|prj| extension == "asc" && prj.exists())
-}
-
 impl Job for Original {
     fn recipe(&self) -> Value {
         json!({ "files": self.files.iter().map(|f| &f.release_path).collect::<Vec<_>>() })
@@ -178,6 +172,8 @@ fn copy(input: &InputFile, work: &Work<'_>, name: &str) -> Result<(), JobError> 
 mod tests {
     use super::*;
 
+    const GRID: &[u8] = b"ncols 1\nnrows 1\ncellsize 1\n7.5\n";
+
     #[test]
     fn val_paths_in_the_release() {
         let place = |file: &str| release_path("dem/site", file, &extension(file));
@@ -201,21 +197,22 @@ mod tests {
     #[test]
     fn val_a_file_is_copied_unless_it_changed() {
         let (folder, draft) = (tempfile::tempdir().unwrap(), tempfile::tempdir().unwrap());
-        std::fs::write(folder.path().join("c.asc"), b"abc").unwrap();
+        // An ASCII grid is one whatever its ending, and so has its .prj file with it.
+        std::fs::write(folder.path().join("c.txt"), GRID).unwrap();
         std::fs::write(folder.path().join("c.prj"), b"geographic").unwrap();
-        let original = Original::of("dem/site", folder.path(), "c.asc").unwrap();
-        let sha256 = "ba7816bf8f01cfea414140de5dae2223b00361a396177a9cb410ff61f20015ad";
-        assert_eq!((original.bytes(), original.release_path(), original.sha256()), (3, "dem/site.asc", sha256));
+        let original = Original::of("dem/site", folder.path(), "c.txt").unwrap();
+        let sha256 = "def20f00d80c499fcc9f5602e2d7c7b8832f1639c1e4b7eb05ee20f35a5eaffd";
+        assert_eq!((original.bytes(), original.release_path(), original.sha256()), (31, "dem/site.txt", sha256));
         let parents = std::collections::BTreeMap::new();
         let work = Work { folder: atomic::Draft(draft.path()), parents: &parents };
         let products = original.run(&work).unwrap().products;
         let places: Vec<Option<&str>> = products.iter().map(|product| product.release_path.as_deref()).collect();
-        assert_eq!(places, [Some("dem/site.asc"), Some("dem/site.prj")]);
-        assert_eq!(std::fs::read(draft.path().join("site.asc")).unwrap(), b"abc");
+        assert_eq!(places, [Some("dem/site.txt"), Some("dem/site.prj")]);
+        assert_eq!(std::fs::read(draft.path().join("site.txt")).unwrap(), GRID);
         assert_eq!(std::fs::read(draft.path().join("site.prj")).unwrap(), b"geographic");
-        std::fs::write(folder.path().join("c.asc"), b"abd").unwrap();
+        std::fs::write(folder.path().join("c.txt"), b"abd").unwrap();
         let error = original.run(&work).unwrap_err();
-        assert!(error.message.ends_with("c.asc: the file changed during the run"), "{error}");
+        assert!(error.message.ends_with("c.txt: the file changed during the run"), "{error}");
         assert_eq!(error.cause, crate::job::Cause::Input);
     }
 
@@ -230,12 +227,15 @@ mod tests {
         assert_eq!(recipe("a.tif"), recipe("b.tif"));
         assert_ne!(recipe("N44W072.hgt"), recipe("N45W072.hgt"));
         let inputs = |file: &str| Original::of("dem/site", folder.path(), file).unwrap().inputs();
-        std::fs::write(folder.path().join("c.asc"), b"x").unwrap();
+        std::fs::write(folder.path().join("c.asc"), GRID).unwrap();
         let bare = inputs("c.asc");
         std::fs::write(folder.path().join("c.prj"), b"geographic").unwrap();
         assert_eq!((bare.len(), inputs("c.asc").len()), (1, 2));
+        // A file with that name beside another file is none of its own.
+        std::fs::write(folder.path().join("c.txt"), b"x").unwrap();
+        assert_eq!(inputs("c.txt").len(), 1);
         // What is not a file is refused, rather than left out.
-        std::fs::write(folder.path().join("d.asc"), b"x").unwrap();
+        std::fs::write(folder.path().join("d.asc"), GRID).unwrap();
         std::fs::create_dir(folder.path().join("d.prj")).unwrap();
         let refused = Original::of("dem/site", folder.path(), "d.asc").err().unwrap().to_string();
         assert!(refused.ends_with("d.prj is a folder, not a file"), "{refused}");

@@ -214,8 +214,7 @@ fn altimetry(
     let release_path = copy.release_path().to_owned();
     let node = copy.node(INPUT_STAGE, &id);
     let path = builder.study.folder.join(file);
-    let reading_bytes =
-        altimetry::reading_bytes(&path).map_err(|e| BuildError::Input(format!("{}: {e}", path.display())))?;
+    let reading_bytes = altimetry::reading_bytes(&path).map_err(|e| BuildError::reading(&path, e))?;
     let made = Altimetry { item: node.item.clone(), release_path: release_path.clone(), reading_bytes };
     builder.node(node)?;
     builder.inputs.push(InputPlace { key: entry.path_of("altimetry"), release_path });

@@ -1,6 +1,7 @@
 //! Stage `route`: plans paths from starts to goals on each terrain.
 
 use super::mask::{self, Mask};
+use super::rasters::Raster;
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
@@ -77,9 +78,7 @@ struct RouteSearch {
     parameters: RouteParameters,
     vehicle: Option<Vehicle>,
     obstacles: Vec<Mask>,
-    cost_raster: Option<ItemRef>,
-    /// Number of cells of the cost raster; 0 without one.
-    cost_cells: u64,
+    cost_raster: Option<Raster>,
     pairs: Pairs,
     roughness: RoughnessSection,
 }
@@ -126,8 +125,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let searches = expanded.iter().map(|one| parameters_of(entry, &envelope, one)).collect::<Result<Vec<_>, _>>()?;
     let terrains = terrains(builder, entry, &envelope.terrains)?;
     let cost_raster = envelope.cost_raster.as_deref().map(|id| builder.surface(entry, "cost_raster", id));
-    let cost_raster = cost_raster.transpose()?.map(|field| (field.item.clone(), field.cells));
-    let (cost_raster, cost_cells) = cost_raster.map_or((None, 0), |(item, cells)| (Some(item), cells));
+    let cost_raster = cost_raster.transpose()?.map(Raster::from);
     let obstacles = mask::add_obstacles(builder, entry, &envelope)?;
     let mut family = Vec::new();
     for (one, (parameters, pairs)) in expanded.into_iter().zip(searches) {
@@ -139,7 +137,6 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             vehicle: vehicle.clone(),
             obstacles: obstacles.clone(),
             cost_raster: cost_raster.clone(),
-            cost_cells,
             pairs,
             roughness: builder.study.roughness.clone(),
         };
@@ -216,7 +213,11 @@ fn add_search(
         let stream = matches!(search.pairs, Pairs::Drawn { .. }).then(|| streams.label());
         let item = ItemRef::new(STAGE, &format!("{}@{terrain}", search.id));
         let masks = search.obstacles.iter().map(|mask| mask.item.clone());
-        let parents = [field.item.clone()].into_iter().chain(masks).chain(search.cost_raster.clone()).collect();
+        let parents = [field.item.clone()]
+            .into_iter()
+            .chain(masks)
+            .chain(search.cost_raster.as_ref().map(|raster| raster.item.clone()))
+            .collect();
         let job = RouteJob { search: Arc::clone(&search), terrain: terrain.clone(), field, word, streams };
         builder.node(Node { item: item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
         let RouteSearch { id, variant, parameters, pairs, .. } = &*search;
@@ -259,8 +260,7 @@ impl RouteSearch {
     /// Inputs that cannot be used.
     fn site(&self, field: &Heightfield, work: &Work<'_>) -> Result<(Site, dem::Dem), JobError> {
         let read = dem::read(&work.parent(&field.item, HEIGHTS)?).map_err(input_error)?;
-        let factors =
-            self.cost_raster.as_ref().map(|item| dem::read(&work.parent(item, HEIGHTS)?).map_err(input_error));
+        let factors = self.cost_raster.as_ref().map(|raster| raster.read(work));
         let mut given = Given {
             vehicle: self.vehicle.clone(),
             factors: factors.transpose()?.map(|dem| dem.grid),
@@ -277,7 +277,7 @@ impl RouteSearch {
             "parameters": self.parameters,
             "vehicle": self.vehicle.as_ref().map(Vehicle::parameters),
             "obstacles": self.obstacles.iter().map(|mask| &mask.source.sha256).collect::<Vec<_>>(),
-            "cost_raster": self.cost_raster,
+            "cost_raster": self.cost_raster.as_ref().map(|raster| &raster.item),
             "pairs": self.pairs.recipe(),
             "roughness": (self.parameters.cost == Cost::Class).then_some(&self.roughness),
         })
@@ -289,7 +289,8 @@ impl RouteSearch {
         let obstacles: u64 = self.obstacles.iter().map(|file| file.reading_bytes).sum();
         let selection = if self.obstacles.is_empty() { 0 } else { mask::selection_bytes(field) };
         // Heights twice, masks, factors, clearance; the search's costs, parents and marks.
-        (64 << 20) + 150 * field.cells + 8 * self.cost_cells + obstacles + selection
+        let factors = self.cost_raster.as_ref().map_or(0, |raster| raster.bytes);
+        (64 << 20) + 150 * field.cells + factors + obstacles + selection
     }
 }
 

@@ -3,7 +3,7 @@
 use super::dem as dem_job;
 use super::fit::{self, Site};
 use super::matched::{Matched, seconds_per_operation};
-use super::rasters::{SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
+use super::rasters::{Raster, SECONDS_PER_WRITTEN_CELL, raster_options, raster_packing};
 use super::scoreboard::{self, Entrant, ScoreboardJob};
 use super::surface::{Surface, SurfaceRows};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
@@ -47,7 +47,7 @@ pub fn kinds() -> Vec<Kind> {
 /// Factor by which a texture is scaled on its base.
 #[derive(Clone)]
 enum Modulation {
-    Raster(ItemRef),
+    Raster(Raster),
     Slope(SlopeFactors),
 }
 
@@ -215,7 +215,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             let one_of_many = item.count.is_some_and(|count| count > 1);
             let (base, fill) = (base.clone(), fill.as_ref().map(|field| field.item.clone()));
             let raster = match &modulation {
-                Some(Modulation::Raster(raster)) => Some(raster.clone()),
+                Some(Modulation::Raster(raster)) => Some(raster.item.clone()),
                 _ => None,
             };
             let exemplar = exemplar_of(method);
@@ -332,7 +332,7 @@ fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Resul
 fn modulation(builder: &Builder<'_>, entry: &Entry<'_>, item: &TextureItem) -> Result<Option<Modulation>, StudyError> {
     Ok(match item.modulate.clone() {
         None => None,
-        Some(Modulate::Raster(id)) => Some(Modulation::Raster(builder.surface(entry, "modulate", &id)?.item.clone())),
+        Some(Modulate::Raster(id)) => Some(Modulation::Raster(builder.surface(entry, "modulate", &id)?.into())),
         Some(Modulate::Slope { slope_deg, factor }) => {
             let factors = SlopeFactors { slope_deg, factor };
             factors.check().map_err(|e| entry.refuse(e))?;
@@ -445,7 +445,7 @@ impl Job for TextureJob {
         }
         match &self.modulation {
             None => {}
-            Some(Modulation::Raster(raster)) => recipe["modulate"] = json!(raster.to_string()),
+            Some(Modulation::Raster(raster)) => recipe["modulate"] = json!(raster.item.to_string()),
             Some(Modulation::Slope(f)) => recipe["modulate"] = json!({ "slope_deg": f.slope_deg, "factor": f.factor }),
         }
         if let Some(dem) = &self.fill {
@@ -464,7 +464,11 @@ impl Job for TextureJob {
 
     fn memory_bytes(&self) -> u64 {
         // The texture, the statistics of its residual (detrended like the fit's), and a base or a DEM to fill.
-        let texture = self.cost.memory_bytes.max((64 << 20) + 110 * self.cells);
+        let factors = match &self.modulation {
+            Some(Modulation::Raster(raster)) => raster.bytes,
+            _ => 0,
+        };
+        let texture = self.cost.memory_bytes.max((64 << 20) + 110 * self.cells + factors);
         self.exemplar.as_ref().map_or(texture, |site| texture + site.memory_bytes())
     }
 
@@ -567,8 +571,8 @@ impl TextureJob {
             None => None,
             Some(Modulation::Slope(factors)) => Some(factors.over(base)),
             Some(Modulation::Raster(raster)) => {
-                let raster = dem::read(&work.parent(raster, HEIGHTS)?).map_err(input_error)?;
-                Some(sastrugi_texture::amplitude(base, &raster.grid).map_err(JobError::input)?)
+                let factors = raster.read(work)?.grid;
+                Some(sastrugi_texture::amplitude(base, &factors).map_err(JobError::input)?)
             }
         })
     }

@@ -1,6 +1,7 @@
 //! Stage `traverse`: drives and records all missions on one terrain.
 
 use super::dem as measured;
+use super::rasters::Raster;
 use super::{missions, roughness, vehicle};
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{
@@ -64,7 +65,7 @@ struct Drive {
     settings: TraverseSettings,
     starts: ReplicateSettings,
     /// Rasters of wheel friction and rolling resistance.
-    rasters: [Option<ItemRef>; 2],
+    rasters: [Option<Raster>; 2],
     head: StudyHead,
     /// Number of missions on each terrain.
     count: usize,
@@ -82,7 +83,7 @@ impl Drive {
             "traverse": settings.parameters(),
             "vehicle": vehicle.parameters(),
             "starts": starts,
-            "rasters": rasters,
+            "rasters": rasters.each_ref().map(|raster| raster.as_ref().map(|raster| &raster.item)),
         });
         let last = json!({
             "study": { "name": head.name, "seed": head.seed, "license": head.license, "epoch_ns": head.epoch_ns, "mcap": head.mcap },
@@ -191,15 +192,10 @@ impl Prepared {
 }
 
 /// The item that produces a raster of the surface.
-fn raster(
-    builder: &Builder<'_>,
-    entry: &Entry<'_>,
-    key: &str,
-    id: Option<&str>,
-) -> Result<Option<ItemRef>, StudyError> {
+fn raster(builder: &Builder<'_>, entry: &Entry<'_>, key: &str, id: Option<&str>) -> Result<Option<Raster>, StudyError> {
     let Some(id) = id else { return Ok(None) };
     let field = builder.heightfields.get(id);
-    field.map(|f| Some(f.item.clone())).ok_or_else(|| unknown_id(entry, key, id, builder.heightfields.keys()))
+    field.map(|field| Some(field.into())).ok_or_else(|| unknown_id(entry, key, id, builder.heightfields.keys()))
 }
 
 /// Refuses a terrain whose cells are known to be larger than the vehicle. A measured DEM is checked when it is read, because its file
@@ -228,7 +224,7 @@ fn add_one(
     let streams = builder.streams(STAGE, &format!("{traverse}@{}", lines.word), None, 0);
     let stream = (drive.starts.count() > 1).then(|| streams.label());
     let own = [field.item.clone(), roughness::item(&terrain), lines.item.clone()];
-    let parents = own.into_iter().chain(drive.rasters.iter().flatten().cloned()).collect();
+    let parents = own.into_iter().chain(drive.rasters.iter().flatten().map(|raster| raster.item.clone())).collect();
     let item = ItemRef::new(STAGE, &format!("{}@{terrain}", drive.id));
     let job = TraverseJob {
         drive: Arc::clone(drive),
@@ -282,7 +278,7 @@ impl TraverseJob {
     ) -> Result<Ground, JobError> {
         let parameters = &self.drive.settings.parameters().surface;
         let [wheel_friction, rolling_resistance] =
-            [0, 1].map(|i| self.drive.rasters[i].as_ref().map(|item| read_raster(work, item, heights)).transpose());
+            [0, 1].map(|i| self.drive.rasters[i].as_ref().map(|raster| read_raster(work, raster, heights)).transpose());
         let layers = SurfaceLayers {
             classes: parameters.differs_by_class().then(|| classes.clone()),
             wheel_friction: wheel_friction?,
@@ -421,7 +417,8 @@ impl TraverseJob {
             source: number.source,
         };
         let Drive { vehicle, settings, starts, rasters, .. } = &*self.drive;
-        let rasters = json!({ "wheel_friction_raster": rasters[0], "rolling_resistance_raster": rasters[1] });
+        let [friction, resistance] = rasters.each_ref().map(|raster| raster.as_ref().map(|raster| &raster.item));
+        let rasters = json!({ "wheel_friction_raster": friction, "rolling_resistance_raster": resistance });
         let more = json!({ "starts": starts, "surface": rasters, "missions": *self.lines.rules });
         let mut rows: Vec<ParameterRow> =
             numbers(vehicle, settings).into_iter().chain(stated("", &more)).map(row).collect();
@@ -431,16 +428,16 @@ impl TraverseJob {
 }
 
 /// A raster of the surface, which must overlap the terrain.
-fn read_raster(work: &Work<'_>, item: &ItemRef, terrain: &Grid) -> Result<Grid, JobError> {
-    let raster = dem::read(&work.parent(item, HEIGHTS)?).map_err(input_error)?.grid;
-    if terrain.geometry.overlaps(&raster.geometry) {
-        return Ok(raster);
+fn read_raster(work: &Work<'_>, raster: &Raster, terrain: &Grid) -> Result<Grid, JobError> {
+    let values = raster.read(work)?.grid;
+    if terrain.geometry.overlaps(&values.geometry) {
+        return Ok(values);
     }
-    let ([x, y], [tx, ty]) = (raster.geometry.origin, terrain.geometry.origin);
+    let ([x, y], [tx, ty]) = (values.geometry.origin, terrain.geometry.origin);
     Err(JobError::input(format!(
         "the raster {} with origin ({x:.2}, {y:.2}) m does not overlap the terrain, whose origin is ({tx:.2}, {ty:.2}) m; \
          convert it to the coordinates of the terrain",
-        item.id
+        raster.item.id
     )))
 }
 
@@ -465,13 +462,14 @@ impl Job for TraverseJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, ground with its bound, classes and rasters once; the samples of the missions that are driven at once, about 1000 bytes
-        // each including the wheels; the rows of the starts.
-        let Drive { count, seconds_each, starts, settings, .. } = &*self.drive;
+        // Heights, ground with its bound and classes once; rasters of the surface; the samples of the missions that are driven at once, about
+        // 1000 bytes each including the wheels; the rows of the starts.
+        let Drive { count, seconds_each, starts, settings, rasters, .. } = &*self.drive;
+        let rasters: u64 = rasters.iter().flatten().map(|raster| raster.bytes).sum();
         let rows = (count * starts.count()) as u64;
         let samples =
             (*count).min(MISSIONS_AT_ONCE) as f64 * seconds_each * f64::from(settings.parameters().sample_rate_hz);
-        ((64 << 20) + 48 * self.cells).saturating_add((1000.0 * samples) as u64).saturating_add(400 * rows)
+        ((64 << 20) + 48 * self.cells + rasters).saturating_add((1000.0 * samples) as u64).saturating_add(400 * rows)
     }
 
     fn estimate(&self) -> Estimate {

@@ -8,7 +8,7 @@ use sastrugi_numeric::{Geometry, Grid};
 use std::fmt::Write;
 use std::io::ErrorKind;
 use std::iter::Peekable;
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
 /// Cell sizes of common global grids in arc seconds. No grid in metres has them by chance, because in degrees they have no short
 /// decimal form.
@@ -179,9 +179,14 @@ pub(super) fn claimed(path: &Path) -> Option<Claimed> {
     Some(Claimed::raster(geometry, crs_of(path, &geometry).ok()?.0.geographic))
 }
 
+/// The file that states the system of a grid, which need not exist.
+pub(super) fn prj_beside(path: &Path) -> PathBuf {
+    path.with_extension("prj")
+}
+
 /// The system of a grid: that of its `.prj` file, or a guess without one.
 fn crs_of(path: &Path, geometry: &Geometry) -> Result<(Crs, Vec<String>), Refusal> {
-    let prj = path.with_extension("prj");
+    let prj = prj_beside(path);
     let refused = |why: &str| {
         let name = prj.file_name().unwrap_or_default().to_string_lossy();
         Refusal::new(format!(

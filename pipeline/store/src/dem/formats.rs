@@ -148,10 +148,10 @@ pub(super) fn of_start(bytes: &[u8]) -> Option<&'static Codec> {
     CODECS.iter().find(|codec| (codec.starts)(bytes))
 }
 
-/// The format of a file of which only the first bytes are known: by those bytes, or by its name for formats without a signature or
-/// with a longer one.
+/// The format of a file of which only the first bytes are known: by those bytes, or by its name for a format without a signature, or with
+/// blanks before the first word.
 pub(super) fn of_header(path: &Path, bytes: &[u8]) -> Option<&'static Codec> {
-    let by_name = |codec: &&Codec| matches!(codec.format, Format::EsriAscii | Format::Hgt | Format::Npy);
+    let by_name = |codec: &&Codec| matches!(codec.format, Format::EsriAscii | Format::Hgt);
     of_start(bytes).or_else(|| of_name(path).filter(by_name))
 }
 

@@ -47,14 +47,12 @@ use raster::save;
 use sastrugi_numeric::Grid;
 use std::fs::File;
 use std::io::{self, Read};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 
-/// Number of leading bytes read to recognise a format before the rest of the file.
-const FIRST_BYTES: u64 = 4;
+/// Number of leading bytes read to recognise a format before the rest of the file: the signatures, and the first word of an ASCII grid.
+const FIRST_BYTES: u64 = 64;
 /// Memory of a raster while it is read, bytes per cell: its heights, decoded and in their final order.
 const BYTES_PER_CELL: u64 = 16;
-/// The same for a point cloud that is gridded to means: sums, counts and heights.
-const BYTES_PER_CELL_OF_POINTS: u64 = 24;
 
 /// Reads a raster.
 ///
@@ -132,7 +130,7 @@ pub fn reading_bytes(path: &Path) -> io::Result<u64> {
     let claimed = claimed(path, &ReadOptions::default()).unwrap_or_else(|| Claimed::size(bytes, 0, None));
     let cells = match claimed.points {
         0 => BYTES_PER_CELL * claimed.cells,
-        _ => points::SEARCH_BYTES + BYTES_PER_CELL_OF_POINTS * claimed.cells,
+        _ => points::SEARCH_BYTES + points::BYTES_PER_CELL * claimed.cells,
     };
     Ok(2 * bytes + cells)
 }
@@ -193,6 +191,12 @@ pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
     let (file, first) = opened(path).ok()?;
     let claim = formats::of_header(path, &first)?.claimed?;
     claim(path, file, options).filter(|claimed| claimed.geometry.is_none_or(|g| check_place(&g).is_ok()))
+}
+
+/// The file beside a raster that [`read`] opens too: the `.prj` file of an ESRI ASCII grid, whatever the name of the grid.
+pub fn sidecar(path: &Path) -> Option<PathBuf> {
+    let (_, first) = opened(path).ok()?;
+    Some(ascii::prj_beside(path)).filter(|prj| ascii::looks_like(&first) && prj.exists())
 }
 
 /// Writes heights in the format given by the file name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),

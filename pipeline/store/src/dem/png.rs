@@ -7,7 +7,7 @@ use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOpti
 use crate::atomic::Target;
 use sastrugi_numeric::Grid;
 use std::fs::File;
-use std::io::{Cursor, Read};
+use std::io::{Cursor, Read, Seek};
 
 /// Keyword of the text chunk with the scale from levels to heights.
 const KEYWORD: &str = "sastrugi.height";
@@ -56,13 +56,12 @@ pub(super) fn looks_like(bytes: &[u8]) -> bool {
     bytes.starts_with(b"\x89PNG")
 }
 
-/// Size according to the header. `file` is positioned after the first four bytes; then follow the rest of the signature, length
-/// and name of the first chunk, width and height.
+/// Size according to the header: after the signature, and length and name of the first chunk, follow width and height.
 pub(super) fn claimed(mut file: File, options: &ReadOptions) -> Option<Claimed> {
-    let mut header = [0; 20];
-    file.read_exact(&mut header).ok()?;
+    let mut header = [0; 24];
+    file.rewind().and_then(|()| file.read_exact(&mut header)).ok()?;
     let side = |at: usize| Some(u64::from(u32::from_be_bytes(header.get(at..at + 4)?.try_into().ok()?)));
-    let (cols, rows) = (side(12)?, side(16)?);
+    let (cols, rows) = (side(16)?, side(20)?);
     let cell_m = options.cell_m.map(|[x, y]| x.min(y));
     let size = Claimed::size(cols.saturating_mul(rows).min(MAX_CELLS), 0, cell_m);
     Some(Claimed { geometry: unplaced_claim(rows, cols, options), ..size })

@@ -487,6 +487,11 @@ fn val_claims() {
         assert_eq!((claimed.cells, claimed.points, claimed.geographic), (60 * 27, 0, false), "{name}");
         assert_eq!((claimed.cell_m, claimed.geometry), (cell_m, Some(geometry)), "{name}");
     }
+    // A format is recognised by its content, whatever the ending.
+    for (name, other) in [("a.tif", "tif.dat"), ("a.asc", "asc.txt")] {
+        std::fs::copy(folder.path().join(name), folder.path().join(other)).unwrap();
+        assert_eq!(claimed(&folder.path().join(other), &none), claim(name, &none), "{other}");
+    }
     // Rasters without georeferencing have their corner at (0, 0), and the cell size given by the caller.
     for name in ["a.png", "a.npy"] {
         let claimed = claim(name, &none).unwrap();
@@ -502,6 +507,26 @@ fn val_claims() {
     std::fs::write(folder.path().join("cut.asc"), "ncols 27\nnrows 60\nxllcorner 0\nyllcorner 0\ncellsize 1").unwrap();
     assert_eq!(claimed(&folder.path().join("cut.asc"), &none), None);
     assert_eq!(claimed(&folder.path().join("none.tif"), &ReadOptions::default()), None);
+}
+
+/// The `.prj` file of an ASCII grid belongs to it whatever the ending of the grid; beside other files it belongs to none.
+#[test]
+fn val_a_prj_file_belongs_to_an_ascii_grid() {
+    let folder = tempfile::tempdir().unwrap();
+    let beside = |name: &str, content: &[u8]| {
+        let path = folder.path().join(name);
+        std::fs::write(&path, content).unwrap();
+        sidecar(&path)
+    };
+    let grid = b"\xef\xbb\xbfNCOLS 1\nnrows 1\ncellsize 1\n7.5\n";
+    assert_eq!(beside("a.asc", grid), None);
+    let prj = folder.path().join("a.prj");
+    std::fs::write(&prj, "PROJCS[\"plane\"]").unwrap();
+    for name in ["a.asc", "a.txt", "a.grd", "a"] {
+        assert_eq!(beside(name, grid), Some(prj.clone()), "{name}");
+    }
+    assert_eq!(beside("a.csv", b"x,y,z\n0,0,1\n"), None);
+    assert_eq!(sidecar(&folder.path().join("none.asc")), None);
 }
 
 /// Files of strips without georeferencing, with various types of heights, compressions and predictors.

@@ -59,7 +59,10 @@ const PLANNED_CELLS_PER_POINT: u64 = 4;
 /// Fewest cells for which memory is planned: a few points may need more than four each.
 const PLANNED_CELLS_MIN: u64 = 1 << 10;
 
-/// Memory of the search for a cell size, bytes.
+/// Memory of a cell whose points are averaged, bytes: their sum and number, and its height.
+pub(super) const BYTES_PER_CELL: u64 = 8 + 4 + 8;
+/// Memory of the search for a cell size, bytes: one bit for each cell of five grids, of which the finest has at most [`MAX_CELLS`] (43 MiB in
+/// all), and decoded points.
 pub(super) const SEARCH_BYTES: u64 = 64 << 20;
 
 /// A gridded cloud.
