@@ -461,16 +461,26 @@ fn val_measured_dems_read_as_rasterio_reads_them() {
 }
 
 /// Cell means of point clouds, which laspy writes from measured DEMs, agree with numpy on the points that laspy reads: half of the points of
-/// one cloud lie on the borders of cells, and a tenth of the points of each are noise or withheld.
+/// one cloud lie on the borders of cells, and a tenth of the points of each are noise or withheld. The chunks of a LAZ have equal or unequal
+/// numbers of points.
 #[test]
 fn val_clouds_are_gridded_as_numpy_grids_them() {
     let Some(python) = python() else { return };
     let folder = area();
-    for (name, ending, step, cells) in
-        [("pozo_blanca", "laz", "0.25", &["0.5", "2"][..]), ("otira", "las", "0.0001", &["0.02"])]
-    {
+    let clouds = [
+        ("pozo_blanca", "laz", &["0.25"][..], &["0.5", "2"][..]),
+        ("otira", "las", &["0.0001"], &["0.02"]),
+        ("otira", "laz", &["0.0001", "unequal"], &["0.02"]),
+    ];
+    for (name, ending, how, cells) in clouds {
         let cloud = folder.path().join(format!("{name}.{ending}"));
-        let made = check(&python, "make_cloud.py", &[&shipped(&format!("{name}.tif")), &cloud, Path::new(step)]);
+        let dem = shipped(&format!("{name}.tif"));
+        let how = how.iter().map(Path::new);
+        let made = check(
+            &python,
+            "make_cloud.py",
+            &[dem.as_path(), cloud.as_path()].into_iter().chain(how).collect::<Vec<_>>(),
+        );
         assert_eq!(made.code, 0, "{}", made.stderr);
         for cell in cells {
             let heights = folder.path().join("heights.npy");
