@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
 use serde_json::Value;
+use std::fmt::Display;
 
 /// One entry of a registry.
 #[derive(Clone, Debug, Serialize)]
@@ -108,6 +109,25 @@ pub fn shown(value: f64) -> String {
         format!("{value:e}")
     } else {
         value.to_string()
+    }
+}
+
+/// A number of things for a message. The number may be text already, such as a rounded one; the noun must have a regular plural.
+///
+/// ```
+/// use sastrugi_schemas::counted;
+///
+/// assert_eq!([0, 1, 2].map(|n| counted(n, "gap cell")), ["0 gap cells", "1 gap cell", "2 gap cells"]);
+/// assert_eq!(["entry", "day", "patch"].map(|noun| counted(3, noun)), ["3 entries", "3 days", "3 patches"]);
+/// assert_eq!([1.0, 1.5].map(|x| counted(x, "cell")), ["1 cell", "1.5 cells"]);
+/// ```
+pub fn counted(number: impl Display, noun: &str) -> String {
+    let number = number.to_string();
+    match noun.strip_suffix('y') {
+        _ if number == "1" => format!("1 {noun}"),
+        Some(stem) if !stem.ends_with(['a', 'e', 'i', 'o', 'u']) => format!("{number} {stem}ies"),
+        _ if ["s", "x", "ch", "sh"].iter().any(|end| noun.ends_with(end)) => format!("{number} {noun}es"),
+        _ => format!("{number} {noun}s"),
     }
 }
 

@@ -4,7 +4,7 @@
 //! them. It states fewer numbers ([`Statistics::numbers`]) than a quarter of the cells with data. Its size does not depend on the DEM's: at most
 //! [`LAGS_MAX`] lags along each axis, 129 probabilities and 32 bands, below 1 MB as JSON.
 
-use crate::ParameterError;
+use crate::{ParameterError, counted};
 use serde::{Deserialize, Serialize};
 
 /// Version of the section.
@@ -199,7 +199,7 @@ impl LagCovariances {
         }
         let needed = self.rows.len() * self.inner();
         if self.values.len() != needed || self.values.iter().any(|c| !c.is_finite()) {
-            return Err(ParameterError::new("values", format!("must be {needed} finite values")));
+            return Err(ParameterError::new("values", format!("must be {}", counted(needed, "finite value"))));
         }
         ParameterError::positive("values", self.variance()).map(drop)
     }

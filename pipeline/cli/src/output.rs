@@ -117,15 +117,6 @@ pub fn columns(rows: &[Vec<String>]) -> String {
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
 }
 
-/// A number of things, such as `1 item`, `2 items` or `3 entries`.
-pub fn counted(number: u64, noun: &str) -> String {
-    match (number, noun.strip_suffix('y')) {
-        (1, _) => format!("1 {noun}"),
-        (_, Some(stem)) => format!("{number} {stem}ies"),
-        (_, None) => format!("{number} {noun}s"),
-    }
-}
-
 /// A size with unit.
 pub fn bytes(count: f64) -> String {
     let steps = [(1e9, "GB"), (1e6, "MB"), (1e3, "kB")];

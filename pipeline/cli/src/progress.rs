@@ -1,8 +1,9 @@
 //! Progress on stderr. Of a run: a bar with ETA on a terminal, plain lines otherwise, only failures when quiet. Of a verb without items: what it
 //! does and the time so far, on a terminal only.
 
-use crate::output::{counted, warn};
+use crate::output::warn;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};
+use sastrugi_schemas::counted;
 use sastrugi_stages::job::ItemRef;
 use sastrugi_stages::runner::progress::{End, Progress};
 use std::io::IsTerminal;
@@ -104,7 +105,7 @@ impl Reporter {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.ended += 1;
         state.seconds_done += seconds;
-        let counts = format!("{}/{} items", state.ended, state.total);
+        let counts = format!("{}/{}", state.ended, counted(state.total, "item"));
         match &self.bar {
             Some(bar) => {
                 bar.set_position((state.seconds_done * TICKS_PER_SECOND) as u64);
@@ -158,7 +159,7 @@ impl Progress for Reporter {
         if let Some(bar) = &self.bar {
             bar.set_length((seconds * TICKS_PER_SECOND) as u64);
         }
-        self.say(&format!("{}, {ready} already computed", counted(total as u64, "item")));
+        self.say(&format!("{}, {ready} already computed", counted(total, "item")));
     }
 
     fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {

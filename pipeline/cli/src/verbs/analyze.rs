@@ -4,8 +4,8 @@ use crate::Verdict;
 use crate::args::{Analyze, Common};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print, warn};
-use sastrugi_schemas::Record;
 use sastrugi_schemas::tables::LogRow;
+use sastrugi_schemas::{Record, counted};
 use sastrugi_stages::Error;
 use sastrugi_stages::verbs::analyze::{Judged, Request, write};
 use sastrugi_stages::verbs::{LogSettings, numbers};
@@ -116,7 +116,7 @@ fn text(judged: &Judged) -> String {
         columns(&rows)
     );
     if row.gaps > 0 {
-        text.push_str(&format!("\n  {} gaps, {:.2} s in total, are not interpolated", row.gaps, row.gap_time_s));
+        text.push_str(&format!("\n  {}, {:.2} s in total, not interpolated", counted(row.gaps, "gap"), row.gap_time_s));
     }
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     text

@@ -4,7 +4,8 @@ use super::serve;
 use crate::Verdict;
 use crate::args::{Cache, Common};
 use crate::failure::{Code, Failure};
-use crate::output::{bytes, counted, print};
+use crate::output::{bytes, print};
+use sastrugi_schemas::counted;
 use sastrugi_stages::runner::shared::{self, Keep, Pruned, prune};
 use std::time::{Duration, SystemTime};
 
@@ -31,12 +32,12 @@ fn age(days: f64) -> Result<Duration, Failure> {
 
 fn described(place: &str, pruned: &Pruned) -> String {
     let Pruned { entries, bytes: size, unused_days, drafts, removed, removed_bytes } = pruned;
-    let mut text = format!("{place}: {}, {}", counted(*entries as u64, "entry"), bytes(*size as f64));
+    let mut text = format!("{place}: {}, {}", counted(entries, "entry"), bytes(*size as f64));
     if let Some(days) = unused_days {
         text.push_str(&format!(", the least recently used {days:.1} days ago"));
     }
     if *drafts > 0 {
-        text.push_str(&format!("; {}", counted(*drafts as u64, "draft")));
+        text.push_str(&format!("; {}", counted(drafts, "draft")));
     }
     if *removed > 0 {
         text.push_str(&format!("; removed {removed}, {}", bytes(*removed_bytes as f64)));

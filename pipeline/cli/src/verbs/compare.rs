@@ -6,6 +6,7 @@ use crate::args::{Common, Compare};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
 use crate::progress::waiting;
+use sastrugi_schemas::counted;
 use sastrugi_stages::verbs::compare::{self, BlockEvidence, COPY_SIDE, Comparison, Copies, Quantity, Request, Side};
 use sastrugi_stages::verbs::releases::{self, Files};
 use sastrugi_stages::verbs::{numbers, parameters};
@@ -102,7 +103,7 @@ fn text_of_files(files: &Files) -> String {
 fn row_of_releases(q: &releases::Quantity) -> Vec<String> {
     let number = |v: Option<f64>| v.map_or_else(|| "-".to_owned(), |v| format!("{v:.4}"));
     let terrains =
-        if q.paired { format!("{} pairs", q.terrains[0]) } else { format!("{}, {}", q.terrains[0], q.terrains[1]) };
+        if q.paired { counted(q.terrains[0], "pair") } else { format!("{}, {}", q.terrains[0], q.terrains[1]) };
     vec![
         q.group.clone(),
         q.name.to_owned(),

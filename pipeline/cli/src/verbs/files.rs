@@ -5,6 +5,7 @@ use crate::Verdict;
 use crate::args::{self, Common, Convert, Info, Target};
 use crate::failure::{Code, Failure};
 use crate::output::{columns, print};
+use sastrugi_schemas::counted;
 use sastrugi_stages::operations::dem::to_metres;
 use sastrugi_stages::studies;
 use sastrugi_stages::verbs::{self, Read, Reading, describe_grid, numbers, read_as_it_is, transects};
@@ -127,7 +128,7 @@ fn convert_vehicle(args: &Convert, format: mechanism::Format, common: &Common) -
     let notes: Vec<String> = doubts.into_iter().chain(mechanism::notes(&vehicle, format)).collect();
     let joints = vehicle.links.iter().map(|link| link.joints.len()).sum::<usize>();
     let mass_kg = vehicle.links.iter().map(|link| link.mass_kg).sum::<f64>();
-    let mut text = format!("{output}: {}, {mass_kg:.3} kg, {joints} joints", vehicle.name);
+    let mut text = format!("{output}: {}, {mass_kg:.3} kg, {}", vehicle.name, counted(joints, "joint"));
     notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));
     let result = json!({
         "file": args.output,

@@ -4,7 +4,8 @@ use super::reading;
 use crate::Verdict;
 use crate::args::{Common, Compress, Convert};
 use crate::failure::{Code, Failure};
-use crate::output::{counted, print};
+use crate::output::print;
+use sastrugi_schemas::counted;
 use sastrugi_stages::verbs::Reading;
 use sastrugi_stages::verbs::lerobot::{self, PATCH_CELL_M, PATCH_M, Settings};
 use serde_json::{Value, json};
@@ -18,12 +19,12 @@ pub fn convert(args: &Convert, common: &Common) -> Verdict {
     let named = |(split, range): (&String, &Value)| format!("{split} {}", range.as_str().unwrap_or_default());
     let splits: Vec<String> = converted.splits.iter().map(named).collect();
     let mut text = format!(
-        "{}: {}, {} frames at {} Hz, {}; episodes of {}",
+        "{}: {}, {} at {} Hz, {}; episodes of {}",
         args.output.display(),
         counted(converted.episodes, "episode"),
-        converted.frames,
+        counted(converted.frames, "frame"),
         converted.fps,
-        counted(converted.tasks.len() as u64, "task"),
+        counted(converted.tasks.len(), "task"),
         splits.join(", ")
     );
     converted.notes.iter().for_each(|note| text.push_str(&format!("\n  note: {note}")));

@@ -5,6 +5,7 @@ use crate::Verdict;
 use crate::args::{Common, Place, Rover};
 use crate::failure::Failure;
 use crate::output::{columns, print, significant};
+use sastrugi_schemas::counted;
 use sastrugi_schemas::tables::RoverEffectRow;
 use sastrugi_stages::studies::{self, RunRequest};
 use sastrugi_stages::verbs::rover::{Estimated, PURPOSE, Request, Summary, load, share, summary};
@@ -151,9 +152,9 @@ fn ranking(rows: &[&RoverEffectRow]) -> String {
         "{}: change for {} % of each parameter, {}, {}, {} in each\n{}{rest}",
         [&first.stage_id, &first.group, &first.variant].map(String::as_str).join(" ").trim_end(),
         significant(100.0 * first.share).trim_end_matches('0').trim_end_matches('.'),
-        counted(first.trajectories, "trajectory", "trajectories"),
-        counted(first.worlds, "world", "worlds"),
-        counted(first.rovers, "rover", "rovers"),
+        counted(first.trajectories, "trajectory"),
+        counted(first.worlds, "world"),
+        counted(first.rovers, "rover"),
         columns(&lines)
     )
 }
@@ -165,10 +166,6 @@ fn per_share(value: f64, share: f64) -> String {
     }
     let text = format!("{:.4}", value * share);
     if text == "-0.0000" { "0.0000".to_owned() } else { text }
-}
-
-fn counted(count: i64, one: &str, many: &str) -> String {
-    format!("{count} {}", if count == 1 { one } else { many })
 }
 
 fn base(row: &RoverEffectRow) -> String {

@@ -4,6 +4,7 @@ use crate::Verdict;
 use crate::args::{Common, LogFormat, Serve};
 use crate::failure::{Code, Failure};
 use crate::output::{print, warn};
+use sastrugi_schemas::counted;
 use sastrugi_server::{LibrarySettings, Limits, Settings, Stop};
 use sastrugi_stages::remote::check_local;
 use serde_json::json;
@@ -92,8 +93,8 @@ pub fn serve(args: &Serve, common: &Common) -> Verdict {
     let mut printed = Ok(());
     sastrugi_server::serve(&settings, stop, |address, collections| {
         let ids: Vec<&String> = collections.keys().collect();
-        let noun = if ids.len() == 1 { "collection" } else { "collections" };
-        let text = format!("http://{address}/\n{} {noun}: {}\nPress Ctrl-C to stop.", ids.len(), shortened(&ids));
+        let count = counted(ids.len(), "collection");
+        let text = format!("http://{address}/\n{count}: {}\nPress Ctrl-C to stop.", shortened(&ids));
         printed = print(common.json, &json!({ "address": format!("http://{address}/"), "collections": ids }), &text);
     })?;
     printed?;

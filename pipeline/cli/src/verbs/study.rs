@@ -3,9 +3,10 @@
 use crate::Verdict;
 use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verify};
 use crate::failure::{Code, Failure};
-use crate::output::{bytes, columns, counted, print, print_long, seconds, warn};
+use crate::output::{bytes, columns, print, print_long, seconds, warn};
 use crate::progress::Reporter;
 use sastrugi_report::{Companions, ReportError};
+use sastrugi_schemas::counted;
 use sastrugi_schemas::manifest::ItemNote;
 use sastrugi_stages::loaded;
 use sastrugi_stages::packing;
@@ -147,7 +148,7 @@ fn told(summary: &RunSummary, took: &str) -> String {
     let mut text = format!(
         "{}: {}, {computed} computed, {} failed, {took}",
         output.display(),
-        counted(*items as u64, "item"),
+        counted(items, "item"),
         failures.len()
     );
     if let Some(tally) = &summary.cache {
@@ -181,7 +182,7 @@ fn failed(summary: &RunSummary) -> String {
     if !skipped.is_empty() {
         let named: Vec<String> = skipped.iter().take(SKIPPED_MAX).map(|f| f.item.to_string()).collect();
         let their = if skipped.len() == 1 { "its" } else { "their" };
-        let count = counted(skipped.len() as u64, "item");
+        let count = counted(skipped.len(), "item");
         text.push_str(&format!("\n  {count} not run because {their} input failed: {}", named.join(", ")));
         if skipped.len() > SKIPPED_MAX {
             text.push_str(&format!(" and {} more", skipped.len() - SKIPPED_MAX));
@@ -194,7 +195,7 @@ fn failed(summary: &RunSummary) -> String {
 fn used(tally: &Tally) -> String {
     let Tally { fetched, published, damaged, changed, read_only, problems } = tally;
     let published = if *read_only { "only read".to_owned() } else { format!("{published} published to it") };
-    let mut text = format!("\n  shared cache: {} copied from it, {published}", counted(*fetched as u64, "item"));
+    let mut text = format!("\n  shared cache: {} copied from it, {published}", counted(fetched, "item"));
     if !damaged.is_empty() {
         let outcome = if *read_only { "computed" } else { "replaced" };
         text.push_str(&format!(", damaged and {outcome}: {}", damaged.len()));
@@ -236,7 +237,7 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     let total_bytes = plan.stale.iter().fold(0.0, |sum, s| sum + s.bytes);
     let mut text = format!(
         "{}, {} ready, {} to compute: about {} on one core, about {} of artifacts",
-        counted(plan.items as u64, "item"),
+        counted(plan.items, "item"),
         plan.ready,
         plan.stale.len(),
         seconds(total_seconds),
@@ -296,11 +297,11 @@ pub fn verify(args: &Verify, common: &Common) -> Verdict {
     let verification = found?;
     let mut text = format!("{}, {} checked", counted(verification.files, "file"), bytes(verification.bytes as f64));
     if !verification.recomputed.is_empty() {
-        text.push_str(&format!(", {} recomputed", counted(verification.recomputed.len() as u64, "item")));
+        text.push_str(&format!(", {} recomputed", counted(verification.recomputed.len(), "item")));
     }
     match verification.differences.len() {
         0 => text.push_str(": no differences"),
-        n => text.push_str(&format!(": {}", counted(n as u64, "difference"))),
+        n => text.push_str(&format!(": {}", counted(n, "difference"))),
     }
     text.push_str(&listed(&verification.differences));
     if let Some(why) = &verification.not_comparable {
@@ -323,7 +324,7 @@ pub fn pack(args: &Pack, common: &Common) -> Verdict {
     let packing = packed?;
     let (output, json) = (packing.output.display(), serde_json::to_value(&packing).map_err(Failure::failed)?);
     let Some(sha256) = &packing.sha256 else {
-        let count = counted(packing.differences.len() as u64, "difference");
+        let count = counted(packing.differences.len(), "difference");
         let text = format!("{output} not written: the release has {count}{}", listed(&packing.differences));
         print(common.json, &json, &text)?;
         return Ok(Code::Difference);
@@ -358,7 +359,7 @@ pub fn report(args: &Report, common: &Common) -> Verdict {
         e => Failure::failed(e),
     })?;
     let page = output.join("index.html");
-    let text = format!("{}: {} files", page.display(), summary.files.len());
+    let text = format!("{}: {}", page.display(), counted(summary.files.len(), "file"));
     print(common.json, &json!({ "page": page, "files": summary.files }), &text)?;
     Ok(Code::Done)
 }
