@@ -1,7 +1,7 @@
 //! Adds a periodic texture to a base terrain, its amplitude optionally modulated by the base's slope or by a raster.
 
 use sastrugi_numeric::{Grid, Surface};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 
 /// Relative difference below which two cell sizes count as equal.
 const CELL_TOLERANCE: f64 = 1e-6;
@@ -61,8 +61,9 @@ impl SlopeFactors {
     pub fn check(&self) -> Result<(), ParameterError> {
         let (slopes, factors) = (&self.slope_deg, &self.factor);
         if slopes.is_empty() || slopes.len() != factors.len() {
-            let message =
-                format!("has {} slopes and {} factors; give one factor per slope", slopes.len(), factors.len());
+            let [slopes, factors] =
+                [(slopes, "slope"), (factors, "factor")].map(|(list, noun)| counted(list.len(), noun));
+            let message = format!("has {slopes} and {factors}; give one factor per slope");
             return Err(ParameterError::new("modulate", message));
         }
         if !slopes.iter().all(|s| s.is_finite()) || slopes.windows(2).any(|pair| pair[0] >= pair[1]) {

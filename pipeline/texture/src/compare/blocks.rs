@@ -32,6 +32,7 @@ use crate::fit::case::Case;
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, Stream, Streams, sums};
 use sastrugi_roughness::{Copies, Scale, Statistic, copies, repeats, surface_statistics};
+use sastrugi_schemas::counted;
 use serde::Serialize;
 
 /// Least width of a block, windows.
@@ -369,10 +370,8 @@ fn notes(evidence: &BlockEvidence, [site, texture]: &[Blocks; 2], widened: f64) 
     )];
     for (name, side) in [("site", site), ("texture", texture)] {
         if side.left_out > 0 {
-            notes.push(format!(
-                "{} blocks of the {name} were left out, because they have too little data or no relief",
-                side.left_out
-            ));
+            let blocks = counted(side.left_out, "block");
+            notes.push(format!("left out {blocks} of the {name}, with too little data or no relief"));
         }
     }
     if widened > WIDENING_NOTED {

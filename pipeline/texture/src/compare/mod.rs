@@ -52,7 +52,7 @@ pub use surfaces::surfaces;
 
 use crate::fit::FitError;
 pub use sastrugi_schemas::Answer;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 use serde::Serialize;
 
 /// How a difference is measured.
@@ -193,9 +193,9 @@ pub enum CompareError {
     },
     /// One side has too few blocks.
     #[error(
-        "the site has {site} blocks of {} x {} cells (two windows or more) with data, the texture {texture}: at least {needed} of each are needed; \
+        "the site has {} of {} x {} cells (two windows or more) with data, the texture {texture}: at least {needed} of each are needed; \
          use a smaller outer scale or larger rasters",
-        .shape[0], .shape[1]
+        counted(.site, "block"), .shape[0], .shape[1]
     )]
     TooFewBlocks {
         /// Rows and columns of a block.

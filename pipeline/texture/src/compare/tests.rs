@@ -290,6 +290,9 @@ fn val_textures_that_cannot_be_judged_are_refused() {
     assert!(refused(&coarse).contains("0.06 x 0.06 m, the texture of 0.12 x 0.12 m"), "{}", refused(&coarse));
     let small = site.window(0, 0, 100, 100);
     assert!(refused(&small).contains("the texture 4: at least 6"), "{}", refused(&small));
+    let few = |site| CompareError::TooFewBlocks { shape: [34, 34], site, texture: 0, needed: 6 }.to_string();
+    assert!(few(1).starts_with("the site has 1 block of 34 x 34 cells"), "{}", few(1));
+    assert!(few(5).starts_with("the site has 5 blocks of 34 x 34 cells"), "{}", few(5));
 }
 
 /// Null: site and texture are normal surfaces of one covariance. 40 pairs; any wrong `different` has a probability of at most 0.05 for each: more

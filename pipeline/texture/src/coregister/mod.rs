@@ -39,6 +39,7 @@ use crate::sizes::NORMAL_CONSISTENCY;
 use rounds::{Overlay, Terms};
 use sastrugi_numeric::{Grid, sums};
 use sastrugi_schemas::coregistration::{Coregistration, StandardErrors};
+use sastrugi_schemas::counted;
 use uncertainty::Uncertainty;
 
 /// Fewest common cells.
@@ -73,7 +74,10 @@ pub enum CoregisterError {
         b: [f64; 4],
     },
     /// Too few common cells.
-    #[error("the DEMs have only {cells} cells with data in common; co-registration needs at least {CELLS_MIN}")]
+    #[error(
+        "the DEMs have only {} with data in common; co-registration needs at least {CELLS_MIN}",
+        counted(.cells, "cell")
+    )]
     TooFewCells {
         /// Common cells.
         cells: usize,

@@ -147,6 +147,9 @@ fn val_what_cannot_be_coregistered_is_refused() {
     let mut line = a.clone();
     line.values.iter_mut().enumerate().for_each(|(k, z)| *z = if k / 140 == 60 { *z } else { f64::NAN });
     assert_eq!(coregister(&a, &line).err(), Some(CoregisterError::TooFewCells { cells: 0 }));
+    let sentence = |cells| CoregisterError::TooFewCells { cells }.to_string();
+    assert!(sentence(1).starts_with("the DEMs have only 1 cell with data in common;"), "{}", sentence(1));
+    assert!(sentence(2).starts_with("the DEMs have only 2 cells with data in common;"), "{}", sentence(2));
 }
 
 /// Ground without slopes in two directions: raise, tilt and NMAD are found, but no shift.

@@ -18,8 +18,8 @@ use super::trimmed::TrimmedNormal;
 use super::{Covariance, density};
 use sastrugi_numeric::fft::{HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_roughness::background::BoxWindow;
-use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::CovarianceMap;
+use sastrugi_schemas::{ParameterError, counted};
 use std::f64::consts::PI;
 
 /// Largest lag of a measured covariance, windows.
@@ -122,7 +122,8 @@ pub fn check(map: &CovarianceMap) -> Result<(), ParameterError> {
         return Err(ParameterError::new("map.base", message));
     }
     if map.covariance_m2.len() != needed {
-        let message = format!("has {} values; lags up to {rows} x {cols} cells need {needed}", map.covariance_m2.len());
+        let found = counted(map.covariance_m2.len(), "value");
+        let message = format!("has {found}; lags up to {rows} x {cols} cells need {needed}");
         return Err(ParameterError::new("map.covariance_m2", message));
     }
     if map.covariance_m2.iter().any(|c| !c.is_finite()) || map.covariance_m2[cols] <= 0.0 {

@@ -1,7 +1,7 @@
 //! Errors of a fit.
 
 use crate::synth::statistics::StatisticsError;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 
 /// Why a DEM cannot be fitted, or with which parameters.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -91,7 +91,7 @@ pub enum FitError {
         model: String,
     },
     /// Too few lags.
-    #[error("only {found} lags have pairs of cells; a fit needs at least {needed}")]
+    #[error("there are pairs of cells at only {}; a fit needs at least {needed}", counted(.found, "lag"))]
     TooFewLags {
         /// Bins with pairs.
         found: usize,

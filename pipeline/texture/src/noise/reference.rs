@@ -15,6 +15,7 @@
 use super::Noise;
 use crate::sizes::{NORMAL_CONSISTENCY, Sizes};
 use sastrugi_numeric::Grid;
+use sastrugi_schemas::counted;
 
 /// Fewest differences; their robust standard deviation is then accurate to about a sixth.
 const DIFFERENCES_MIN: u64 = 100;
@@ -55,8 +56,9 @@ pub struct ReferenceNoise {
 pub enum NoiseError {
     /// Too small, or full of holes.
     #[error(
-        "the noise reference has {found} runs of three neighbouring cells with data within the DEM (and its window); at least \
-         {DIFFERENCES_MIN} are needed: use a larger reference"
+        "the noise reference has {} of three neighbouring cells with data within the DEM (and its window); at least \
+         {DIFFERENCES_MIN} are needed: use a larger reference",
+        counted(.found, "run")
     )]
     TooSmall {
         /// Runs found.
@@ -321,5 +323,9 @@ mod tests {
         assert_eq!(of_reference(&small), Err(NoiseError::TooSmall { found: 30 }));
         let none = small.map(|_| f64::NAN);
         assert_eq!(of_reference(&none), Err(NoiseError::TooSmall { found: 0 }));
+        for (found, runs) in [(1, "has 1 run of three"), (30, "has 30 runs of three")] {
+            let sentence = NoiseError::TooSmall { found }.to_string();
+            assert!(sentence.contains(runs), "{sentence}");
+        }
     }
 }

@@ -28,7 +28,7 @@ use crate::covariance::Covariance;
 use rayon::prelude::*;
 use sastrugi_numeric::fft::smooth_length;
 use sastrugi_numeric::{Grid, Streams};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 
 /// Directions in which measured cells are searched, cells south and east.
 const RAYS: [[isize; 2]; 16] = [
@@ -91,9 +91,9 @@ impl Filled {
 
 impl std::fmt::Display for Filled {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
-        write!(f, "{} no-data cells were filled", self.cells)?;
+        write!(f, "filled {}", counted(self.cells, "no-data cell"))?;
         if self.left > 0 {
-            write!(f, "; {} were left because they are not enclosed by data", self.left)?;
+            write!(f, ", and left {} not enclosed by data", counted(self.left, "cell"))?;
         }
         if let Some(range_m) = self.twin_range_m {
             write!(f, "; the self-affine covariance was replaced by a Matern one of range {range_m} m")?;
@@ -110,8 +110,8 @@ pub enum FillError {
     NoData,
     /// A texture that does not cover the surface cell by cell.
     #[error(
-        "the texture has {} rows and {} columns, and the DEM {} and {}; make it as large as the DEM",
-        .texture_cells[0], .texture_cells[1], .dem_cells[0], .dem_cells[1]
+        "the texture has {} and {}, and the DEM {} and {}; make it as large as the DEM",
+        counted(.texture_cells[0], "row"), counted(.texture_cells[1], "column"), .dem_cells[0], .dem_cells[1]
     )]
     Shape {
         /// Rows and columns of the surface.
@@ -482,6 +482,10 @@ mod tests {
         let filled = fill(&dem, &exponential(), &streams).unwrap();
         assert!(filled.grid.at(12, 18).is_finite() && filled.grid.at(38, 20).is_nan());
         assert_eq!((filled.cells + filled.left, filled.grid.finite_count()), (480, 1120 + filled.cells));
+        let one = Filled { cells: 1, left: 1, ..filled.clone() };
+        assert_eq!(one.to_string(), "filled 1 no-data cell, and left 1 cell not enclosed by data");
+        let many = Filled { cells: 80, left: 400, ..filled };
+        assert_eq!(many.to_string(), "filled 80 no-data cells, and left 400 cells not enclosed by data");
         let empty = Grid::filled(dem.geometry, f64::NAN);
         assert_eq!(fill(&empty, &exponential(), &streams).unwrap_err(), FillError::NoData);
     }

@@ -12,8 +12,8 @@ use super::to_micrometres;
 use crate::covariance::masked_covariance;
 use crate::fit::{FitError, FitSettings, Heights, residual_with_quantiles};
 use sastrugi_numeric::{Geometry, Grid, sums};
-use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::{ParameterError, counted};
 use std::f64::consts::E;
 
 /// Relative difference of cell sizes that counts as rounding.
@@ -188,10 +188,10 @@ impl std::fmt::Display for Copies {
         write!(
             f,
             "copied runs: {mean_south:.1} cells on average along columns and {mean_east:.1} along rows, at most {south} and {east}; \
-             {:.0} % of the cells have the height of their source; {:.0} % of the site occurs, one of its cells {} times",
+             {:.0} % of the cells have the height of their source; {:.0} % of the site occurs, one of its cells {}",
             100.0 * self.verbatim_share,
             100.0 * self.site_share,
-            self.uses_max
+            counted(self.uses_max, "time")
         )
     }
 }

@@ -33,8 +33,8 @@ use marginal::Marginal;
 use measured::Measured;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_roughness::background::BoxWindow;
-use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::{CovarianceMap, FitFile};
+use sastrugi_schemas::{ParameterError, counted};
 use schemars::JsonSchema;
 use serde::Serialize;
 use serde::de::DeserializeOwned;
@@ -216,8 +216,9 @@ pub enum SynthesisError {
     },
     /// Too little of the site is free of gaps.
     #[error(
-        "the measured residual has {places} places of {side} m x {side} m without gaps, and `{method}` needs at least {least} to choose from; \
+        "the measured residual has {} of {side} m x {side} m without gaps, and `{method}` needs at least {least} to choose from; \
          give a larger DEM or one with fewer gaps, or set `find_objects = false` if the objects are part of the texture",
+        counted(.places, "place"),
         side = to_micrometres(*.side_m)
     )]
     FewPlaces {

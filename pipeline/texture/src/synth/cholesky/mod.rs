@@ -17,7 +17,7 @@ use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted};
 use crate::covariance::Covariance;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Streams};
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::OnceLock;
@@ -120,8 +120,8 @@ impl Kernel for Cholesky {
     fn notes(&self) -> Vec<String> {
         let gigabytes = 1e-9 * self.cost().memory_bytes as f64;
         vec![format!(
-            "the covariance matrix of {} cells needs {gigabytes:.3} GB; the field is not periodic",
-            self.tile.len()
+            "the covariance matrix of {} needs {gigabytes:.3} GB; the field is not periodic",
+            counted(self.tile.len(), "cell")
         )]
     }
 

@@ -17,7 +17,7 @@ use super::tile::{self, Tile};
 use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted, fft_ma, reach};
 use crate::covariance::Covariance;
 use sastrugi_numeric::{Geometry, Streams};
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -124,7 +124,8 @@ impl Kernel for Gaussians {
         let Class { along_m, across_m, count, .. } = self.class;
         let mut notes = fft_ma::size_notes(&self.covariance, &self.tile, true);
         notes.push(format!(
-            "{count} Gaussians with half axes {along_m:.4} m x {across_m:.4} m: the correlation is Gaussian, not the fit's"
+            "{} with half axes {along_m:.4} m x {across_m:.4} m: the correlation is Gaussian, not the fit's",
+            counted(count, "Gaussian")
         ));
         notes
     }

@@ -73,7 +73,7 @@ use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::statistics::{Modulation, Statistics};
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -228,13 +228,14 @@ fn doubts(fitted: &Modulation) -> Vec<String> {
         "the log variance of the amplitude was reduced from the measured {measured:.2} to {log_variance:.2}: on a site this smooth, a larger value would \
          change the covariance, or the variance of increments, by more than 10 %"
     );
+    let patches = counted(format_args!("{patches:.0}"), "independent patch");
     let uncertain = match error > measured.max(NOTED_MIN) {
         true => format!(
-            "the log variance of the amplitude is not identified ({measured:.2}, with a standard error of {error:.2}): the site has {patches:.0} independent \
-             patches, and on smooth ground a nonlinear map of the heights cannot be told from patches; set `log_variance` to override it"
+            "the log variance of the amplitude is not identified ({measured:.2}, with a standard error of {error:.2}): the site has {patches}, \
+             and on smooth ground a nonlinear map of the heights cannot be told from patches; set `log_variance` to override it"
         ),
         false => format!(
-            "the log variance of the amplitude, {measured:.2}, has a standard error of {error:.2}: the site has {patches:.0} independent patches; set \
+            "the log variance of the amplitude, {measured:.2}, has a standard error of {error:.2}: the site has {patches}; set \
              `log_variance` to override it"
         ),
     };

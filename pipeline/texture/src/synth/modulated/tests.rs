@@ -394,6 +394,8 @@ fn val_fits_without_patches() {
         notes[0].contains("from the measured 0.40 to 0.30") && notes[1].contains("5 independent patches"),
         "{notes:?}"
     );
+    let one = doubts(&Modulation { patches: 1.2, ..few.clone() });
+    assert!(one[1].contains("the site has 1 independent patch; set"), "{one:?}");
     let vague = Modulation { log_variance: 0.05, measured_log_variance: 0.05, log_variance_error: 1.1, ..few };
     assert!(
         doubts(&vague)[0].contains("is not identified (0.05, with a standard error of 1.10)"),

@@ -27,7 +27,7 @@ use super::tile::{self, Tile};
 use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted, fft_ma, reach};
 use crate::covariance::Covariance;
 use sastrugi_numeric::{Geometry, Streams};
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -256,8 +256,8 @@ impl Kernel for QuasiWavelets {
         let (largest, smallest) = (self.classes.first(), self.classes.last());
         let size = |class: Option<&Class>| class.map_or(0.0, |c| c.along_m);
         notes.push(format!(
-            "{} classes of bumps, half axes {:.3} m to {:.3} m; {:.1} % of the variance is white",
-            self.classes.len(),
+            "{} of bumps, half axes {:.3} m to {:.3} m; {:.1} % of the variance is white",
+            counted(self.classes.len(), "class"),
             size(largest),
             size(smallest),
             100.0 * self.white_m2 / self.covariance.at_distance(0.0)

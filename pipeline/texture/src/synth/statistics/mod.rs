@@ -13,6 +13,7 @@ pub mod tails;
 
 use super::{modulated, wavelet_statistics};
 use sastrugi_numeric::{Grid, sums};
+use sastrugi_schemas::counted;
 use sastrugi_schemas::statistics::{Statistics, VERSION};
 
 /// Fewest cells with data. The flatness of a smaller residual rests on a handful of increments.
@@ -28,7 +29,7 @@ const SPARSE: [usize; 2] = [16, 8];
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum StatisticsError {
     /// Too little data.
-    #[error("the residual has {cells} cells with data; its statistics need at least {CELLS_MIN}")]
+    #[error("the residual has {} with data; its statistics need at least {CELLS_MIN}", counted(.cells, "cell"))]
     TooSmall {
         /// Cells with data.
         cells: usize,
@@ -52,7 +53,8 @@ pub enum StatisticsError {
     },
     /// A window of few cells.
     #[error(
-        "the largest lag of the covariance is {lag} cells; it must be at least {LAG_MIN}: use a wider window or smaller cells"
+        "the largest lag of the covariance is {}; it must be at least {LAG_MIN}: use a wider window or smaller cells",
+        counted(.lag, "cell")
     )]
     ShortLag {
         /// The smaller of the largest lags along rows and columns, cells.

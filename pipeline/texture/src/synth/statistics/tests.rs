@@ -75,9 +75,15 @@ fn val_refusals() {
     assert_eq!(measure(&z.map(|_| 2.5), [16, 16]), Err(StatisticsError::Flat { height_m: 2.5 }));
     // A strip of seven rows has no lags to half its width.
     assert_eq!(measure(&noise(7, 700), [16, 16]), Err(StatisticsError::ShortLag { lag: 3 }));
-    let sentence = StatisticsError::ShortLag { lag: 3 }.to_string();
-    assert_eq!(
-        sentence,
-        "the largest lag of the covariance is 3 cells; it must be at least 4: use a wider window or smaller cells"
-    );
+    for (lag, cells) in [(1, "1 cell"), (3, "3 cells")] {
+        assert_eq!(
+            StatisticsError::ShortLag { lag }.to_string(),
+            format!(
+                "the largest lag of the covariance is {cells}; it must be at least 4: use a wider window or smaller cells"
+            )
+        );
+    }
+    let few = [1, 2].map(|cells| StatisticsError::TooSmall { cells }.to_string());
+    assert!(few[0].starts_with("the residual has 1 cell with data;"), "{few:?}");
+    assert!(few[1].starts_with("the residual has 2 cells with data;"), "{few:?}");
 }

@@ -72,7 +72,7 @@ use rayon::prelude::*;
 use sastrugi_numeric::fft::{RealFft2, smooth_length};
 use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::statistics::{Statistics, Wavelets};
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -204,8 +204,9 @@ impl WaveletStatisticsParameters {
         let octaves = statistics.wavelets.octaves;
         let least = WIDTHS << octaves.min(u32::BITS - 1);
         if let Some(side) = torus.into_iter().find(|side| *side < least) {
+            let octaves = counted(octaves, "octave");
             let message = format!(
-                "gives a periodic texture of {side} cells on a side, too few for the {octaves} octaves of the fit's wavelets, which need {least}: make it \
+                "gives a periodic texture of {side} cells on a side, too few for the {octaves} of the fit's wavelets, which need {least}: make it \
                  larger, or set periodic = false"
             );
             return Err(ParameterError::new("size_px", message));
