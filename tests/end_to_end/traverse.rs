@@ -279,7 +279,7 @@ fn val_measured_dems_are_driven_or_refused() {
     for (dem, more, words) in [
         // 423 x 331 cells of 2 cm.
         (&gaps, &[][..], "the terrain is 8.46 x 6.62 m, including a border of 5 m"),
-        (&gaps, &short[..], "has low roughness"),
+        (&gaps, &short[..], "there is no low roughness in the"),
         (&catchment, &[][..], "cells of 1 m: they are larger than its wheelbase of 0.512 m"),
     ] {
         let (code, said) = drive(other.path(), dem, more);
@@ -317,7 +317,7 @@ fn val_traverse_states_why_it_refuses() {
         assert!(!folder.path().join("drive").exists());
     };
     refused(&ascii(0.1, |_, _| 0.0), &[], "the terrain is 9.60 x 9.60 m, including a border of 5 m");
-    let steep = "has low roughness; every cell is steeper than [roughness] low_max: use a smoother terrain";
+    let steep = "from the edge; every cell is steeper than [roughness] low_max: use a smoother terrain";
     refused(&ascii(0.1, |row, col| f64::from((row + col) % 2)), &short, steep);
     // Spikes 0.8 m apart, between which no disc of the closing fits.
     let spikes = |row: u32, col: u32| if row.is_multiple_of(8) && col.is_multiple_of(8) { 1.0 } else { 0.0 };

@@ -31,7 +31,7 @@ pub use perturb::{ReplicateParameters, ReplicateSettings};
 pub use polyline::{Foot, Polyline, PolylineError};
 
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams};
-use sastrugi_schemas::RoughnessClass;
+use sastrugi_schemas::{RoughnessClass, counted};
 
 /// A mission: straight from start to goal, or along a polyline.
 #[derive(Clone, Debug, PartialEq, serde::Serialize, serde::Deserialize)]
@@ -142,7 +142,10 @@ pub enum MissionError {
         inside_y_m: f64,
     },
     /// No low-roughness cell lies inside the border.
-    #[error("find a start: none of the {cells} cells farther than {border_m} m from the edge has low roughness")]
+    #[error(
+        "find a start: there is no low roughness in the {} farther than {border_m} m from the edge",
+        counted(.cells, "cell")
+    )]
     NoEligibleStart {
         /// Cells inside the border.
         cells: usize,
@@ -151,8 +154,9 @@ pub enum MissionError {
     },
     /// No draw satisfied the goal rule.
     #[error(
-        "find a goal for {mission_id}: in {draws} draws, none of the {starts} low-roughness cells had a goal of low or semi \
-         roughness {length_m} m away; raise `max_draws` or shorten `length_m`"
+        "find a goal for {mission_id}: {} from {} gave no goal of low or semi roughness {length_m} m away; raise `max_draws` or \
+         shorten `length_m`",
+        counted(.draws, "draw"), counted(.starts, "low-roughness cell")
     )]
     DrawsExhausted {
         /// Id of the mission.

@@ -5,6 +5,7 @@
 //! its loops are longer than the window, the foot stays on the part that the vehicle is following. Cost: the segments inside
 //! the window.
 
+use sastrugi_schemas::counted;
 use sastrugi_schemas::topics::StateSample;
 use serde::{Deserialize, Serialize};
 
@@ -32,7 +33,7 @@ pub enum PolylineError {
         y_m: f64,
     },
     /// All points coincide, or there are fewer than two.
-    #[error("build a polyline: the {points} points span no length; give at least two distinct points")]
+    #[error("build a polyline of {}: it has no length; give at least two distinct points", counted(.points, "point"))]
     NoLength {
         /// Number of points.
         points: usize,
@@ -224,6 +225,8 @@ mod tests {
         let error = |points: &[[f64; 2]]| Polyline::new(points).unwrap_err();
         assert_eq!(error(&[]), PolylineError::NoLength { points: 0 });
         assert_eq!(error(&[[1.0, 2.0]; 3]), PolylineError::NoLength { points: 3 });
+        assert!(error(&[[1.0, 2.0]]).to_string().starts_with("build a polyline of 1 point: it has no length"));
+        assert!(error(&[[1.0, 2.0]; 3]).to_string().starts_with("build a polyline of 3 points: it has no length"));
         assert!(error(&[[0.0, 0.0], [f64::NAN, 2.0]]).to_string().contains("point 1 is (NaN, 2) m"));
         assert_eq!(error(&[[-1e308, 0.0], [1e308, 0.0]]), PolylineError::TooLong);
         assert_eq!(error(&[[0.0, 0.0], [1e-200, 0.0]]), PolylineError::NoLength { points: 2 });

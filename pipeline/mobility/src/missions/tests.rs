@@ -116,12 +116,15 @@ fn val_impossible_terrains_are_refused_with_the_reason() {
     assert!(matches!(draw(&small, &border), MissionError::LongerThanTerrain { .. }));
     let rough = Grid::filled(Geometry::square(1009, 1009, 0.05), SEMI);
     assert!(matches!(draw(&rough, &settings(|_| ())), MissionError::NoEligibleStart { .. }));
+    let none = |cells| MissionError::NoEligibleStart { cells, border_m: 5.0 }.to_string();
+    assert_eq!(none(1), "find a start: there is no low roughness in the 1 cell farther than 5 m from the edge");
+    assert_eq!(none(9), "find a start: there is no low roughness in the 9 cells farther than 5 m from the edge");
     // Low roughness only in the middle: every goal lies outside the border.
     let mut pit = Grid::filled(Geometry::square(1009, 1009, 0.05), HIGH);
     pit.values[504 * 1009 + 504] = LOW;
     let error = draw(&pit, &settings(|p| p.max_draws = 77));
     assert!(matches!(error, MissionError::DrawsExhausted { draws: 77, starts: 1, .. }), "{error}");
-    assert!(error.to_string().contains("77 draws"));
+    assert!(error.to_string().contains("77 draws from 1 low-roughness cell gave no goal"), "{error}");
 }
 
 #[test]

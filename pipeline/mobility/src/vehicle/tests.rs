@@ -678,6 +678,9 @@ fn val_bad_vehicles_are_refused() {
     assert_eq!(key(json!({"wheels": {"axles_m": [0.1, -0.1]}})), "vehicle_changes.wheels.axles_m");
     assert_eq!(key(json!({"wheels": {"axles_m": [-0.25, 0.25]}})), "vehicle_changes.wheels.axles_m");
     assert_eq!(key(json!({"wheels": {"axles_m": []}})), "vehicle_changes.wheels.axles_m");
+    let axles = |axles_m: Value| refused(json!({"wheels": {"axles_m": axles_m}})).1;
+    assert!(axles(json!([0.0])).starts_with("lists 1 axle;"), "{}", axles(json!([0.0])));
+    assert!(axles(json!([])).starts_with("lists 0 axles;"), "{}", axles(json!([])));
     assert_eq!(key(json!({"wheels": {"track_m": 0.1}})), "vehicle_changes.wheels.track_m");
     assert_eq!(
         key(json!({"chassis": {"centre_of_mass_m": [0.3, 0, 0.06]}})),

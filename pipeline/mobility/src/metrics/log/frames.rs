@@ -2,6 +2,7 @@
 
 use super::LogError;
 use super::series::{Rotation, between};
+use sastrugi_schemas::counted;
 use sastrugi_schemas::log::{PoseStream, TimedPose, TransformStream};
 use std::collections::BTreeMap;
 
@@ -38,7 +39,7 @@ pub(super) fn path(transforms: &[TransformStream], body: &str, fixed: Option<&st
     chain.reverse();
     let densest = chain.iter().max_by_key(|stream| stream.poses.len()).ok_or_else(missing)?;
     let poses = densest.poses.iter().filter_map(|pose| composed(&chain, pose.time_ns)).collect();
-    let schema = format!("{frame} to {body} by {} transforms", chain.len());
+    let schema = format!("{frame} to {body} by {}", counted(chain.len(), "transform"));
     Ok(PoseStream { topic: densest.topic.clone(), schema, frame: frame.to_owned(), body: body.to_owned(), poses })
 }
 

@@ -28,6 +28,7 @@ mod tests;
 pub use ground::{OnGround, on_ground};
 
 use super::{Differentiator, EulerAngles, Metrics};
+use sastrugi_schemas::counted;
 use sastrugi_schemas::log::{ImuStream, Log, PoseStream, TimedPose};
 use sastrugi_schemas::topics::StateSample;
 use series::Rotation;
@@ -295,7 +296,8 @@ const PREFERRED: [&str; 6] = [
 
 /// The stream to analyse, and the others as text.
 fn chosen(log: &Log, settings: &LogSettings) -> Result<(PoseStream, Vec<String>), LogError> {
-    let words = |stream: &PoseStream| format!("{} ({}, {} poses)", stream.topic, stream.schema, stream.poses.len());
+    let words =
+        |stream: &PoseStream| format!("{} ({}, {})", stream.topic, stream.schema, counted(stream.poses.len(), "pose"));
     let of_transforms = frames::path(&log.transforms, &settings.body_frame, settings.fixed_frame.as_deref());
     let mut streams: Vec<&PoseStream> = log.poses.iter().collect();
     let rank = |s: &PoseStream| PREFERRED.iter().position(|p| *p == s.schema).unwrap_or(PREFERRED.len());

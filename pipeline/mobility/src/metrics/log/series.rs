@@ -2,6 +2,7 @@
 
 use super::LogError;
 use sastrugi_numeric::sums;
+use sastrugi_schemas::counted;
 use sastrugi_schemas::log::{PoseStream, TimedPose};
 use sastrugi_schemas::topics::StateSample;
 
@@ -91,10 +92,10 @@ pub(super) fn cleaned(stream: &PoseStream) -> Result<(Vec<TimedPose>, Vec<String
     }
     let mut notes = Vec::new();
     if unusable > 0 {
-        notes.push(format!("dropped {unusable} poses with numbers that are not finite"));
+        notes.push(format!("dropped {} with numbers that are not finite", counted(unusable, "pose")));
     }
     if repeated > 0 {
-        notes.push(format!("dropped {repeated} poses with the same time as the previous one"));
+        notes.push(format!("dropped {} with the same time as the previous one", counted(repeated, "pose")));
     }
     Ok((poses, notes))
 }

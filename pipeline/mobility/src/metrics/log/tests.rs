@@ -111,7 +111,7 @@ fn val_bad_poses_are_reported() {
         analysed(poses)
     };
     let nan = with(7, |p| p.position_m[2] = f64::NAN).unwrap();
-    assert!(nan.poses == 49 && nan.notes[0] == "dropped 1 poses with numbers that are not finite", "{:?}", nan.notes);
+    assert!(nan.poses == 49 && nan.notes[0] == "dropped 1 pose with numbers that are not finite", "{:?}", nan.notes);
     let back = with(7, |p| p.time_ns -= 500_000_000).unwrap_err();
     assert_eq!(back, LogError::Backwards { topic: "/odom".into(), message: 8, back_s: 0.45 });
     let zero = with(3, |p| p.orientation = [0.0; 4]).unwrap_err();
@@ -339,7 +339,7 @@ fn val_repeated_poses_and_short_pauses() {
     poses.insert(30, poses[30]);
     let found = analysed(poses).unwrap();
     assert_eq!((found.poses, found.gaps_s.len()), (100, 0));
-    assert_eq!(found.notes[0], "dropped 1 poses with the same time as the previous one");
+    assert_eq!(found.notes[0], "dropped 1 pose with the same time as the previous one");
     let paused = |pause_s: f64| {
         let before = (0..50).map(|k| pose(0.1 * f64::from(k), 0.0, 0.0));
         let after = (0..50).map(move |k| pose(4.9 + pause_s + 0.1 * f64::from(k), 0.0, 0.0));

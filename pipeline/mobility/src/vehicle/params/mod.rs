@@ -190,7 +190,8 @@ impl WheelParameters {
     /// Wheels must not overlap.
     fn check_room(&self) -> Result<(), ParameterError> {
         if !(2..=AXLES_MAX).contains(&self.axles_m.len()) {
-            let message = format!("lists {} axles; it must list 2 to {AXLES_MAX}, front to rear", self.axles_m.len());
+            let axles = sastrugi_schemas::counted(self.axles_m.len(), "axle");
+            let message = format!("lists {axles}; it must list 2 to {AXLES_MAX}, front to rear");
             return Err(ParameterError::new("axles_m", message));
         }
         let diameter = 2.0 * self.radius_m;
