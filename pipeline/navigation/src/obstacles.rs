@@ -4,7 +4,7 @@
 //! those. (The thesis marks the cells of the edge as vertices, which would then lie inside the obstacle.)
 
 use crate::map::{Node, TravelMap};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 
 #[cfg(test)]
 mod tests;
@@ -13,7 +13,7 @@ mod tests;
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum ObstacleError {
     /// Fewer than three distinct points.
-    #[error("block a polygon of {0} points: it needs at least 3 distinct points")]
+    #[error("block a polygon of {}: it needs at least 3 distinct points", counted(.0, "point"))]
     Points(usize),
     /// A coordinate is not finite.
     #[error("block a polygon with the point ({x}, {y}): coordinates must be finite")]

@@ -4,7 +4,7 @@ use super::crowd::CrowdSettings;
 use super::obstacles::MovingObstacle;
 use super::shape::{Formation, FormationError, Pattern, SlotParameters};
 use super::speeds::{Bands, SpeedLimits};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -221,9 +221,8 @@ impl TeamParameters {
         match formation.slots().len() > self.drawn_losses as usize {
             true => Ok(()),
             false => {
-                let left = formation.slots().len();
-                let message =
-                    format!("is {}; at least one of the {left} remaining members must be kept", self.drawn_losses);
+                let left = counted(formation.slots().len(), "remaining member");
+                let message = format!("is {}; of {left}, at least one must be kept", self.drawn_losses);
                 Err(ParameterError::new("drawn_losses", message))
             }
         }

@@ -70,7 +70,8 @@ fn prop_marked_cells_block_like_the_square_that_fills_them() {
 #[test]
 fn val_invalid_polygons_are_refused() {
     let message = |points: &[[f64; 2]]| Polygon::new(vec![points.to_vec()]).unwrap_err().to_string();
-    assert!(message(&[[0.0, 0.0], [1.0, 1.0]]).contains("2 points"));
+    assert!(message(&[[0.0, 0.0]]).contains("a polygon of 1 point:"));
+    assert!(message(&[[0.0, 0.0], [1.0, 1.0]]).contains("a polygon of 2 points:"));
     assert!(message(&[[0.0, 0.0], [1.0, 1.0], [1.0, 1.0], [0.0, 0.0]]).contains("2 points"));
     assert!(message(&[[0.0, 0.0], [1.0, 1.0], [2.0, 2.0]]).contains("without area"));
     assert!(message(&[[0.0, 0.0], [1.0, f64::NAN], [2.0, 0.0]]).contains("(1, NaN)"));

@@ -22,7 +22,7 @@ use crate::search::{Found, Network, anytime, astar, theta_star};
 use crate::smoothing::smoothed;
 use crate::vertices::{VertexSettings, Vertices};
 use query::Query;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 
 /// A cell: row and column.
 pub type Cell = [usize; 2];
@@ -83,7 +83,7 @@ pub enum RouteError {
         limits_deg: [f64; 2],
     },
     /// An anytime search used up its budget before it found a path.
-    #[error("find a path within {budget} expansions; raise the budget or the weight")]
+    #[error("find a path within {}; raise the budget or the weight", counted(.budget, "expansion"))]
     Budget {
         /// The budget.
         budget: u64,

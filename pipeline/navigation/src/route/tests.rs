@@ -162,6 +162,9 @@ fn val_an_anytime_search_reports_a_budget_that_is_too_small() {
     let anytime = |budget| RouteSettings { method: Method::Anytime { weight: 3.0, budget }, ..GRID };
     let error = plan(&ground(&map, &costs), &anytime(5), [0, 0], [9, 9]).unwrap_err();
     assert_eq!(error, RouteError::Budget { budget: 5 });
+    let spent = |budget| RouteError::Budget { budget }.to_string();
+    assert_eq!(spent(1), "find a path within 1 expansion; raise the budget or the weight");
+    assert_eq!(spent(5), "find a path within 5 expansions; raise the budget or the weight");
     assert!(plan(&ground(&map, &costs), &anytime(50), [0, 0], [9, 9]).is_ok());
 }
 
