@@ -14,7 +14,7 @@ use crate::direction::Vector;
 use crate::photometry::Photometry;
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams, sums};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 
 /// Lights closer to one plane than this are refused: smallest over largest singular value of their unit vectors.
 const COPLANAR: f64 = 0.002;
@@ -103,7 +103,7 @@ pub enum RecoverError {
     #[error(transparent)]
     Setting(#[from] ParameterError),
     /// Not enough images.
-    #[error("{0} images do not determine two slopes and an albedo; at least 3 are needed")]
+    #[error("{} cannot determine two slopes and an albedo; at least 3 are needed", counted(.0, "image"))]
     TooFewImages(usize),
     /// Lights lie in one plane.
     #[error(
@@ -118,7 +118,7 @@ pub enum RecoverError {
     #[error("the sun of image {0} is not above the horizon")]
     SunBelowHorizon(usize),
     /// The wrong number of pixels.
-    #[error("image {image} has {found} pixels, its camera {expected}; they must be equal")]
+    #[error("image {image} has {}, its camera {expected}; they must be equal", counted(.found, "pixel"))]
     Size {
         /// Number of the image, from 1.
         image: usize,
@@ -290,7 +290,8 @@ impl<'a> Inversion<'a> {
         let mut warnings = Vec::new();
         let beyond = known.points.len() - constraints.len();
         if beyond > 0 {
-            warnings.push(format!("{beyond} of {} points lie off the map and are ignored", known.points.len()));
+            warnings
+                .push(format!("ignored {beyond} of {}, for lying off the map", counted(known.points.len(), "point")));
         }
         if let Some(coarse) = &known.coarse {
             constraints.extend(Constraint::coarse(&g, &coarse.dem, coarse.sigma_m));
@@ -549,7 +550,8 @@ impl<'a> Inversion<'a> {
         let unreached = self.unreached.iter().filter(|u| **u).count();
         if unreached > 0 {
             self.warnings.push(format!(
-                "no path from the centre reaches {unreached} cells behind holes, so they have no height; `integration = \"poisson\"` recovers them"
+                "no path from the centre reaches {} behind holes, so heights are missing there; `integration = \"poisson\"` recovers them",
+                counted(unreached, "cell")
             ));
         }
         if !self.converged {

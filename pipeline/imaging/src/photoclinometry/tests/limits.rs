@@ -17,7 +17,8 @@ fn val_refusals_say_what_is_wrong() {
     let images = scene.nadir_images(&THREE, 45.0);
     let (start, known, settings) = (level(&scene), Known::default(), quick());
     let of = |images: &[Image]| refusal(images, &start, &known, &settings);
-    assert!(of(&images[..2]).starts_with("2 images do not determine"));
+    assert!(of(&images[..2]).starts_with("2 images cannot determine"));
+    assert!(of(&images[..1]).starts_with("1 image cannot determine"));
     // North, south and straight above: one plane.
     let suns = [[0.0, 45.0], [180.0, 45.0], [0.0, 90.0]];
     let coplanar: Vec<Image> = suns.iter().map(|s| scene.image(scene.nadir(), *s)).collect();
