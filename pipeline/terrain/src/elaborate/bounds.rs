@@ -6,6 +6,7 @@
 //! on light and contrast; surveys that count rocks require more pixels.
 
 use crate::planetary::RawProcess;
+use sastrugi_schemas::counted;
 
 /// Largest crater or rock, posts of the DEM.
 pub const DIAMETER_POSTS: f64 = 2.0;
@@ -39,7 +40,9 @@ impl Bound {
     pub fn note(self, processes: &[RawProcess]) -> Option<String> {
         let why = match self {
             Self::Posts(post_m) => format!("the DEM, with posts {post_m:.3} m apart"),
-            Self::Pixels(resolution_m, pixels) => format!("images with {resolution_m} m pixels ({pixels} pixels)"),
+            Self::Pixels(resolution_m, pixels) => {
+                format!("images with {resolution_m} m pixels ({})", counted(pixels, "pixel"))
+            }
         };
         let bounded = processes.iter().any(|p| diameter_min_m(p).is_some());
         bounded

@@ -5,7 +5,7 @@ use crate::planetary::{
     Lattice, RawProcess, WHOLE_TOLERANCE, Window, Work, check_processes, check_texture, window_in_reach,
 };
 use crate::size::Size;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -166,10 +166,8 @@ impl RawElaborate {
         }
         match self.altimetry_points_m.iter().position(|p| !(3..=4).contains(&p.len())) {
             Some(n) => {
-                let message = format!(
-                    "has {} numbers; a point must be [x, y, z] or [x, y, z, sigma]",
-                    self.altimetry_points_m[n].len()
-                );
+                let found = counted(self.altimetry_points_m[n].len(), "number");
+                let message = format!("has {found}; a point must be [x, y, z] or [x, y, z, sigma]");
                 Err(ParameterError::new(format!("altimetry_points_m.{n}"), message))
             }
             None => Ok(()),
