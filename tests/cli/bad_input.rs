@@ -83,7 +83,7 @@ fn val_exports_are_refused() {
             path,
             &["convert", "holed.asc", "out", "--for", target],
             USAGE,
-            &[target, "1 cells hold no data", "--fill"],
+            &[target, "has 1 cell without data", "--fill"],
         );
     }
     refused(path, &["convert", "row.asc", "out.glb"], USAGE, &["out.glb", "no three neighbouring cells"]);

@@ -31,7 +31,7 @@ use parquet::file::metadata::{KeyValue, SortingColumn};
 use parquet::file::properties::WriterProperties;
 use parquet::schema::types::ColumnPath;
 use sastrugi_schemas::tables::compare_keys;
-use sastrugi_schemas::{Cell, Column, ColumnType, Record, Table};
+use sastrugi_schemas::{Cell, Column, ColumnType, Record, Table, counted};
 use std::cmp::Ordering;
 use std::collections::HashMap;
 use std::io;
@@ -544,8 +544,8 @@ fn open(path: &Path, table: &Table) -> Result<ParquetRecordBatchReaderBuilder<Ch
         }
     }
     if found.fields().len() > table.columns.len() {
-        let extra = found.fields().len() - table.columns.len();
-        let reason = format!("table {} has {extra} unexpected columns", table.name);
+        let extra = counted(found.fields().len() - table.columns.len(), "unexpected column");
+        let reason = format!("table {} has {extra}", table.name);
         return Err(TableError::unusable(path, reason));
     }
     Ok(builder)

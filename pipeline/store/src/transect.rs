@@ -12,6 +12,7 @@
 //! Memory: the text and 8 bytes per height.
 
 use crate::dem::{DemError, NO_DATA, Refusal};
+use sastrugi_schemas::counted;
 use std::path::Path;
 
 #[cfg(test)]
@@ -127,8 +128,8 @@ impl Columns {
             self.values = vec![vec![]; fields.len()];
         }
         if fields.len() != self.values.len() {
-            let (found, before) = (fields.len(), self.values.len());
-            return Err(Refusal::new(format!("line {number} has {found} columns; the lines before it have {before}")));
+            let (found, before) = (counted(fields.len(), "column"), self.values.len());
+            return Err(Refusal::new(format!("line {number} has {found}; the lines before it have {before}")));
         }
         for (column, (values, field)) in self.values.iter_mut().zip(fields).enumerate() {
             let value =
@@ -145,7 +146,8 @@ impl Columns {
         }
         match self.names.as_ref().map(Vec::len) {
             Some(names) if names != self.values.len() => Err(Refusal::new(format!(
-                "the first line names {names} columns, but line {} has {}",
+                "the first line names {}, but line {} has {}",
+                counted(names, "column"),
                 self.lines[0],
                 self.values.len()
             ))),

@@ -5,6 +5,7 @@ use super::checks::{cell_count, free_of_no_data_value};
 use super::crs::Crs;
 use super::raster::{Claimed, Dem, DemInfo, Format, NO_DATA, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_schemas::counted;
 use std::fmt::Write;
 use std::io::ErrorKind;
 use std::iter::Peekable;
@@ -149,8 +150,8 @@ pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
     let cells = geometry.len();
     // Every value takes a character and a separator.
     if cells as u64 * 2 - 1 > bytes.len() as u64 {
-        let (rows, cols) = (geometry.rows, geometry.cols);
-        return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
+        let (rows, cols) = (counted(geometry.rows, "row"), counted(geometry.cols, "column"));
+        return Err(Refusal::new(format!("claims {rows} of {cols} in {} bytes", bytes.len())));
     }
     let (values, integers) = read_values(words, cells, header.nodata)?;
     let (crs, notes) = crs_of(path, &geometry)?;
@@ -211,14 +212,18 @@ fn read_values<'a>(
     let mut integers = true;
     for word in words {
         if values.len() == cells {
-            return Err(Refusal::new(format!("has more than the {cells} values that its header declares")));
+            return Err(Refusal::new(format!(
+                "has more than the {} that its header declares",
+                counted(cells, "value")
+            )));
         }
         let value = number(word)?;
         integers &= word.iter().all(|b| matches!(b, b'0'..=b'9' | b'-' | b'+'));
         values.push(if Some(value) == nodata { f64::NAN } else { value });
     }
     if values.len() < cells {
-        return Err(Refusal::new(format!("has {} of the {cells} values that its header declares", values.len())));
+        let declared = counted(cells, "value");
+        return Err(Refusal::new(format!("has {} of the {declared} that its header declares", values.len())));
     }
     Ok((values, integers))
 }

@@ -2,6 +2,7 @@
 
 use super::raster::{Dem, MAX_CELLS, NO_DATA, ReadOptions, Refusal, unplaced};
 use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_schemas::counted;
 
 /// Checks common to all formats.
 pub(crate) fn checked(mut dem: Dem) -> Result<Dem, Refusal> {
@@ -10,7 +11,7 @@ pub(crate) fn checked(mut dem: Dem) -> Result<Dem, Refusal> {
     let infinite = dem.grid.values.iter().filter(|v| v.is_infinite()).count();
     if infinite > 0 {
         dem.grid.values.iter_mut().filter(|v| v.is_infinite()).for_each(|v| *v = f64::NAN);
-        dem.info.notes.push(format!("{infinite} infinite values are treated as no data"));
+        dem.info.notes.push(format!("treated {} as no data", counted(infinite, "infinite value")));
     }
     if dem.grid.finite_count() == 0 {
         return Err(Refusal::new(format!("none of the {} x {} cells holds data", g.rows, g.cols)));
@@ -31,11 +32,12 @@ pub(super) fn check_place(g: &Geometry) -> Result<(), Refusal> {
 
 /// Number of cells of a claimed size, if it can be held in memory.
 pub(super) fn cell_count(rows: u64, cols: u64) -> Result<usize, Refusal> {
+    let (all_rows, all_cols) = (counted(rows, "row"), counted(cols, "column"));
     if rows == 0 || cols == 0 {
-        return Err(Refusal::new(format!("has no cells ({rows} rows, {cols} columns)")));
+        return Err(Refusal::new(format!("has no cells ({all_rows}, {all_cols})")));
     }
     let cells = rows.checked_mul(cols).filter(|&n| n <= MAX_CELLS).ok_or_else(|| {
-        Refusal::new(format!("claims {rows} rows of {cols} columns; at most {MAX_CELLS} cells can be read"))
+        Refusal::new(format!("claims {all_rows} of {all_cols}; at most {MAX_CELLS} cells can be read"))
     })?;
     usize::try_from(cells).map_err(|_| Refusal::new(format!("{cells} cells do not fit in memory")))
 }

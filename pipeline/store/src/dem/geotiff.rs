@@ -11,6 +11,7 @@ use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOpti
 use geotiff_reader::geokeys::{GeoKeyDirectory, GeoKeyValue};
 use geotiff_reader::{GeoTiffFile, GeoTiffOpenOptions};
 use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_schemas::counted;
 use std::error::Error;
 use std::fs::File;
 use std::io::{BufReader, Cursor, Read, Seek};
@@ -264,7 +265,7 @@ fn single_band(bands: u64, photometric: Option<u16>) -> Result<(), Refusal> {
 /// Refuses a raster too large to be stored in so few bytes.
 fn affordable(rows: u32, cols: u32, bytes_per_cell: u64, size: u64) -> Result<(), Refusal> {
     if rows == 0 || cols == 0 {
-        return Err(Refusal::new(format!("has no cells ({rows} rows, {cols} columns)")));
+        return Err(Refusal::new(format!("has no cells ({}, {})", counted(rows, "row"), counted(cols, "column"))));
     }
     let cells = u64::from(rows) * u64::from(cols);
     if cells.saturating_mul(bytes_per_cell) > FREE_BYTES.max(size.saturating_mul(MAX_EXPANSION)) {

@@ -5,6 +5,7 @@ use super::band::Values;
 use super::crs::Crs;
 use super::raster::{Claimed, Dem, DemInfo, Format, Refusal};
 use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_schemas::counted;
 use std::fs::File;
 use std::path::Path;
 
@@ -15,8 +16,8 @@ const SIDES: [usize; 2] = [1201, 3601];
 pub(super) fn parse(path: &Path, bytes: &[u8]) -> Result<Dem, Refusal> {
     let side = SIDES.into_iter().find(|n| n * n * 2 == bytes.len()).ok_or_else(|| {
         Refusal::new(format!(
-            "has {} bytes; an .hgt tile has 2884802 (3 arc seconds) or 25934402 (1 arc second)",
-            bytes.len()
+            "has {}; an .hgt tile has 2884802 (3 arc seconds) or 25934402 (1 arc second)",
+            counted(bytes.len(), "byte")
         ))
     })?;
     let geometry = tile(corner(path)?, side);

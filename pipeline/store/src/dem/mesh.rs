@@ -9,6 +9,7 @@ use super::crs::Crs;
 use super::raster::Refusal;
 use sastrugi_numeric::triangulation::{self, Limits};
 use sastrugi_numeric::{Grid, Triangulation, triangulate};
+use sastrugi_schemas::counted;
 use serde_json::{Value, json};
 use std::fmt::Write;
 
@@ -56,8 +57,8 @@ impl Decimation {
         let triangulation = triangulate(grid, &requested).ok_or_else(no_mesh)?;
         let count = triangulation.triangles.len();
         if limits.triangles_max.is_some_and(|most| count > most) {
-            let reason =
-                format!("the outline and the rims of holes alone take {count} triangles; allow at least that many");
+            let triangles = counted(count, "triangle");
+            let reason = format!("the outline and the rims of holes alone take {triangles}; allow at least that many");
             return Err(Refusal::new(reason));
         }
         Ok(Self { limits: *limits, triangulation, full })
@@ -67,9 +68,9 @@ impl Decimation {
     pub fn sentence(&self) -> String {
         let found = &self.triangulation;
         let mut text = format!(
-            "decimated to {} of {} triangles; largest error at a cell centre {} m, RMS {} m",
+            "decimated to {} of {}; largest error at a cell centre {} m, RMS {} m",
             found.triangles.len(),
-            self.full,
+            counted(self.full, "triangle"),
             stated(found.error_max),
             stated(found.error_rms)
         );

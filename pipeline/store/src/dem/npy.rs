@@ -5,6 +5,7 @@ use super::checks::{cell_count, unplaced_claim};
 use super::crs::Crs;
 use super::raster::{Claimed, Dem, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, unplaced};
 use sastrugi_numeric::Grid;
+use sastrugi_schemas::counted;
 use std::path::Path;
 
 /// True for the first bytes of an array's file.
@@ -26,8 +27,8 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
     };
     let cells = cell_count(rows, cols)?;
     if data.len() != cells * element.bytes {
-        let expected = cells * element.bytes;
-        return Err(Refusal::new(format!("holds {} bytes of data; {rows} x {cols} cells need {expected}", data.len())));
+        let (found, expected) = (counted(data.len(), "byte"), cells * element.bytes);
+        return Err(Refusal::new(format!("holds {found} of data; {rows} x {cols} cells need {expected}")));
     }
     let (rows, cols) = (rows as usize, cols as usize);
     let stored: Vec<f64> = data.chunks_exact(element.bytes).map(|v| (element.decode)(v, big_endian)).collect();

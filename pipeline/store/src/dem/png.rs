@@ -6,6 +6,7 @@ use super::crs::Crs;
 use super::raster::{Claimed, Dem, DemError, DemInfo, Format, MAX_CELLS, ReadOptions, Refusal, save, unplaced};
 use crate::atomic::Target;
 use sastrugi_numeric::Grid;
+use sastrugi_schemas::counted;
 use std::fs::File;
 use std::io::{Cursor, Read, Seek};
 
@@ -147,7 +148,8 @@ pub(super) fn parse(bytes: &[u8], options: &ReadOptions) -> Result<Dem, Refusal>
     let cells = cell_count(rows, cols)?;
     // Deflate compresses by a factor of at most 1032.
     if cells as u64 > (bytes.len() as u64).saturating_mul(1032) {
-        return Err(Refusal::new(format!("claims {rows} rows of {cols} columns in {} bytes", bytes.len())));
+        let (rows, cols) = (counted(rows, "row"), counted(cols, "column"));
+        return Err(Refusal::new(format!("claims {rows} of {cols} in {} bytes", bytes.len())));
     }
     let mut data = vec![0; cells * if wide { 2 } else { 1 }];
     reader.next_frame(&mut data).map_err(refused)?;

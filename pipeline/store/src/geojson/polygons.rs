@@ -3,6 +3,7 @@
 //! RFC 7946 repeats the first position of a ring as the last, which makes at least 4. As in GDAL, a ring that is not closed is also
 //! accepted, and its last position is joined to the first: it needs at least 3 corners.
 
+use sastrugi_schemas::counted;
 use serde_json::Value;
 use std::io::{self, BufRead};
 
@@ -92,7 +93,8 @@ fn ring(value: &Value) -> Result<Ring, String> {
     let corners = positions.len() - usize::from(closed);
     if corners < CORNERS_MIN {
         return Err(format!(
-            "a ring of a polygon has {corners} corners; it needs at least {CORNERS_MIN} (the first may be repeated as the last)"
+            "a ring of a polygon has {}; it needs at least {CORNERS_MIN} (the first may be repeated as the last)",
+            counted(corners, "corner")
         ));
     }
     Ok(positions)

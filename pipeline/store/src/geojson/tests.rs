@@ -91,7 +91,7 @@ fn val_unusable_obstacles_are_refused() {
             "a ring of a polygon has 2 corners; it needs at least 3 (the first may be repeated as the last)",
         ),
         ("{\"type\": \"Polygon\", \"coordinates\": [[[0, 0], [1, 1], [0, 0]]]}", "a ring of a polygon has 2 corners"),
-        ("{\"type\": \"Polygon\", \"coordinates\": [[[0, 0]]]}", "a ring of a polygon has 1 corners"),
+        ("{\"type\": \"Polygon\", \"coordinates\": [[[0, 0]]]}", "a ring of a polygon has 1 corner;"),
         ("{\"type\": \"Polygon\", \"coordinates\": [[]]}", "a ring of a polygon has 0 corners"),
         ("{\"type\": \"Point\", \"coordinates\": [1, 2]}", "contains a Point; only Polygon and MultiPolygon"),
         ("{\"a\": 1}", "has no \"type\""),

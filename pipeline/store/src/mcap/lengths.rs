@@ -5,6 +5,7 @@
 //! texts is its length in bytes, then keys and values in turn. Records without texts, above all messages, cost nothing here.
 
 use mcap::records::op;
+use sastrugi_schemas::counted;
 
 /// Part of a record up to its last text.
 enum Part {
@@ -82,7 +83,8 @@ fn after_numbers(data: &[u8], entry: usize) -> &[u8] {
 }
 
 fn beyond(what: &str, bytes: usize, rest: &[u8]) -> String {
-    format!("a record claims a {what} of {bytes} bytes, but has only {} bytes left", rest.len())
+    let (claimed, left) = (counted(bytes, "byte"), counted(rest.len(), "byte"));
+    format!("a record claims a {what} of {claimed}, but has only {left} left")
 }
 
 #[cfg(test)]
@@ -133,7 +135,7 @@ mod tests {
                 longer[k][..4].copy_from_slice(&u32::MAX.to_le_bytes());
                 let refused = check(opcode, &longer.concat()).unwrap_err();
                 let left = pieces[k..].concat().len() - 4;
-                let words = format!("of 4294967295 bytes, but has only {left} bytes left");
+                let words = format!("of 4294967295 bytes, but has only {} left", counted(left, "byte"));
                 assert!(refused.ends_with(&words), "{opcode}: {refused}");
             }
         }

@@ -6,7 +6,7 @@ use crate::digest;
 use crate::parquet::check_table;
 use rayon::prelude::*;
 use sastrugi_schemas::manifest::{Artifact, Manifest};
-use sastrugi_schemas::tables;
+use sastrugi_schemas::{counted, tables};
 use std::collections::{BTreeMap, BTreeSet};
 use std::fmt;
 use std::fs;
@@ -247,7 +247,7 @@ fn check(folder: &Path, name: &str, expected: &Expected<'_>) -> Result<(u64, Opt
         Err(e) => return Err(ReleaseError::io(&path)(e)),
     };
     if let Some(bytes) = expected.bytes.filter(|bytes| *bytes != size) {
-        let message = format!("has {size} bytes, expected {bytes}");
+        let message = format!("has {}, expected {bytes}", counted(size, "byte"));
         return Ok((size, problem(ProblemKind::Size, message)));
     }
     let (_, sha256) = digest::of_file(&path).map_err(ReleaseError::io(&path))?;
@@ -266,7 +266,7 @@ fn check_rows(path: &Path, name: &str, expected: &Expected<'_>) -> Result<(), (P
     let table = tables::by_name(name).ok_or_else(|| wrong(format!("table {name} does not exist in this version")))?;
     let found = check_table(path, table).map_err(|e| wrong(e.to_string()))?;
     if let Some(rows) = expected.records.filter(|rows| *rows != found.rows) {
-        return Err(wrong(format!("has {} rows, expected {rows}", found.rows)));
+        return Err(wrong(format!("has {}, expected {rows}", counted(found.rows, "row"))));
     }
     match (expected.study_sha256, found.study_sha256) {
         (Some(stated), Some(own)) if own != stated => {

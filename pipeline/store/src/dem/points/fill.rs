@@ -11,6 +11,7 @@
 //! Cost: O(cells) for the closing, at most 9 additions per empty cell and step; 2 bytes per cell, including a margin of `reach`.
 
 use crate::dem::raster::{MAX_CELLS, Refusal};
+use sastrugi_schemas::counted;
 
 /// Fills the gaps of a row-major grid and returns the number of filled cells.
 ///
@@ -23,7 +24,8 @@ pub(super) fn fill(values: &mut [f64], rows: usize, cols: usize, reach: u32) -> 
     let margin = reach as usize;
     if (rows + 2 * margin) as u64 * (cols + 2 * margin) as u64 > 2 * MAX_CELLS {
         return Err(Refusal::new(format!(
-            "gaps in {rows} x {cols} cells cannot be filled up to {reach} cells: not enough memory"
+            "gaps in {rows} x {cols} cells cannot be filled up to {}: not enough memory",
+            counted(reach, "cell")
         )));
     }
     let closed = closing(values, rows, cols, margin);

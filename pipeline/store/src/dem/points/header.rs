@@ -11,6 +11,7 @@ use crate::dem::raster::Refusal;
 use crate::guard::unless_panicking;
 use laz::LazVlr;
 use laz::laszip::ChunkTable;
+use sastrugi_schemas::counted;
 use std::io::{self, Read, Seek, SeekFrom};
 
 /// Longest header of a supported version, bytes.
@@ -172,7 +173,8 @@ impl DeclaredSize {
         let room = data_start.checked_sub(u64::from(header_size)).filter(|_| data_start <= file_bytes);
         if room.is_none_or(|room| records * RECORD_HEADER_BYTES > room) {
             return Err(Refusal::new(format!(
-                "claims {records} records before its points at byte {data_start} in a file of {file_bytes} bytes"
+                "claims {} before its points at byte {data_start} in a file of {file_bytes} bytes",
+                counted(records, "record")
             )));
         }
         let (format, compressed) = point_format(header.0[104])?;
@@ -199,10 +201,8 @@ impl DeclaredSize {
     fn check_points(&self) -> Result<(), Refusal> {
         let least = POINT_BYTES[usize::from(self.format)];
         if self.point_bytes < least {
-            let (format, bytes) = (self.format, self.point_bytes);
-            return Err(Refusal::new(format!(
-                "its points have {bytes} bytes; point format {format} needs at least {least}"
-            )));
+            let (format, bytes) = (self.format, counted(self.point_bytes, "byte"));
+            return Err(Refusal::new(format!("its points have {bytes}; point format {format} needs at least {least}")));
         }
         if self.points == 0 {
             return Err(Refusal::new("has no points"));
@@ -211,8 +211,8 @@ impl DeclaredSize {
         let most =
             if self.compressed { room.saturating_mul(MAX_POINTS_PER_BYTE) } else { room / u64::from(self.point_bytes) };
         if self.points > most {
-            let points = self.points;
-            return Err(Refusal::new(format!("claims {points} points in {room} bytes, which hold at most {most}")));
+            let (points, room) = (counted(self.points, "point"), counted(room, "byte"));
+            return Err(Refusal::new(format!("claims {points} in {room}, which can hold at most {most}")));
         }
         if self.points > u64::from(u32::MAX) {
             return Err(Refusal::new(format!("has {} points; at most {} can be read", self.points, u32::MAX)));
@@ -268,7 +268,8 @@ impl DeclaredSize {
         let left = end.saturating_sub(start + head);
         if length > left {
             let kind = if head == RECORD_HEADER_BYTES { "a" } else { "an extended" };
-            return Err(Refusal::new(format!("claims {kind} record of {length} bytes, but only {left} are left")));
+            let length = counted(length, "byte");
+            return Err(Refusal::new(format!("claims {kind} record of {length}, with only {left} left")));
         }
         let mut user = [0; 16];
         read_at(file, start + 2, &mut user)?;
@@ -348,12 +349,14 @@ impl DeclaredSize {
             let layers: u64 = sizes.as_chunks().0.iter().map(|size| u64::from(u32::from_le_bytes(*size))).sum();
             at = start + 4 + sizes.len() as u64 + layers;
             if at > table {
-                return Err(Refusal::new(format!("is damaged after {points} of its {} points", self.points)));
+                let all = counted(self.points, "point");
+                return Err(Refusal::new(format!("is damaged after {points} of its {all}")));
             }
             points += in_chunk.min(decoded.next().unwrap_or(0));
         }
         if points < self.points {
-            return Err(Refusal::new(format!("claims {} points, but its chunks hold {points}", self.points)));
+            let all = counted(self.points, "point");
+            return Err(Refusal::new(format!("claims {all}, but its chunks hold {points}")));
         }
         Ok(())
     }

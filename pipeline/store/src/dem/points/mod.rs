@@ -50,6 +50,7 @@ use grid::Cells;
 use header::DeclaredSize;
 use lattice::Lattice;
 use sastrugi_numeric::Grid;
+use sastrugi_schemas::counted;
 use std::fs::File;
 use std::path::Path;
 use survey::{Chosen, check_stated, survey};
@@ -178,13 +179,15 @@ fn gridded(cloud: &Cloud, settings: &GridSettings) -> Result<Gridded, Refusal> {
     let (held, cells) = (counts.iter().filter(|n| **n > 0).count(), counts.len());
     let statistic = settings.statistic.name();
     notes.push(format!(
-        "{} points gridded ({statistic} of each cell of {cell_m} m); {held} of {cells} cells hold points",
-        survey.points
+        "gridded {} into {held} of {} ({statistic} of each cell of {cell_m} m)",
+        counted(survey.points, "point"),
+        counted(cells, "cell")
     ));
     let geometry = lattice.geometry();
     let filled = fill::fill(&mut heights, geometry.rows, geometry.cols, settings.fill_cells)?;
     if settings.fill_cells > 0 {
-        notes.push(format!("{filled} gap cells filled, up to {} cells from points", settings.fill_cells));
+        let (gaps, reach) = (counted(filled, "gap cell"), counted(settings.fill_cells, "cell"));
+        notes.push(format!("filled {gaps}, up to {reach} from points"));
     }
     let info = DemInfo {
         format: Format::Las,

@@ -4,7 +4,7 @@ use super::cloud::{Cloud, Point};
 use super::header::DeclaredSize;
 use crate::dem::crs::Crs;
 use crate::dem::raster::Refusal;
-use sastrugi_schemas::shown;
+use sastrugi_schemas::{counted, shown};
 
 /// The selected points of a cloud.
 pub(super) struct Chosen<'a> {
@@ -51,12 +51,12 @@ pub(super) fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refus
             }
         }
     })?;
-    let total = cloud.declared.points;
+    let total = counted(cloud.declared.points, "point");
     if points == 0 && other > 0 {
-        return Err(Refusal::new(format!("none of the {total} points is of class 2, ground")));
+        return Err(Refusal::new(format!("has {total}, none of class 2, ground")));
     }
     if points == 0 {
-        return Err(Refusal::new(format!("all {total} points are withheld or noise")));
+        return Err(Refusal::new(format!("every point is withheld or noise, {total} in all")));
     }
     let place = |stored: [i32; 2]| [0, 1].map(|axis| cloud.coordinate(axis, f64::from(stored[axis])));
     let survey = Survey { points, low: place(low), high: place(high) };
@@ -65,10 +65,11 @@ pub(super) fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refus
         notes.push("the file names no reference system; coordinates are treated as metres".to_owned());
     }
     if noise > 0 {
-        notes.push(format!("{noise} points that are withheld or noise (classes 7 and 18) are left out"));
+        let noise = counted(noise, "point");
+        notes.push(format!("left out {noise} marked as withheld or noise (classes 7 and 18)"));
     }
     if other > 0 {
-        notes.push(format!("{other} points of classes other than ground (2) are left out"));
+        notes.push(format!("left out {} not of class 2, ground", counted(other, "point")));
     }
     Ok((survey, notes))
 }

@@ -138,15 +138,16 @@ fn val_noise_and_other_classes_are_left_out() {
         settings.ground_only = false;
         let all = grid_bytes(&bytes, &settings).unwrap();
         assert_eq!((all.counts.values[0], all.dem.grid.values[0]), (2, 2.0));
-        assert!(all.dem.info.notes.iter().any(|note| note.starts_with("3 points that are withheld")));
+        assert!(all.dem.info.notes.iter().any(|note| note.starts_with("left out 3 points marked as withheld")));
         settings.ground_only = true;
         let bare = grid_bytes(&bytes, &settings).unwrap();
         assert_eq!((bare.counts.values[0], bare.dem.grid.values[0]), (1, 1.0));
-        assert!(bare.dem.info.notes.iter().any(|note| note.starts_with("1 points of classes other than ground")));
+        assert!(bare.dem.info.notes.iter().any(|note| note == "left out 1 point not of class 2, ground"));
     }
     let error = grid_bytes(&plain(&shots[4..]), &settings).unwrap_err();
-    assert!(error.to_string().contains("class 2, ground"));
-    assert!(refusal(&plain(&shots[1..4])).contains("withheld or noise"));
+    assert!(error.to_string().contains("has 1 point, none of class 2, ground"), "{error}");
+    assert!(refusal(&plain(&shots[1..4])).contains("every point is withheld or noise, 3 points in all"));
+    assert!(refusal(&plain(&shots[1..2])).contains("every point is withheld or noise, 1 point in all"));
 }
 
 /// Reference: cells in a map, statistics from sorted lists.
@@ -376,6 +377,9 @@ fn val_clouds_are_read_like_rasters() {
     let filling = GridSettings { fill_cells: 1, ..GridSettings::default() };
     let filled = dem::read_gridded(&path, &ReadOptions { cell_m: Some([1.0; 2]) }, &filling).unwrap();
     assert_eq!(filled.grid.values, [1.0, 2.0, 3.0]);
+    for words in ["gridded 2 points into 2 of 3 cells (", "filled 1 gap cell, up to 1 cell from points"] {
+        assert!(filled.info.notes.iter().any(|note| note.starts_with(words)), "{words}: {:?}", filled.info.notes);
+    }
     let oblong = dem::read_with(&path, &ReadOptions { cell_m: Some([1.0, 2.0]) }).unwrap_err();
     assert!(oblong.to_string().contains("square") && !oblong.unusable_input());
     let written = dem::write(&path, &dem.grid, &Crs::default(), &WriteOptions::default()).unwrap_err();

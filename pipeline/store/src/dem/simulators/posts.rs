@@ -4,6 +4,7 @@ use crate::dem::checks::check_single_precision;
 use crate::dem::raster::Refusal;
 use sastrugi_numeric::resample::stretch;
 use sastrugi_numeric::{Geometry, Grid};
+use sastrugi_schemas::counted;
 use serde_json::{Value, json};
 
 /// Heights at posts, which are cell centres.
@@ -143,5 +144,6 @@ fn check_holes(grid: &Grid) -> Result<(), Refusal> {
         return Ok(());
     }
     let advice = "fill them (`sastrugi texture FIT.json --fill DEM -o OUT.tif`) or cut a window without them";
-    Err(Refusal::new(format!("{holes} cells hold no data, but a height map cannot have holes; {advice}")))
+    let cells = counted(holes, "cell");
+    Err(Refusal::new(format!("the DEM has {cells} without data, but a height map cannot have holes; {advice}")))
 }

@@ -110,7 +110,7 @@ fn val_unsuitable_dems_are_refused() {
     holed.values[17] = f64::NAN;
     for simulator in [Simulator::Unreal, Simulator::Unity, Simulator::Gazebo, Simulator::Mujoco] {
         let found = refusal(&holed, simulator);
-        assert!(found.starts_with(simulator.name()) && found.contains("1 cells hold no data"), "{found}");
+        assert!(found.starts_with(simulator.name()) && found.contains("the DEM has 1 cell without data"), "{found}");
     }
     assert!(resampled(&holed, Simulator::Isaac).is_ok(), "a mesh has holes");
     holed.values.fill(f64::NAN);

@@ -10,8 +10,10 @@ use super::{McapError, bag_files, lengths};
 use crate::guard::unless_panicking;
 use mcap::records::Record;
 use mcap::sans_io::linear_reader::{LinearReadEvent, LinearReader, LinearReaderOptions};
+use sastrugi_schemas::counted;
 use sastrugi_schemas::log::{ImuStream, Log, PoseStream, TimedForce, TimedPose, TransformStream};
 use std::collections::BTreeMap;
+use std::fmt::Display;
 use std::io::Read;
 use std::path::Path;
 
@@ -103,8 +105,7 @@ fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
                 reader.notify_read(read);
             }
             Ok(LinearReadEvent::Record { data, opcode }) => {
-                let damaged = |e| unusable(format!("the file is damaged after {} messages: {e}", gathered.messages));
-                let record = parse(opcode, data).map_err(damaged)?;
+                let record = parse(opcode, data).map_err(|e| unusable(gathered.damaged(&e)))?;
                 gathered.take(&record).map_err(unusable)?;
             }
             Err(mcap::McapError::UnexpectedEof) if gathered.begun => {
@@ -116,7 +117,7 @@ fn read_file(path: &Path, gathered: &mut Gathered) -> Result<(), McapError> {
                 return Err(unusable("not an MCAP file".to_owned()));
             }
             Err(error) => {
-                return Err(unusable(format!("the file is damaged after {} messages: {error}", gathered.messages)));
+                return Err(unusable(gathered.damaged(&error)));
             }
         }
     }
@@ -160,7 +161,12 @@ impl Gathered {
     /// Describes where the file is truncated.
     fn broken(&self) -> String {
         let seconds = self.last_ns.saturating_sub(self.first_ns.unwrap_or(self.last_ns)) as f64 * 1e-9;
-        format!("the file is truncated after {} messages, {seconds:.3} s after the first", self.messages)
+        format!("the file is truncated after {}, {seconds:.3} s after the first", counted(self.messages, "message"))
+    }
+
+    /// Describes where the file is damaged.
+    fn damaged(&self, error: &impl Display) -> String {
+        format!("the file is damaged after {}: {error}", counted(self.messages, "message"))
     }
 
     /// Prepares for the next file of a bag, which renumbers the channels and continues their streams.
