@@ -293,7 +293,7 @@ fn val_measured_dems_are_driven_or_refused() {
     let missions = rows(&other.path().join("drive"), "missions");
     let nowhere = missions.iter().filter(|row| text(row, "outcome") == "out_of_bounds" && row["time_s"] == 0.0).count();
     assert!(
-        nowhere > 0 && manifest.contains(&format!("{nowhere} of 6 missions start with the vehicle over")),
+        nowhere > 0 && manifest.contains(&format!("{nowhere} of 6 missions started with the vehicle over")),
         "{missions:?}"
     );
 }

@@ -5,8 +5,8 @@ use crate::builder::{BuildError, Builder, Heightfield};
 use crate::jobs::traverse;
 use crate::study::keys::nearest;
 use crate::study::{Entry, StudyError};
-use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::study::{HypothesisItem, HypothesisTest, TraverseItem};
+use sastrugi_schemas::{ParameterError, counted};
 use sastrugi_statistics::{holm, least_p_apart, least_p_in_blocks};
 use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
@@ -218,8 +218,7 @@ impl std::fmt::Display for Units {
                 let (last, first) = sizes.split_last().map_or(("", &[][..]), |(last, first)| (last.as_str(), first));
                 write!(f, "{} and {last} terrains", first.join(", "))
             }
-            Self::Blocks(_, 1) => write!(f, "1 paired terrain"),
-            Self::Blocks(_, blocks) => write!(f, "{blocks} paired terrains"),
+            Self::Blocks(_, blocks) => f.write_str(&counted(blocks, "paired terrain")),
         }
     }
 }

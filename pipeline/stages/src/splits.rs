@@ -12,7 +12,7 @@ use crate::study::{Study, StudyError};
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::study::{Pairing, Shares};
 use sastrugi_schemas::tables::CellType;
-use sastrugi_schemas::{Cell, Table};
+use sastrugi_schemas::{Cell, Table, counted};
 use std::collections::{BTreeMap, BTreeSet};
 
 /// Names of the splits, in the order of `[study] split`.
@@ -111,7 +111,6 @@ fn too_few(study: &Study, groups: &BTreeSet<String>, units: &[Unit], shares: &[f
     let of = if names.is_empty() { "the study".to_owned() } else { format!("group {}", names.join(" with ")) };
     let parts = shares.iter().filter(|share| **share > 0.0).count();
     let terrains = units.iter().map(|unit| unit.terrains.len()).sum::<usize>();
-    let counted = |count: usize, what: &str| format!("{count} {what}{}", if count == 1 { "" } else { "s" });
     let tied = match units.iter().max_by_key(|unit| unit.terrains.len()) {
         Some(Unit { terrains: tied, .. }) if terrains > units.len() => format!(
             " in {} ({} belong together: one is made from the other or they share random draws)",

@@ -11,8 +11,8 @@ use crate::runner::progress::Progress;
 use crate::runner::tables::table_of;
 use crate::splits::{self, Splits};
 use crate::studies::{RunRequest, resolved, run};
-use sastrugi_schemas::Table;
 use sastrugi_schemas::manifest::{Artifact, ItemNote, Manifest};
+use sastrugi_schemas::{Table, counted};
 use sastrugi_store::parquet::TableReader;
 use sastrugi_store::release::{self, Head, MANIFEST, Problem, ProblemKind, Release, ReleaseError, STUDY, VerifyReport};
 use serde::Serialize;
@@ -336,7 +336,7 @@ fn compare_rows(release: &Release, table: &Table, mut missing: BTreeSet<String>)
             missing.remove(&format!("{:?}", row.map_err(ReleaseError::from)?));
         }
     }
-    let problem = format!("{} of {count} rows differ when recomputed", missing.len());
+    let problem = format!("{} of {} differed when recomputed", missing.len(), counted(count, "row"));
     Ok((!missing.is_empty()).then(|| Difference { path: format!("tables/{}", table.name), problem }))
 }
 

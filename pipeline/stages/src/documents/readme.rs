@@ -2,8 +2,8 @@
 
 use super::described::{Described, FOLDERS, folded, map_files, map_words, page, quoted, source_line};
 use super::spdx_list;
-use sastrugi_schemas::Table;
 use sastrugi_schemas::manifest::Source;
+use sastrugi_schemas::{Table, counted};
 use std::fmt::Write as _;
 
 /// Licence names of dataset hubs that are not the SPDX identifier in lower case.
@@ -78,7 +78,8 @@ pub fn text(described: &Described<'_>) -> String {
         text.push_str(&sources_section(described.sources));
     }
     if !described.failures.is_empty() {
-        let _ = writeln!(text, "\n{} items failed (parameters in `manifest.json`):\n", described.failures.len());
+        let failed = counted(described.failures.len(), "item");
+        let _ = writeln!(text, "\n{failed} failed (parameters in `manifest.json`):\n");
         for failure in described.failures {
             let _ = writeln!(text, "- `{}`: {}", failure.item, failure.message);
         }

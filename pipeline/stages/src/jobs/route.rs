@@ -19,10 +19,10 @@ use sastrugi_navigation::SlopeCost;
 use sastrugi_navigation::pairs::{Pair, PairParameters, draw_pairs};
 use sastrugi_navigation::parameters::{Cost, RouteParameters, Search as Method};
 use sastrugi_numeric::Streams;
-use sastrugi_schemas::Kind;
 use sastrugi_schemas::Record;
 use sastrugi_schemas::study::{RoughnessSection, RouteItem};
 use sastrugi_schemas::tables::{RoutePointRow, RouteRow};
+use sastrugi_schemas::{Kind, counted};
 use sastrugi_store::{dem, digest, geojson};
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -531,7 +531,7 @@ impl Job for RouteJob {
 /// A note on pairs without a route.
 fn notes(rows: &[RouteRow]) -> Vec<String> {
     let without = rows.iter().filter(|row| row.outcome != "found").count();
-    let note = format!("{without} of {} start-goal pairs have no route within the limits", rows.len());
+    let note = format!("{without} of {} had no route within the limits", counted(rows.len(), "start-goal pair"));
     (without > 0).then_some(note).into_iter().collect()
 }
 

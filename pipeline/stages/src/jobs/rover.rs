@@ -19,7 +19,7 @@ use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::study::{McapFlavour, RoverItem, StudyHead};
 use sastrugi_schemas::tables::{RoverRow, RoverSampleRow};
 use sastrugi_schemas::topics::RoverRecording;
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, counted};
 use sastrugi_store::digest;
 use sastrugi_store::mcap::{RoverMcap, TerrainView, bag_metadata, write_rover};
 use serde_json::{Value, json};
@@ -435,7 +435,7 @@ impl RoverJob {
 /// Notes on rovers that did not reach their goal.
 fn notes(rows: &[Driven]) -> Vec<String> {
     let endings = [
-        ("lost", "stopped where they wrongly believed the goal to be"),
+        ("lost", "stopped at a place wrongly taken for the goal"),
         ("no_way", "found no way forward"),
         ("distance_limit", "reached the distance limit"),
         ("cycle_limit", "reached the cycle limit"),
@@ -443,7 +443,7 @@ fn notes(rows: &[Driven]) -> Vec<String> {
     ];
     let note = |(name, words): (&str, &str)| {
         let count = rows.iter().filter(|d| d.row.outcome == name).count();
-        (count > 0).then(|| format!("{count} of {} rovers {words}", rows.len()))
+        (count > 0).then(|| format!("{count} of {} {words}", counted(rows.len(), "rover")))
     };
     endings.into_iter().filter_map(note).collect()
 }

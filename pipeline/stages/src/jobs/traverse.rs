@@ -25,7 +25,7 @@ use sastrugi_numeric::{Grid, Streams};
 use sastrugi_schemas::study::{McapFlavour, StudyHead, TraverseItem};
 use sastrugi_schemas::tables::{MissionRow, ParameterRow, ReplicateRow, SampleRow};
 use sastrugi_schemas::topics::{EventKind, Recording};
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, counted};
 use sastrugi_store::mcap::{MissionMcap, TerrainView, bag_metadata, write_mission};
 use sastrugi_store::{dem, digest};
 use serde_json::{Value, json};
@@ -514,8 +514,8 @@ fn no_ground_note(missions: &[MissionRow]) -> Option<String> {
     let count = missions.iter().filter(nowhere).count();
     (count > 0).then(|| {
         format!(
-            "{count} of {} missions start with the vehicle over cells without data; fill the gaps of the DEM first",
-            missions.len()
+            "{count} of {} started with the vehicle over cells without data; fill the gaps of the DEM first",
+            counted(missions.len(), "mission")
         )
     })
 }

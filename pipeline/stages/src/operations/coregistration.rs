@@ -2,6 +2,7 @@
 
 use crate::job::JobError;
 use sastrugi_schemas::coregistration::{Coregistration, Minus};
+use sastrugi_schemas::counted;
 use sastrugi_store::dem::{Crs, Dem};
 use sastrugi_texture::coregister::{Coregistered, SIGNIFICANCE, coregister};
 
@@ -55,7 +56,7 @@ pub fn sentence(minus: &Minus) -> String {
 
 /// The number of rounds, with its noun.
 pub fn rounds(c: &Coregistration) -> String {
-    format!("{} {}", c.iterations, if c.iterations == 1 { "round" } else { "rounds" })
+    counted(c.iterations, "round")
 }
 
 /// The verdict on a co-registration.

@@ -8,8 +8,8 @@ use sastrugi_imaging::photoclinometry::{
 };
 use sastrugi_imaging::{CameraPose, ImageDescription};
 use sastrugi_numeric::{Geometry, Grid, Streams, Surface, sums};
-use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_schemas::{Kind, counted};
 use sastrugi_store::altimetry;
 use sastrugi_store::atomic::Target;
 use sastrugi_store::dem::{self, Crs, Values, WriteOptions};
@@ -181,9 +181,9 @@ fn same_cells(truth: &Grid, poses: &[CameraPose], map: &Geometry) -> Option<Stri
     let cells = pixel_m / truth.geometry.mean_cell();
     (cells < TRUTH_CELLS_MIN - 1e-6).then(|| {
         format!(
-            "a pixel is {} cells of the true surface wide, fewer than {TRUTH_CELLS_MIN}: images rendered from it contain little relief below the pixel size, and \
+            "a pixel is {} of the true surface wide, fewer than {TRUTH_CELLS_MIN}: images rendered from it contain little relief below the pixel size, and \
              errors are underestimated",
-            significant(cells)
+            counted(significant(cells), "cell")
         )
     })
 }

@@ -11,7 +11,7 @@ use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Surroundin
 use sastrugi_navigation::map::{Neighbourhood, Node};
 use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
 use sastrugi_numeric::{Geometry, Grid, Ground, GroundClass, GroundGrid, Streams};
-use sastrugi_schemas::{ParameterError, RoughnessClass};
+use sastrugi_schemas::{ParameterError, RoughnessClass, counted};
 use sastrugi_store::dem;
 use sastrugi_store::mcap::{ROCK, SAND};
 use sastrugi_terrain::planetary::{self, Clearing, GROUND_BYTES_PER_TILE, Planetary, RawPlanetary, WorldGround};
@@ -206,8 +206,8 @@ fn unchecked_starts(parameters: &RoverParameters, streams: &Streams) -> Vec<Star
 /// A note on starts that were redrawn because they or their goals had no ground.
 pub fn redrawn(parameters: &RoverParameters, streams: &Streams, starts: &[Start]) -> Option<String> {
     let count = unchecked_starts(parameters, streams).iter().zip(starts).filter(|(first, kept)| first != kept).count();
-    (count > 0)
-        .then(|| format!("{count} of {} starts were redrawn because they or their goals had no ground", starts.len()))
+    let all = counted(starts.len(), "start");
+    (count > 0).then(|| format!("redrew {count} of {all}, for lack of ground there or at the goal"))
 }
 
 /// Text on the extent of a terrain.
@@ -239,7 +239,8 @@ pub fn note(drive: &Drive, task: &Task) -> Option<String> {
             Some(format!("reached the distance limit of {} m, {residual_m:.2} m from the goal", task.distance_limit_m))
         }
         Ending::CycleLimit => {
-            Some(format!("reached the limit of {} cycles, {residual_m:.2} m from the goal", task.cycle_limit))
+            let limit = counted(task.cycle_limit, "cycle");
+            Some(format!("reached the limit of {limit}, {residual_m:.2} m from the goal"))
         }
         Ending::OffGround(nowhere) => Some(nowhere.to_string()),
     }

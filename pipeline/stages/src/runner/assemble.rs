@@ -15,6 +15,7 @@ use crate::error::Error;
 use crate::job::ItemRef;
 use crate::splits::Splits;
 use crate::study::Study;
+use sastrugi_schemas::counted;
 use sastrugi_schemas::manifest::{Artifact, FailedItem, ItemNote, Origin};
 use sastrugi_store::release::{self, Head, Incoming, MANIFEST, ReleaseBuilder, ReleaseError, STUDY, for_each_artifact};
 use std::fs::File;
@@ -150,8 +151,9 @@ pub fn head(study: &Study, text: &str) -> Head {
 
 /// The error for a run that would replace one of the same study with fewer failed items.
 pub fn fewer_items(dest: &Path, before: usize, now: usize) -> Error {
+    let before = counted(before, "failed item");
     Error::Failed(format!(
-        "{}: not replaced, because it has {before} failed items and this run of the same study has {now}; use --replace to replace it anyway",
+        "{}: not replaced, because it has {before} and this run of the same study has {now}; use --replace to replace it anyway",
         dest.display()
     ))
 }
@@ -290,6 +292,13 @@ mod tests {
         drop(first);
         drop(DestinationLock::take(&dest).unwrap());
         assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+    }
+
+    #[test]
+    fn val_one_failed_item_is_one() {
+        let said = |before| fewer_items(Path::new("release"), before, 3).to_string();
+        assert!(said(1).contains("because it has 1 failed item and this run of the same study has 3;"), "{}", said(1));
+        assert!(said(2).contains("because it has 2 failed items and this run of the same study has 3;"), "{}", said(2));
     }
 
     /// One process writes at a time, in any order of events, also while one removes its lock file.

@@ -5,6 +5,7 @@
 
 use super::graph::Graph;
 use super::shard::owner;
+use sastrugi_schemas::counted;
 use serde::Serialize;
 
 /// The share of reserved time that must be used for a number of shards to be recommended.
@@ -175,9 +176,9 @@ fn advice(graph: &Graph, division: &Division, count: u32) -> Vec<String> {
     if common_ancestors.items > 0 {
         let times = seconds_without_cache / study.seconds.max(f64::MIN_POSITIVE);
         advice.push(format!(
-            "{} items are ancestors in more than one shard: without a shared cache (`--cache`) the shards take {times:.1} times as long \
+            "{} needed by more than one shard: without a shared cache (`--cache`) the shards take {times:.1} times as long \
              together as with one",
-            common_ancestors.items
+            counted(common_ancestors.items, "item")
         ));
     }
     let longest = shards.iter().max_by(|a, b| a.left.seconds.total_cmp(&b.left.seconds));

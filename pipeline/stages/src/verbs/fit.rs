@@ -10,10 +10,10 @@ use crate::operations::dem::{input_error, metres_note};
 use crate::operations::fits::{check_noise_reference, covariance_rows, noise_reference, to_json, with_source};
 use sastrugi_numeric::resample::in_metres;
 use sastrugi_numeric::{Geometry, Grid, Streams};
-use sastrugi_schemas::Cell;
 use sastrugi_schemas::coregistration::Minus;
 use sastrugi_schemas::fit::{FitFile, MaskSource, Source};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_schemas::{Cell, counted};
 use sastrugi_store::dem::{self, BlockReader, Crs, Format, ReadOptions};
 use sastrugi_store::{atomic, csv, digest};
 use sastrugi_texture::coregister::Coregistered;
@@ -191,7 +191,7 @@ fn fitted(request: &Request<'_>, settings: &FitSettings) -> Result<Fitted, Error
             let message = format!("{}: transects have no background raster; omit `--background`", path.display());
             return Err(Error::Usage(message));
         }
-        let note = format!("{} transects, spacing {} m", found.names.len(), found.spacing_m);
+        let note = format!("{}, spacing {} m", counted(found.names.len(), "transect"), found.spacing_m);
         return Ok(whole(&profiles, settings, &Crs::default(), vec![note]));
     }
     if let Some((parts, notes)) = Parts::of_large(request.dem, &request.reading)? {

@@ -14,10 +14,10 @@ use crate::runner::assemble::DestinationLock;
 use crate::splits::{OTHER, PARTS};
 use crate::studies::check_outside;
 use sastrugi_numeric::{Grid, PatchShape, relative_height_patch};
-use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::Manifest;
 use sastrugi_schemas::tables::{MissionRow, SampleRow, TerrainRow};
 use sastrugi_schemas::topics::EventKind;
+use sastrugi_schemas::{Record, counted};
 use sastrugi_store::lerobot::{
     self, DatasetWriter, Description, Episode, Feature, Kind, LerobotError, Shape, Summary, Values,
 };
@@ -362,10 +362,8 @@ impl Counts {
     fn notes(&self) -> Vec<String> {
         let mut notes = vec![];
         if self.left_out > 0 {
-            notes.push(format!(
-                "{} missions without commands, or with values beyond single precision, are left out",
-                self.left_out
-            ));
+            let missions = counted(self.left_out, "mission");
+            notes.push(format!("left out {missions} without commands, or with values beyond single precision"));
         }
         if self.unknown > 0 {
             let share = 100.0 * self.unknown as f64 / self.points as f64;

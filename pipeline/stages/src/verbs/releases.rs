@@ -221,11 +221,12 @@ fn sentence(quantities: &[Quantity], answer: Answer) -> String {
         Answer::Different => {
             let names = quantities.iter().filter(|q| q.answer == Answer::Different);
             let names: Vec<String> = names.map(|q| format!("{} of {}", q.name, q.group)).collect();
-            format!("{} of {n} metrics differ: {}", names.len(), names.join("; "))
+            format!("the releases differ in {} of {n} metrics: {}", names.len(), names.join("; "))
         }
         Answer::CannotTell => format!(
-            "no metric differs significantly; {same} of {n} are the same within the margin; for the others the data cannot \
-             tell"
+            "no metric differs significantly; {same} of {n} {} the same within the margin; for the others the data cannot \
+             tell",
+            if same == 1 { "is" } else { "are" }
         ),
     }
 }

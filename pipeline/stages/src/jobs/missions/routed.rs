@@ -18,9 +18,9 @@ use sastrugi_mobility::registry;
 use sastrugi_mobility::vehicle::Vehicle;
 use sastrugi_navigation::parameters::{Cost, RouteParameters};
 use sastrugi_numeric::Grid;
-use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{MissionsItem, RoughnessSection};
+use sastrugi_schemas::{Kind, counted};
 use sastrugi_store::dem;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -214,9 +214,9 @@ impl Job for RoutedJob {
         work.write(MISSIONS, &serde_json::to_vec(&missions).map_err(JobError::new)?)?;
         let note = raised.iter().max().map(|most| {
             format!(
-                "{} of {} missions have no route within the slope limits; the limits were raised for them by up to {} degrees",
+                "{} of {} had no route within the slope limits; there the limits were raised by up to {} degrees",
                 raised.len(),
-                missions.len(),
+                counted(missions.len(), "mission"),
                 RELAXATION_DEG * *most as f64
             )
         });

@@ -21,11 +21,11 @@ use sastrugi_navigation::formation::{Outcome as Ended, Team, TeamError, TeamGrou
 use sastrugi_navigation::vertices::Vertices;
 use sastrugi_navigation::{CostModel, Ground, Method, SlopeLimits, TravelMap};
 use sastrugi_numeric::{Grid, Streams};
-use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{McapFlavour, NavigateItem, StudyHead};
 use sastrugi_schemas::tables::{FormationEventRow, FormationRow, FormationSampleRow};
 use sastrugi_schemas::topics::TeamRecording;
+use sastrugi_schemas::{Kind, counted};
 use sastrugi_store::mcap::{TeamMcap, TerrainView, bag_metadata, write_team};
 use sastrugi_store::{dem, digest};
 use serde_json::{Value, json};
@@ -423,12 +423,12 @@ impl Job for NavigateJob {
 fn notes(led: &[Led], planned: &PlannedRoutes) -> Vec<String> {
     let missing = planned.routes.iter().filter(|route| route.points_m.is_empty()).count();
     let count = |outcome: &str| led.iter().filter(|led| led.row.outcome == outcome).count();
-    let runs = led.len();
+    let (pairs, teams) = (counted(planned.routes.len(), "start-goal pair"), counted(led.len(), "team"));
     let notes = [
-        (missing, format!("{missing} of {} start-goal pairs have no route for a team to follow", planned.routes.len())),
-        (count("stuck"), format!("{} of {runs} teams got stuck", count("stuck"))),
-        (count("timeout"), format!("{} of {runs} teams ran out of time", count("timeout"))),
-        (count("no_room"), format!("{} of {runs} teams found no room at the start", count("no_room"))),
+        (missing, format!("{missing} of {pairs} had no route for a team to follow")),
+        (count("stuck"), format!("{} of {teams} got stuck", count("stuck"))),
+        (count("timeout"), format!("{} of {teams} ran out of time", count("timeout"))),
+        (count("no_room"), format!("{} of {teams} found no room at the start", count("no_room"))),
     ];
     notes.into_iter().filter(|(count, _)| *count > 0).map(|(_, note)| note).collect()
 }

@@ -6,6 +6,7 @@ use sastrugi_navigation::TravelMap;
 use sastrugi_navigation::formation::obstacles::MovingObstacle;
 use sastrugi_navigation::formation::team::{Event, EventKind, Sample};
 use sastrugi_navigation::formation::{Outcome, Team, TeamParameters};
+use sastrugi_schemas::counted;
 use sastrugi_schemas::tables::{FormationEventRow, FormationSampleRow};
 use sastrugi_schemas::topics::{
     DiscState, FormationBox, Member, MemberState, MovingDisc, PlannedRoute as TimedRoute, TeamEvent, TeamEventKind,
@@ -129,7 +130,7 @@ fn described(event: &Event, members: usize, departure: &str) -> Vec<TeamEvent> {
     let own = |kind: TeamEventKind, text: &str| vec![one(kind, event.member, text.to_owned())];
     let end = |text: String| one(TeamEventKind::End, None, text);
     match &event.kind {
-        EventKind::Start => own(TeamEventKind::Start, &format!("{members} members set out {departure}")),
+        EventKind::Start => own(TeamEventKind::Start, &format!("{} set out {departure}", counted(members, "member"))),
         EventKind::Wait => own(TeamEventKind::Wait, "waits"),
         EventKind::Dodge => own(TeamEventKind::Dodge, "leaves the straight line to its target"),
         EventKind::Lost => own(TeamEventKind::Lost, "is lost and stays as an obstacle"),

@@ -95,5 +95,8 @@ fn val_a_patch_is_a_whole_number_of_cells() {
 fn val_notes_tell_what_was_left_out() {
     assert!(Counts::default().notes().is_empty());
     let notes = Counts { left_out: 2, points: 1000, unknown: 125 }.notes();
-    assert!(notes[0].starts_with("2 missions") && notes[1].starts_with("12.50 % of the points"), "{notes:?}");
+    assert!(notes[0].starts_with("left out 2 missions without commands"), "{notes:?}");
+    assert!(notes[1].starts_with("12.50 % of the points"), "{notes:?}");
+    let one = Counts { left_out: 1, ..Counts::default() }.notes();
+    assert!(one[0].starts_with("left out 1 mission without commands"), "{one:?}");
 }
