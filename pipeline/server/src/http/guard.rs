@@ -12,6 +12,7 @@ use axum::http::{HeaderName, HeaderValue, Method, StatusCode, header};
 use axum::middleware::Next;
 use axum::response::{IntoResponse, Response};
 use hyper::body::{Body as HttpBody, Bytes, Frame, SizeHint};
+use sastrugi_schemas::counted;
 use std::collections::HashMap;
 use std::net::{IpAddr, SocketAddr};
 use std::pin::Pin;
@@ -196,9 +197,9 @@ fn admit(service: &Arc<Service>, request: &Request) -> Result<Option<Seat>, Prob
     let mut under_way = seats(service);
     let count = under_way.entry(client).or_insert(0);
     if *count >= service.limits.per_client {
-        let most = service.limits.per_client;
+        let most = counted(service.limits.per_client, "request");
         return Err(Problem::too_many_requests(format!(
-            "this client already has {most} requests in progress, the maximum; wait for one to finish"
+            "this client already has {most} in progress, the maximum; wait for one to finish"
         )));
     }
     *count += 1;
