@@ -18,7 +18,7 @@ from . import _native
 from ._errors import SastrugiError
 from ._heightfield import Heightfield
 from ._kept import Kept
-from ._values import INPUT, USAGE, number, pair
+from ._values import INPUT, USAGE, counted, number, pair
 
 MANIFEST = "manifest.json"
 # The last is for missions on terrains in none of the others; their column `split` is null.
@@ -105,7 +105,7 @@ class Table:
         return Table(self._table.selecting(column, text))
 
     def __repr__(self) -> str:
-        return f"Table({self.name}: {len(self)} rows, {len(self.columns)} columns)"
+        return f"Table({self.name}: {counted(len(self), 'row')}, {counted(len(self.columns), 'column')})"
 
 
 def _objects(values: list[Any]) -> npt.NDArray[Any]:

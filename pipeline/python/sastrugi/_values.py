@@ -39,6 +39,11 @@ def _plain(value: Any) -> Any:
     raise TypeError(f"{value!r} has the type {type(value).__name__}")
 
 
+def counted(number: int, noun: str) -> str:
+    """A number of things for a message: `1 row`, `2 rows`."""
+    return f"{number} {noun}" if number == 1 else f"{number} {noun}s"
+
+
 def heights(values: Any) -> npt.NDArray[np.float64]:
     """Heights as an array (rows, columns) of float64; what a mask hides is NaN."""
     try:
@@ -51,7 +56,7 @@ def heights(values: Any) -> npt.NDArray[np.float64]:
     if found is None:
         raise SastrugiError(f"heights must be an array of real numbers, got {_shown(values)}", USAGE)
     if found.ndim != 2:
-        raise SastrugiError(f"heights must be an array (rows, columns), got {found.ndim} dimensions", USAGE)
+        raise SastrugiError(f"heights must be an array (rows, columns), got {counted(found.ndim, 'dimension')}", USAGE)
     # Masked arrays have it.
     filled = getattr(found, "filled", None)
     plain = np.asarray(found if filled is None else filled(np.nan))

@@ -5,6 +5,7 @@
 
 use crate::errors::{refused, usage};
 use pyo3::prelude::*;
+use sastrugi_schemas::counted;
 use sastrugi_stages::Error;
 use sastrugi_stages::job::ItemRef;
 use sastrugi_stages::runner::progress::{End, Progress};
@@ -43,7 +44,7 @@ impl Progress for Watched {
     fn begin(&self, total: usize, ready: usize, _seconds: f64) {
         self.done.store(ready, Ordering::SeqCst);
         self.total.store(total, Ordering::SeqCst);
-        self.tell(format!("{total} items, {ready} already computed"));
+        self.tell(format!("{}, {ready} already computed", counted(total, "item")));
     }
 
     fn ended(&self, item: &ItemRef, end: &End, _seconds: f64) {

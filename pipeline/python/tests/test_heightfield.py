@@ -118,7 +118,7 @@ def test_xarray_and_matplotlib():
 
 def test_refusals():
     for make, sentence in [
-        (lambda: Heightfield([1.0, 2.0], cell=1.0), "heights must be an array (rows, columns), got 1 dimensions"),
+        (lambda: Heightfield([1.0, 2.0], cell=1.0), "heights must be an array (rows, columns), got 1 dimension"),
         (lambda: Heightfield([[1.0]], cell=(1.0, 2.0, 3.0)), "`cell` must be one or two numbers, got (1.0, 2.0, 3.0)"),
         (lambda: Heightfield.read("a.tif", window=(1.0, 2.0)), "`window` must be 4 numbers, got (1.0, 2.0)"),
         (lambda: Heightfield([[1.0, 2.0]], cell=-1.0).save("a.tif"), "`cell` is [-1.0, -1.0]; cell sizes must be finite and above 0"),
