@@ -252,7 +252,7 @@ pub fn tracks(data: &Data, scene: Scene) -> Result<Option<Figure>, ReportError> 
             set::with_unit(time_s, 3, "s"),
             exaggeration_words(factor)
         ),
-        description: format!("Map of the tracks of {} members, {}.", members.len(), extent(&grid)),
+        description: format!("Map of the tracks of {}, {}.", set::counted(members.len(), "member"), extent(&grid)),
         svg: map.svg,
         numbers,
     }))

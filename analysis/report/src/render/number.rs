@@ -67,9 +67,9 @@ pub fn count(n: impl TryInto<u64>) -> String {
     out
 }
 
-/// A count with the word it counts: `1 terrain`, `2 terrains`.
+/// A count, with its thousands separated, and the word it counts: `1 terrain`, `2 terrains`.
 pub fn counted(n: usize, word: &str) -> String {
-    format!("{} {word}{}", count(n), if n == 1 { "" } else { "s" })
+    sastrugi_schemas::counted(count(n), word)
 }
 
 /// A file size in decimal units.

@@ -12,6 +12,7 @@ use crate::ReportError;
 use crate::content::Block;
 use crate::data::{Data, Group, Mission};
 use crate::render::number as set;
+use sastrugi_schemas::counted;
 use sastrugi_statistics::normal;
 use std::collections::BTreeSet;
 use values::Metric;
@@ -128,11 +129,11 @@ fn refusal(groups: &[Group<Mission>], metrics: &[Metric], pairing: &Pairing) -> 
     let level = 2.0 * normal::cdf(normal::quantile(0.5 * ALPHA) / inflation.sqrt());
     format!(
         "{words} Here {} of the variance of success within groups lies between terrains. The {} missions per terrain therefore \
-         count as {} independent missions, and a mission-level test at {} % would report a difference that does not exist in \
+         count as {}, and a mission-level test at {} % would report a difference that does not exist in \
          about {} of cases.",
         set::percent(share, 0),
         set::plain(per_terrain, 3),
-        set::plain(per_terrain / inflation, 2),
+        counted(set::plain(per_terrain / inflation, 2), "independent mission"),
         set::fixed(100.0 * ALPHA, 0),
         set::percent(level, 0)
     )

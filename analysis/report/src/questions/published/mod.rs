@@ -11,6 +11,7 @@ use crate::data::{Data, Group, Mission};
 use crate::papers::{self, Paper, Published};
 use crate::render::number as set;
 use sastrugi_numeric::sums;
+use sastrugi_schemas::counted;
 use sastrugi_schemas::tables::TerrainRow;
 use sastrugi_statistics::{BoxPlot, Interval};
 use std::collections::BTreeSet;
@@ -59,10 +60,10 @@ fn difference(data: &Data, paper: &Paper) -> Option<String> {
         && per_terrain.iter().all(|n| *n == paper.missions_per_terrain);
     (!same).then(|| {
         format!(
-            "Settings differ: this release has {} terrains per group and {} missions per terrain, the paper {} and {}. \
+            "Settings differ: this release has {} per group and {} per terrain, the paper {} and {}. \
              The differences below are therefore not a verdict on the paper.",
-            span(&terrains),
-            span(&per_terrain),
+            counted(span(&terrains), "terrain"),
+            counted(span(&per_terrain), "mission"),
             paper.terrains_per_group,
             paper.missions_per_terrain
         )
