@@ -98,11 +98,13 @@ fn val_logs_allocate_no_memory_for_claimed_texts() {
     }
 }
 
-/// A TIFF of one strip of int16 cells; the file has 32 of them, whatever it claims.
-fn tiff(side: u32, is_placed: bool) -> Vec<u8> {
+/// A TIFF of int16 cells, in one strip or in tiles with this side; the file has 32 of them, whatever it claims. `texts` are tags of texts that the
+/// file does not have, with their length.
+fn tiff(side: u32, tile: Option<u32>, is_placed: bool, texts: &[[u32; 2]]) -> Vec<u8> {
     const STRIP: [u8; 64] = [1; 64];
     let places = if is_placed { [[33550, 12, 3, 0], [33922, 12, 6, 24]].to_vec() } else { Vec::new() };
-    let after_tags = 8 + 2 + 12 * (10 + places.len() as u32) + 4;
+    let blocks = if tile.is_some() { 4 } else { 3 };
+    let after_tags = 8 + 2 + 12 * (7 + blocks + (places.len() + texts.len()) as u32) + 4;
     let strip_at = after_tags + 72 * u32::from(is_placed);
     // Tag, type (3 short, 4 long, 12 double), count, value or its place.
     let mut tags: Vec<[u32; 4]> = vec![
@@ -111,13 +113,17 @@ fn tiff(side: u32, is_placed: bool) -> Vec<u8> {
         [258, 3, 1, 16],
         [259, 3, 1, 1],
         [262, 3, 1, 1],
-        [273, 4, 1, strip_at],
         [277, 3, 1, 1],
-        [278, 4, 1, side],
-        [279, 4, 1, STRIP.len() as u32],
         [339, 3, 1, 2],
     ];
+    let stored = STRIP.len() as u32;
+    match tile {
+        None => tags.extend([[273, 4, 1, strip_at], [278, 4, 1, side], [279, 4, 1, stored]]),
+        Some(tile) => tags.extend([[322, 4, 1, tile], [323, 4, 1, tile], [324, 4, 1, strip_at], [325, 4, 1, stored]]),
+    }
+    tags.extend(texts.iter().map(|[tag, length]| [*tag, 2, *length, strip_at]));
     tags.extend(places.iter().map(|[tag, kind, count, at]| [*tag, *kind, *count, after_tags + at]));
+    tags.sort_unstable();
     let mut bytes = b"II*\0\x08\0\0\0".to_vec();
     bytes.extend((tags.len() as u16).to_le_bytes());
     for [tag, kind, count, value] in tags {
@@ -140,11 +146,11 @@ fn val_rasters_allocate_no_memory_for_claimed_cells() {
     let path = folder.path().join("a.tif");
     let options = ReadOptions::default();
     for is_placed in [false, true] {
-        std::fs::write(&path, tiff(5, is_placed)).unwrap();
+        std::fs::write(&path, tiff(5, None, is_placed, &[])).unwrap();
         assert_eq!(dem::read(&path).unwrap().grid.values, [257.0; 25], "placed: {is_placed}");
         // Beyond the memory that any file may take, beyond the most cells of a raster, and as many as can be stated.
         for side in [10_000, 60_000, u32::MAX] {
-            let bytes = tiff(side, is_placed);
+            let bytes = tiff(side, None, is_placed, &[]);
             std::fs::write(&path, &bytes).unwrap();
             let (peak, errors) = peak_of(|| {
                 assert_eq!(dem::claimed(&path, &options), None);
@@ -158,6 +164,30 @@ fn val_rasters_allocate_no_memory_for_claimed_cells() {
                 let error = error.unwrap();
                 assert!(error.unusable_input() && error.to_string().ends_with(&words), "{side}, {is_placed}: {error}");
             }
+        }
+    }
+}
+
+/// Nor for tiles larger than their raster, nor for the texts of its header.
+#[test]
+fn val_rasters_allocate_no_memory_for_claimed_tiles_and_texts() {
+    let _alone = ALONE.lock().unwrap();
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.tif");
+    let (nodata, metadata) = (42_113, 42_112);
+    for is_placed in [false, true] {
+        for (tile, texts) in [(Some(16_000), &[][..]), (None, &[[metadata, 1 << 30], [nodata, 0x7e00_0000]])] {
+            std::fs::write(&path, tiff(5, tile, is_placed, texts)).unwrap();
+            let (peak, read) = peak_of(|| dem::read(&path));
+            println!("{tile:?}, placed: {is_placed}: peak {:.1} MB, {:?}", 1e-6 * peak as f64, read.as_ref().err());
+            assert!(peak < SMALL, "{tile:?}, placed: {is_placed}: {peak} bytes");
+            let error = read.unwrap_err().to_string();
+            let words = match (tile, is_placed) {
+                (Some(_), _) => "a.tif claims 256000000 cells in a file of ",
+                (None, false) => "a.tif claims 1073741824 values of a tag in a file of ",
+                (None, true) => "a.tif: not a readable TIFF: ",
+            };
+            assert!(error.contains(words), "{error}");
         }
     }
 }

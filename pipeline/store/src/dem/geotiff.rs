@@ -18,7 +18,8 @@ use std::io::{BufReader, Cursor, Read, Seek};
 use std::iter::successors;
 use std::ops::Range;
 use std::path::Path;
-use tiff::decoder::{Decoder, DecodingResult, Limits};
+use tiff::decoder::ifd::Value;
+use tiff::decoder::{Decoder, DecodingResult, IfdDecoder, Limits};
 use tiff::tags::Tag;
 use tiff_reader::TiffError;
 
@@ -90,9 +91,9 @@ fn unreferenced<R: Read + Seek>(reader: R) -> Option<Decoder<R>> {
     let mut limits = Limits::default();
     limits.decoding_buffer_size = MAX_CELLS as usize * 8;
     let mut decoder = Decoder::new(reader).ok()?.with_limits(limits);
-    let mut has = |tag| decoder.find_tag(tag).ok().flatten().is_some();
     let tags = [Tag::ModelPixelScaleTag, Tag::ModelTransformationTag, Tag::GeoKeyDirectoryTag];
-    let referenced = tags.into_iter().any(&mut has);
+    let ifd = decoder.image_ifd();
+    let referenced = tags.into_iter().any(|tag| ifd.directory().contains(tag));
     (!referenced).then_some(decoder)
 }
 
@@ -173,7 +174,11 @@ impl<R: Read + Seek> Raster<R> {
         }
         let pixel_is_point = file.crs().raster_type == RASTER_PIXEL_IS_POINT;
         let info = DemInfo { format: Format::GeoTiff, dtype, nodata, crs, values, placed, pixel_is_point, notes };
-        let block_rows = ifd.tile_height().filter(|_| ifd.is_tiled()).unwrap_or_else(|| ifd.rows_per_strip());
+        let tile = ifd.tile_width().zip(ifd.tile_height()).filter(|_| ifd.is_tiled());
+        if let Some((wide, high)) = tile {
+            affordable(high, wide, u64::from(stored.1).div_ceil(8), size)?;
+        }
+        let block_rows = tile.map_or_else(|| ifd.rows_per_strip(), |(_, high)| high);
         let block_rows = (block_rows as usize).clamp(1, geometry.rows);
         Ok(Self {
             pixels: Pixels::Referenced { file: Box::new(file), stored, south_first },
@@ -186,6 +191,7 @@ impl<R: Read + Seek> Raster<R> {
     /// A TIFF without any georeferencing.
     fn plain(decoder: Option<Decoder<R>>, size: u64, options: &ReadOptions) -> Result<Self, Refusal> {
         let mut decoder = decoder.ok_or_else(|| Refusal::new("not a readable TIFF"))?;
+        check_counts(&decoder.image_ifd(), size)?;
         let mut number = |tag| decoder.find_tag_unsigned::<u64>(tag).map_err(|e| refused(&e));
         let bands = number(Tag::SamplesPerPixel)?.unwrap_or(1);
         let photometric = number(Tag::PhotometricInterpretation)?.and_then(|n| u16::try_from(n).ok());
@@ -195,8 +201,12 @@ impl<R: Read + Seek> Raster<R> {
         affordable(rows, cols, 8, size)?;
         let [format, bits] = stored.map(|n| u16::try_from(n).unwrap_or(u16::MAX));
         let dtype = dtype(format, bits)?;
-        let nodata = decoder.get_tag_ascii_string(Tag::GdalNodata).ok().and_then(|text| parse_nodata(&text));
-        let metadata = decoder.get_tag_ascii_string(Tag::Unknown(band::TAG)).ok();
+        let mut text = |tag| match decoder.find_tag(tag) {
+            Ok(found) => found.map(Value::into_string).transpose().map_err(|e| refused(&e)),
+            Err(e) => Err(refused(&e)),
+        };
+        let nodata = text(Tag::GdalNodata)?.and_then(|text| parse_nodata(&text));
+        let metadata = text(Tag::Unknown(band::TAG))?;
         let values = metadata.map(|text| Values::of_metadata(&text)).unwrap_or_default();
         let mut notes = vec!["the TIFF has no georeferencing".to_owned()];
         notes.extend(values.note());
@@ -208,6 +218,7 @@ impl<R: Read + Seek> Raster<R> {
         if wide == 0 || high == 0 {
             return Err(Refusal::new("has empty strips or tiles"));
         }
+        affordable(high, wide, 8, size)?;
         let block_rows = (high as usize).min(geometry.rows);
         Ok(Self { pixels: Pixels::Plain(Box::new(decoder)), geometry, info, block_rows })
     }
@@ -260,6 +271,14 @@ fn single_band(bands: u64, photometric: Option<u16>) -> Result<(), Refusal> {
         return Err(Refusal::new("holds palette colours, not heights"));
     }
     Ok(())
+}
+
+/// Refuses a tag with more values than the file has bytes: the decoder allocates memory for a text of any length.
+fn check_counts(ifd: &IfdDecoder<'_>, size: u64) -> Result<(), Refusal> {
+    match ifd.directory().iter().map(|(_, entry)| entry.count()).find(|count| *count > size) {
+        Some(count) => Err(Refusal::new(format!("claims {count} values of a tag in a file of {size} bytes"))),
+        None => Ok(()),
+    }
 }
 
 /// Refuses a raster too large to be stored in so few bytes.
