@@ -1,0 +1,32 @@
+//! One arena of the C library for all threads, where memory is limited.
+//!
+//! glibc gives each thread an arena, which keeps what the thread has freed for its next allocation, in pieces of up to 32 MiB. Threads that compute items
+//! one after the other therefore hold more than the items that are being computed, which is what `--memory` limits. The number of arenas is read from
+//! the environment when a program starts.
+
+use std::env;
+use std::ffi::OsStr;
+use std::os::unix::process::CommandExt;
+use std::process::Command;
+
+/// Environment variable of glibc for the largest number of arenas.
+const ARENAS: &str = "MALLOC_ARENA_MAX";
+/// The running program.
+const PROGRAM: &str = "/proc/self/exe";
+
+/// Starts the program again with one arena if an argument limits its memory and the environment does not set the number of arenas. Otherwise, and where
+/// the program cannot be started again, returns.
+pub fn share() {
+    let mut arguments = env::args_os();
+    let Some(name) = arguments.next() else { return };
+    let arguments: Vec<_> = arguments.collect();
+    if env::var_os(ARENAS).is_none() && arguments.iter().any(|argument| limits_memory(argument)) {
+        // On success this does not return; without a limit on arenas the program still works.
+        let _ = Command::new(PROGRAM).arg0(name).args(arguments).env(ARENAS, "1").exec();
+    }
+}
+
+fn limits_memory(argument: &OsStr) -> bool {
+    let bytes = argument.as_encoded_bytes();
+    bytes == b"--memory" || bytes.starts_with(b"--memory=")
+}
