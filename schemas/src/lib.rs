@@ -42,6 +42,7 @@ pub mod class;
 pub mod coregistration;
 pub mod fit;
 pub mod kind;
+pub mod limits;
 pub mod log;
 pub mod manifest;
 pub mod mechanism;
