@@ -1,17 +1,36 @@
 //! The envelope of a study file: the keys of each item other than its kernel parameters. The parameters themselves are defined
 //! by the kernels; a section's table combines the keys of the envelope and the kernel.
 
-use crate::ParameterError;
 use crate::topics::EventKind;
-use schemars::JsonSchema;
+use crate::{ParameterError, limits};
+use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
+use serde_json::{Value, json};
 use std::collections::{BTreeMap, BTreeSet};
+
+/// Names and ids, as a regular expression for the JSON Schema.
+const NAME: &str = "^[a-z0-9][a-z0-9.-]{0,63}$";
+/// Text that is not blank.
+const NOT_BLANK: &str = r"\S";
+/// Days of a calendar, apart from the lengths of the months.
+const DATE: &str = "^[0-9]{4}-(0[1-9]|1[0-2])-(0[1-9]|[12][0-9]|3[01])$";
+/// Web addresses.
+const ADDRESS: &str = r"^https?://[^\s]+$";
+/// DOIs, after the Citation File Format.
+const DOI: &str = r"^10\.[0-9]{4,9}(\.[0-9]+)?/[A-Za-z0-9._;()/:-]+$";
+/// ORCID iDs, apart from their checksum.
+const ORCID: &str = "^([0-9]{4}-){3}[0-9]{3}[0-9X]$";
+/// Names of creators: more than commas.
+const CREATOR: &str = r"[^,\s]";
+/// Statistics of a point-cloud cell.
+const CELL_STATISTIC: &str = r"^(mean|median|min|max|p[0-9]+(\.[0-9]+)?)$";
 
 /// `[study]`: properties of the release.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct StudyHead {
     /// Short name, `[a-z0-9][a-z0-9.-]{0,63}`.
+    #[schemars(regex(pattern = NAME))]
     pub name: String,
     /// Title of the release; default: the name.
     #[serde(default)]
@@ -22,18 +41,24 @@ pub struct StudyHead {
     /// Seed of every random stream of the study.
     pub seed: u64,
     /// Date of the study, YYYY-MM-DD: the only date in any output.
+    #[schemars(regex(pattern = DATE))]
     pub date: String,
     /// Version of the dataset, for citations.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(regex(pattern = NOT_BLANK))]
     pub version: Option<String>,
     /// Web page of the dataset, `https://...`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(regex(pattern = ADDRESS))]
     pub url: Option<String>,
     /// DOI of the dataset, `10.<registrant>/<suffix>`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(regex(pattern = DOI))]
     pub doi: Option<String>,
-    /// Licence of the release as an SPDX expression; the licences of its DEMs must permit it.
+    /// Licence of the release: an SPDX expression, or `LicenseRef-<name>` for terms of your own. A DEM whose licence is known not to permit it is
+    /// refused; a combination of which one is unknown is noted.
     #[serde(default = "default_license")]
+    #[schemars(regex(pattern = NOT_BLANK))]
     pub license: String,
     /// Creators: names of people and organisations, or tables `{ name = "Family, Given", orcid = "...", affiliation = "..." }`. Write people
     /// as `Family, Given` so that citations can separate the parts of a name.
@@ -44,9 +69,11 @@ pub struct StudyHead {
     pub organizations: Vec<String>,
     /// Keywords of the dataset.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("uniqueItems" = true), inner(regex(pattern = NOT_BLANK)))]
     pub keywords: Vec<String>,
     /// Funding: grants as Zenodo identifiers (`<DOI of the funder>::<number of the grant>`), or any text.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("uniqueItems" = true), inner(regex(pattern = NOT_BLANK)))]
     pub funding: Vec<String>,
     /// Start time of every mission in MCAP files, ns since 1970-01-01 UTC.
     #[serde(default = "default_epoch_ns")]
@@ -61,7 +88,8 @@ pub struct StudyHead {
     #[serde(default)]
     pub pairing: Pairing,
     /// Shares of the splits `train`, `validation` and `test` among the terrains of every group, such as `[0.7, 0.15, 0.15]`, or of `train` and
-    /// `test`, such as `[0.8, 0.2]`; they must add up to 1. If some terrains have a group, terrains without one are left out.
+    /// `test`, such as `[0.8, 0.2]`; they must add up to 1. If some terrains have a group, terrains without one are left out. A split takes whole
+    /// independent sets, at least one: terrains made from one another, or from the same random draws, stay together.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub split: Option<Shares>,
 }
@@ -77,16 +105,19 @@ pub enum Creator {
     /// A name with identifiers.
     Described {
         /// Name; people as `Family, Given`.
+        #[schemars(regex(pattern = CREATOR))]
         name: String,
         /// ORCID iD of a person, such as `0000-0002-1825-0097`.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(regex(pattern = ORCID))]
         orcid: Option<String>,
         /// Affiliation of a person.
         #[serde(default, skip_serializing_if = "Option::is_none")]
+        #[schemars(regex(pattern = NOT_BLANK))]
         affiliation: Option<String>,
     },
     /// A name.
-    Name(String),
+    Name(#[schemars(regex(pattern = CREATOR))] String),
 }
 
 impl Creator {
@@ -117,6 +148,7 @@ impl Creator {
 /// Shares of the splits of a dataset.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "must be the shares of two or three splits, such as [0.8, 0.2] or [0.7, 0.15, 0.15]")]
+#[schemars(transform = limits::within(0.0, 1.0))]
 pub enum Shares {
     /// `train`, `validation`, `test`.
     Three([f64; 3]),
@@ -215,6 +247,7 @@ pub enum Pairing {
 #[serde(deny_unknown_fields)]
 pub struct DemItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// File, relative to the study file.
     pub file: String,
@@ -226,10 +259,12 @@ pub struct DemItem {
     pub window: Option<[f64; 4]>,
     /// Cell size east-west and north-south, m, for files that state none (.npy) and for point clouds, whose cells are square.
     #[serde(default)]
+    #[schemars(transform = limits::positive)]
     pub cell_m: Option<[f64; 2]>,
     /// Statistic that gives the height of a point-cloud cell (.las, .laz): `mean` of its points (default), `median`, `min`, `max`, or
     /// a percentile such as `p90`.
     #[serde(default)]
+    #[schemars(regex(pattern = CELL_STATISTIC))]
     pub statistic: Option<String>,
     /// Fill gaps of a point cloud up to this distance from its points, in cells; default: gaps are not filled.
     #[serde(default)]
@@ -237,17 +272,21 @@ pub struct DemItem {
     /// Use only the ground points (class 2) of a point cloud.
     #[serde(default)]
     pub ground_only: Option<bool>,
-    /// Licence of the data as an SPDX identifier, or `public domain`.
+    /// Licence of the data: an SPDX identifier, `public domain`, or `LicenseRef-<name>` with the terms in `license_file`. One that is known not to
+    /// permit the licence of the release is refused; a combination of which one is unknown is noted.
     #[serde(default)]
+    #[schemars(regex(pattern = NOT_BLANK))]
     pub license: Option<String>,
-    /// File with the text of that licence, relative to the study file; it is copied into the release with the data.
+    /// File with the text of that licence, whichever it is, relative to the study file; it is copied into the release with the data.
     #[serde(default)]
     pub license_file: Option<String>,
     /// Attribution: whom to name as the source.
     #[serde(default)]
+    #[schemars(regex(pattern = NOT_BLANK))]
     pub attribution: Option<String>,
     /// How to cite the data.
     #[serde(default)]
+    #[schemars(regex(pattern = NOT_BLANK))]
     pub citation: Option<String>,
 }
 
@@ -256,6 +295,7 @@ pub struct DemItem {
 #[serde(deny_unknown_fields)]
 pub struct TerrainItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Generator (see `sastrugi kinds`).
     pub kind: String,
@@ -264,6 +304,7 @@ pub struct TerrainItem {
     pub group: Option<String>,
     /// Replicates `<id>-0001`, `<id>-0002` ...; one item with the plain id when absent.
     #[serde(default)]
+    #[schemars(range(min = 1))]
     pub count: Option<u32>,
     /// Explicit seed instead of the study's; replicate k uses `seed + k - 1`.
     #[serde(default)]
@@ -281,6 +322,7 @@ pub struct TerrainItem {
     /// Decimate the meshes of the exports (`gazebo`, `isaac`): maximum vertical distance of any post from the mesh, m. Default: not
     /// decimated.
     #[serde(default)]
+    #[schemars(transform = limits::not_negative)]
     pub export_max_error_m: Option<f64>,
 }
 
@@ -321,6 +363,7 @@ impl Simulator {
 #[serde(deny_unknown_fields)]
 pub struct FitItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Id of the DEM to fit.
     pub dem: String,
@@ -377,6 +420,7 @@ impl Files {
 #[serde(deny_unknown_fields)]
 pub struct TextureItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Id of the fit to match, or an explicit covariance: `{ model = "exponential", sigma_m = 0.03, range_m = 0.28 }`.
     pub fit: FitReference,
@@ -389,13 +433,16 @@ pub struct TextureItem {
     pub methods: Option<Methods>,
     /// Number of realisations per method for the scoreboard.
     #[serde(default = "default_realisations")]
+    #[schemars(range(min = 1, max = Self::REALISATIONS_MAX))]
     pub realisations: u32,
-    /// Base to which the texture is added: the id of a terrain or DEM, or `{ background = "<fit id>" }`, the background that a fit
-    /// removed. Default: no base.
+    /// Base to which the texture is added: the id of a terrain, DEM or other texture, or `{ background = "<fit id>" }`, the background that a fit
+    /// removed. Cells, size and position of the result are taken from the base, so a texture of other cells is refused. Default: no base, level
+    /// ground.
     #[serde(default)]
     pub onto: Option<Onto>,
     /// Factor on the heights of the texture, above 0; 2 doubles their standard deviation. Not with `methods` or `fill`.
     #[serde(default = "one")]
+    #[schemars(transform = limits::positive)]
     pub amplitude: f64,
     /// Local factor on the texture: the id of a raster of factors, or a table of factors by the slope of the base.
     #[serde(default)]
@@ -408,6 +455,7 @@ pub struct TextureItem {
     pub group: Option<String>,
     /// Replicates `<id>-0001`, `<id>-0002` ...; one item with the plain id when absent.
     #[serde(default)]
+    #[schemars(range(min = 1))]
     pub count: Option<u32>,
     /// Explicit seed instead of the study's; replicate k uses `seed + k - 1`.
     #[serde(default)]
@@ -415,6 +463,11 @@ pub struct TextureItem {
     /// One item (or one set of replicates) per value of a parameter: `sweep.<parameter> = [...]`.
     #[serde(default)]
     pub sweep: BTreeMap<String, Vec<serde_json::Value>>,
+}
+
+impl TextureItem {
+    /// Maximum number of realisations of a scoreboard.
+    pub const REALISATIONS_MAX: u32 = 1000;
 }
 
 fn one() -> f64 {
@@ -426,10 +479,10 @@ fn one() -> f64 {
 #[serde(
     untagged,
     deny_unknown_fields,
-    expecting = "must be the id of a terrain or DEM, or a table `{ background = \"<fit id>\" }`"
+    expecting = "must be the id of a terrain, DEM or texture, or a table `{ background = \"<fit id>\" }`"
 )]
 pub enum Onto {
-    /// Id of a terrain or DEM.
+    /// Id of a terrain, DEM or texture.
     Id(String),
     /// The background of a fitted DEM.
     Background {
@@ -448,8 +501,10 @@ pub enum Modulate {
     #[serde(rename_all = "snake_case")]
     Slope {
         /// Slopes, degrees, ascending.
+        #[schemars(length(min = 1))]
         slope_deg: Vec<f64>,
         /// Factor at each slope.
+        #[schemars(length(min = 1), transform = limits::not_negative)]
         factor: Vec<f64>,
     },
 }
@@ -493,6 +548,7 @@ fn default_method() -> String {
 #[serde(deny_unknown_fields)]
 pub struct MissionsItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Line that missions follow (see `sastrugi kinds`): `straight`, a planned route (`routed`), or the `trail` of a terrain.
     #[serde(default)]
@@ -527,8 +583,10 @@ pub enum MissionKind {
 #[serde(deny_unknown_fields)]
 pub struct RouteItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; routes are named `<id>-0001` ...
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Ids of the terrains, textures or DEMs to plan on; the id of a replicated item includes all its replicates.
+    #[schemars(length(min = 1))]
     pub terrains: Vec<String>,
     /// Start, `[x, y]` in the terrain's coordinates, m; default: drawn at random.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -538,12 +596,13 @@ pub struct RouteItem {
     pub goal: Option<[f64; 2]>,
     /// Number of start-goal pairs to draw on each terrain, 1 to 9999; default 1. All route stages with the same rules draw the same pairs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = Self::PAIRS_MAX))]
     pub pairs: Option<u32>,
     /// Areas to avoid, as a file or list of files relative to the study file: GeoJSON polygons in the terrain's coordinates, or the
     /// nonzero cells of a raster.
     #[serde(default)]
     pub obstacles: Files,
-    /// Vehicle whose slope limits apply (see `sastrugi kinds`); `max_up_deg` and `max_down_deg` override them.
+    /// Vehicle whose slope limits apply (see `sastrugi kinds vehicle`); `max_up_deg` and `max_down_deg` override them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub vehicle: Option<String>,
     /// For `cost = "raster"`: id of a raster (a DEM or terrain) of factors above 0, in the terrain's coordinates; NaN cells are blocked.
@@ -567,11 +626,13 @@ impl RouteItem {
 #[serde(deny_unknown_fields)]
 pub struct NavigateItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; runs are named `<id>-0001` ... by the number of their route.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Id of the routes to follow.
     pub route: String,
     /// Number of runs along each route, 1 to 9999; default 1: `<id>-0001-01`, `<id>-0001-02` ..., which differ in their random draws.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = Self::COUNT_MAX))]
     pub count: Option<u32>,
     /// Explicit seed instead of the study's.
     #[serde(default)]
@@ -591,15 +652,18 @@ impl NavigateItem {
 #[serde(deny_unknown_fields)]
 pub struct RoverItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; rovers are named `<id>-0001` ...
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Navigator: see `sastrugi kinds`.
     pub kind: String,
     /// Ids of the terrains, textures or DEMs to drive on; the id of a replicated item includes all its replicates. On a `planetary` terrain,
     /// rovers drive on the unbounded world, which is generated around them, not only in its window; rocks and albedo of other terrains are
     /// those of their maps.
+    #[schemars(length(min = 1))]
     pub terrains: Vec<String>,
     /// Distance between rows of a rover in `rover_samples`, m; 0 for one row per cycle; default 0.5.
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::not_negative)]
     pub sample_m: Option<f64>,
     /// Number of rovers recorded as MCAP on each terrain, starting with the first; default 1, 0 for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -620,6 +684,7 @@ pub struct RoverItem {
 #[serde(deny_unknown_fields)]
 pub struct ImageItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study. With several surfaces images are named `<id>-<surface>`.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Id of the terrain, texture or DEM to render; the id of a replicated item includes all its replicates. The albedo is that of the
     /// terrain's map, if it has one.
@@ -638,14 +703,18 @@ pub struct ImageItem {
 #[serde(deny_unknown_fields, default)]
 pub struct Perturb {
     /// Largest relative change in either direction, above 0 and below 1: 0.1 varies each parameter between 0.9 and 1.1 of its value.
+    #[schemars(transform = limits::between(0.0, 1.0))]
     pub share: f64,
     /// Number of trajectories, 1 to 999; the same on every world.
+    #[schemars(range(min = 1, max = Self::TRAJECTORIES_MAX))]
     pub trajectories: u32,
     /// Number of equally spaced values of each parameter, even, 2 to 64. A step spans `levels / 2` of them: 4 levels and a share of 0.1 have the factors
     /// 0.9, 0.967, 1.033 and 1.1, and steps of 0.133.
+    #[schemars(range(min = 2, max = Self::LEVELS_MAX), extend("multipleOf" = 2))]
     pub levels: u32,
     /// Number of rovers per design and world; default: that of the trial, at most 10.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1))]
     pub rovers: Option<u32>,
     /// Parameters to vary: names of numbers, or of lists of numbers, which are scaled together; `noise.<name>` for those of the noise. Default: all
     /// parameters of the navigator. Parameters of value 0 are left out and named in a note.
@@ -692,14 +761,17 @@ impl Perturb {
 #[serde(deny_unknown_fields)]
 pub struct PhotoclinometryItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study. If the images show several surfaces, there is one item `<id>-<surface>` for each.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Ids of images, three or more of each surface; the id of a swept image includes all its values.
+    #[schemars(length(min = 1))]
     pub images: Vec<String>,
     /// Id of a coarse DEM that constrains the heights: the first round starts from it, and it is a soft constraint.
     #[serde(default)]
     pub coarse: Option<String>,
     /// Standard deviation of its heights, m.
     #[serde(default)]
+    #[schemars(transform = limits::positive)]
     pub coarse_sigma_m: Option<f64>,
     /// File of measured points (columns `x`, `y`, `z`, `sigma`, m), each a soft constraint with its sigma, above 0. With `free_exposure`, three or
     /// more points determine the tilt.
@@ -721,6 +793,7 @@ pub struct PhotoclinometryItem {
 #[serde(deny_unknown_fields)]
 pub struct TraverseItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study; missions are recorded as `<id>-0001` ...
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Id of the missions to drive.
     pub missions: String,
@@ -740,28 +813,37 @@ pub struct TraverseItem {
 /// it separately from exploratory comparisons.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
+#[schemars(transform = by_test)]
 pub struct HypothesisItem {
     /// Id, `[a-z0-9][a-z0-9.-]{0,63}`, unique in the study.
+    #[schemars(regex(pattern = NAME))]
     pub id: String,
     /// Metric of the missions.
     pub statistic: Statistic,
-    /// Labels of the groups: two for `difference` and `equivalence`, three or more in order for `trend`.
+    /// Labels of the groups: two for `difference` and `equivalence`, three or more in order for `trend`. A single claim at the level of 0.05 takes
+    /// at least 4 terrains in each group for a difference, 2 for a trend over three groups, and 2 for equivalence; of paired terrains (`pairing =
+    /// "common"`) 6, 3 and 2. A family of several claims takes more: `sastrugi plan` tells how many are missing.
+    #[schemars(length(min = 2), extend("uniqueItems" = true))]
     pub groups: Vec<String>,
     /// Id of the `[[traverse]]` whose missions are tested. It must drive all of these groups and have no sweep; required if several
     /// traverses drive them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub traverse: Option<String>,
-    /// The claim.
+    /// The claim, which determines the test. Every terrain counts once, with the mean of its missions: of all of them for `success`, of those that
+    /// reached the goal for other metrics. Groups that share their draws are compared by blocks of paired terrains.
     pub test: HypothesisTest,
-    /// Direction of the change from the first group to the last; default: either. Not for `equivalence`.
+    /// Direction of the change from the first group to the last; default: either. The test remains two-sided; the estimate must have this sign as
+    /// well. Not for `equivalence`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub direction: Option<Direction>,
     /// Only for `equivalence`: the smallest difference of means at which groups count as different, above 0, in the unit of the
     /// statistic (success: percentage points).
     #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub margin: Option<f64>,
     /// Level of the test, above 0 and below 0.5.
     #[serde(default = "default_alpha")]
+    #[schemars(transform = limits::between(0.0, ALPHA_MAX))]
     pub alpha: f64,
     /// Hypotheses of the same family share one level (Holm, 1979); those without a family form one family.
     #[serde(default)]
@@ -770,6 +852,30 @@ pub struct HypothesisItem {
 
 fn default_alpha() -> f64 {
     0.05
+}
+
+/// Levels lie below this.
+const ALPHA_MAX: f64 = 0.5;
+/// Groups of a trend, at least.
+const TREND_GROUPS_MIN: usize = 3;
+
+/// What [`HypothesisItem::check`] asks of groups, margin and direction.
+fn by_test(schema: &mut Schema) {
+    let is = |test: HypothesisTest| json!({ "properties": { "test": { "const": test } }, "required": ["test"] });
+    let groups = |limits: Value| json!({ "properties": { "groups": limits } });
+    let rules = json!([
+        {
+            "if": is(HypothesisTest::Trend),
+            "then": groups(json!({ "minItems": TREND_GROUPS_MIN })),
+            "else": groups(json!({ "maxItems": 2 })),
+        },
+        {
+            "if": is(HypothesisTest::Equivalence),
+            "then": { "required": ["margin"], "not": { "required": ["direction"] } },
+            "else": { "not": { "required": ["margin"] } },
+        },
+    ]);
+    schema.insert("allOf".to_owned(), rules);
 }
 
 impl HypothesisItem {
@@ -791,7 +897,7 @@ impl HypothesisItem {
     pub fn check(&self) -> Result<(), ParameterError> {
         let refuse = |key: &str, message: String| Err(ParameterError::new(key, message));
         let (count, trend) = (self.groups.len(), self.test == HypothesisTest::Trend);
-        if trend && count < 3 {
+        if trend && count < TREND_GROUPS_MIN {
             return refuse("groups", format!("has {count}; a trend needs three or more, in order"));
         }
         if !trend && count != 2 {
@@ -810,8 +916,8 @@ impl HypothesisItem {
         if equivalence && self.direction.is_some() {
             return refuse("direction", "does not apply to equivalence".into());
         }
-        if !(self.alpha > 0.0 && self.alpha < 0.5) {
-            return refuse("alpha", format!("is {}; it must be above 0 and below 0.5", self.alpha));
+        if !(self.alpha > 0.0 && self.alpha < ALPHA_MAX) {
+            return refuse("alpha", format!("is {}; it must be above 0 and below {ALPHA_MAX}", self.alpha));
         }
         Ok(())
     }
@@ -883,11 +989,11 @@ impl Statistic {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "snake_case")]
 pub enum HypothesisTest {
-    /// Two groups differ.
+    /// Two groups differ: rank-sum test (Wilcoxon, Mann and Whitney), signed-rank test (Wilcoxon) for paired terrains.
     Difference,
-    /// The metric rises or falls over ordered groups.
+    /// The metric rises or falls over ordered groups: permutation test of the rank correlation of group and value, Page's test for paired terrains.
     Trend,
-    /// The means of two groups differ by less than the margin.
+    /// The means of two groups differ by less than the margin: two one-sided t tests (Schuirmann, 1987).
     Equivalence,
 }
 
@@ -905,15 +1011,24 @@ pub enum Direction {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RoughnessSection {
-    /// Largest Moore gradient of class `low`, m/m (50 levels of 0.75/128 cm per cm; Majhor and Bos, section 2.3).
+    /// Largest gradient of class `low`, m/m. The gradient of a cell is the steepest rise or fall to any of its eight neighbours: height difference
+    /// over distance (Moore gradient). On rough ground it grows as cells become finer, so the same ground has less of class `low` at a smaller
+    /// `cell_m`. Default: 50 height levels of 0.75/128 cm for each cm of distance (Majhor and Bos, section 2.3).
+    #[schemars(transform = limits::positive)]
     pub low_max: f64,
-    /// Largest Moore gradient of class `semi`, m/m (140 levels per cm).
+    /// Largest gradient of class `semi`, m/m, above `low_max`; steeper cells have class `high`. Default: 140 such levels.
+    #[schemars(transform = limits::positive)]
     pub semi_max: f64,
     /// Border excluded from the class shares, m (Majhor and Bos, section 2.4).
+    #[schemars(transform = limits::not_negative)]
     pub border_m: f64,
-    /// Radius of the disk of the morphological closing, m (half diagonal of a Husky A200's outline).
+    /// Radius of the disk of the morphological closing, m, about that of the vehicle: a place between rougher cells that is too narrow for the disk
+    /// takes their class, so that smooth patches too small for the vehicle vanish. Starts and goals of missions lie on the closed classes; class
+    /// shares are those before the closing. 0: no closing. Default: half the diagonal of a Husky A200's outline.
+    #[schemars(transform = limits::not_negative)]
     pub closing_radius_m: f64,
     /// Window of the moving average that is subtracted for the band RMS, m; default: 41 cells.
+    #[schemars(transform = limits::positive)]
     pub band_window_m: Option<f64>,
 }
 

@@ -31,7 +31,7 @@ use std::sync::Arc;
 /// Name of the stage.
 pub const STAGE: &str = "texture";
 /// Maximum number of realisations of a scoreboard.
-const REALISATIONS_MAX: u32 = 1000;
+const REALISATIONS_MAX: u32 = TextureItem::REALISATIONS_MAX;
 
 /// Approximate time to detrend, trim and describe one cell of a texture, s.
 const SECONDS_PER_DESCRIBED_CELL: f64 = 6e-7;
