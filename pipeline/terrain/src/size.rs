@@ -4,7 +4,7 @@ use sastrugi_numeric::Geometry;
 use sastrugi_schemas::{ParameterError, shown};
 
 /// Minimum number of cells along a side.
-const MIN_SIDE_PX: u32 = 3;
+pub(crate) const MIN_SIDE_PX: u32 = 3;
 /// Maximum number of cells of a heightfield: 2 GiB of heights, the most that can be read back.
 const MAX_CELLS: u64 = 1 << 28;
 /// A quotient this close to an integer counts as that integer.

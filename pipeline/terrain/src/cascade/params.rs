@@ -1,8 +1,8 @@
 //! Parameters of the cascade.
 
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use sastrugi_numeric::fft::smooth_length;
-use sastrugi_schemas::{ParameterError, shown};
+use sastrugi_schemas::{ParameterError, limits, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -21,21 +21,28 @@ const ROUNDING: f64 = 1e-9;
 pub struct RawCascade {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 512 x 512 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// Codimension C1 of the mean flux, above 0 and below 1: how patchy the roughness is (Gagnon et al., 2006: 0.12 for topography);
     /// 0 would be a constant flux, which has no relief.
+    #[schemars(transform = limits::between(0.0, 1.0))]
     pub codimension: f64,
     /// Exponent H of the mean increment, 0 to 1 (Gagnon et al., 2006: 0.66).
+    #[schemars(transform = limits::between(0.0, 1.0))]
     pub hurst_exponent: f64,
     /// Outer scale L at which the cascade starts, m; by default the shorter side.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub outer_scale_m: Option<f64>,
     /// Standard deviation of the heights, m.
+    #[schemars(transform = limits::positive)]
     pub rms_height_m: f64,
 }
 

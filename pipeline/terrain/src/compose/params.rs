@@ -2,9 +2,9 @@
 
 use super::trail::{RawTrail, Trail};
 use crate::generator::{Generator, NamedInput};
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use sastrugi_numeric::Geometry;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value, json};
@@ -22,15 +22,19 @@ pub(super) const COMMON: [&str; 4] = ["size_m", "size_px", "cell_m", "origin_m"]
 pub struct RawCompose {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 512 x 512 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// South-west corner, m, in the coordinates of the study's surfaces that are used as operands.
     pub origin_m: [f64; 2],
     /// The processes, in order; by default hills with a rough surface added.
+    #[schemars(length(min = 1, max = PROCESSES_MAX))]
     pub processes: Vec<RawProcess>,
 }
 
@@ -106,6 +110,7 @@ pub struct RawProcess {
     pub high_m: Option<f64>,
     /// For `scale_to_relief`: highest minus lowest height, m.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub relief_m: Option<f64>,
     /// For `trail`: course and shape of the trail; along ridges by default.
     #[serde(skip_serializing_if = "Option::is_none")]

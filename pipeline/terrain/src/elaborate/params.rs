@@ -4,8 +4,8 @@ use super::bounds::{Bound, DIAMETER_PIXELS};
 use crate::planetary::{
     Lattice, RawProcess, WHOLE_TOLERANCE, Window, Work, check_processes, check_texture, window_in_reach,
 };
-use crate::size::Size;
-use sastrugi_schemas::{ParameterError, counted};
+use crate::size::{MIN_SIDE_PX, Size};
+use sastrugi_schemas::{ParameterError, counted, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -24,15 +24,19 @@ pub struct RawElaborate {
     pub dem: String,
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Samples east and north; 1000 x 1000 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Distance between samples, m; finer than the DEM.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// Spacing of the lattice on which detail is generated, m: `cell_m` divided by a power of 2, by default the smallest that gives at
     /// most 0.0125 m. Part of the surface: another spacing gives different detail.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub basic_spacing_m: Option<f64>,
     /// Position of the south-west sample in the DEM's own coordinates, m.
     pub origin_m: [f64; 2],
@@ -40,9 +44,11 @@ pub struct RawElaborate {
     pub texture: bool,
     /// Hurst exponent of the texture, above 0 to 1; fitted to the DEM by default.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::above(0.0, 1.0))]
     pub hurst: Option<f64>,
     /// Standard deviation of a point about the mean of its parents 1 m away, m; fitted to the DEM by default.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::not_negative)]
     pub roughness_m: Option<f64>,
     /// Craters, rocks, albedo and dust, in order, as for kind `planetary`: tables with a `kind` of `primary_craters`,
     /// `secondary_craters`, `rocks`, `albedo`, `dust`. Features wider than two posts are not added, because the DEM would show them.
@@ -50,20 +56,25 @@ pub struct RawElaborate {
     /// Ground size of a pixel of existing images of the site, m: craters and rocks that the images would show are not added. No
     /// images by default.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub image_resolution_m: Option<f64>,
     /// Width in pixels of the widest crater or rock that images do not show, 1 or above (2: the sampling theorem; our choice).
+    #[schemars(transform = limits::half_open(1.0, f64::INFINITY))]
     pub image_pixels: f64,
     /// Measured points that the surface passes through: a CSV file with columns `x`, `y`, `z` and optionally `sigma`, m, in the DEM's own
     /// coordinates.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
     pub altimetry: Option<String>,
     /// Measured points as a list, alone or in addition to the file: `[x, y, z]` or `[x, y, z, sigma]`, m. The surface passes only within
     /// sigma of a point with a standard error sigma.
     #[serde(skip_serializing_if = "Vec::is_empty")]
+    #[schemars(inner(length(min = 3, max = 4)))]
     pub altimetry_points_m: Vec<Vec<f64>>,
     /// Measured albedo, 0 to 1: an id in a study (`<id>.albedo` for the map of a terrain) or a raster file that covers the window. The
     /// resulting map keeps it at its cell centres; the process `albedo` adds detail between them.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
     pub albedo: Option<String>,
 }
 

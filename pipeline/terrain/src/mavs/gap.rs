@@ -8,9 +8,9 @@ use super::frame::Frame;
 use super::perlin::{self, Layer};
 use super::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_SIZE_PX, GAP};
 use crate::generator::{Generator, Input, Terrain, TerrainError};
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use sastrugi_numeric::{Geometry, Streams};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -22,26 +22,34 @@ use std::f64::consts::PI;
 pub struct RawGap {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 666 x 666 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
     /// Depth, m.
+    #[schemars(transform = limits::positive)]
     pub depth_m: f64,
     /// Width of the floor, m.
+    #[schemars(transform = limits::positive)]
     pub width_m: f64,
     /// Angle of the walls from the vertical, degrees, from 0 to below 90.
+    #[schemars(transform = limits::half_open(0.0, 90.0))]
     pub wall_angle_deg: f64,
     /// Easting of the western edge in the world, m; by default the trench is centred.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub edge_m: Option<f64>,
     /// Peak height of the roughness, m.
+    #[schemars(transform = limits::not_negative)]
     pub hi_mag_m: f64,
     /// Length scale of the roughness, m (listing); its noise lattice is 3.93 times as long.
+    #[schemars(transform = limits::positive)]
     pub hi_len_m: f64,
 }
 

@@ -4,7 +4,7 @@ use super::frame::Frame;
 use crate::generator::{Map, Terrain, TerrainError};
 use sastrugi_numeric::{Grid, ops, sums};
 use sastrugi_roughness::{BandError, Detrended, Detrender, WaveBand};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 
@@ -26,17 +26,21 @@ pub enum Scaling {
 pub struct RawRoughness {
     /// Shortest and longest wavelength, m; alternative to `wheelbase_m` and `tyre_radius_m`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub band_m: Option<[f64; 2]>,
     /// Wheelbase of a vehicle, m (2.7 in the example of the MAVS documentation): the band ends at twice this wavelength.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub wheelbase_m: Option<f64>,
     /// Tyre radius of that vehicle, m (0.33): the band starts at this wavelength, and cells may be at most half of it.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub tyre_radius_m: Option<f64>,
     /// True: cells too large for the shortest wave cause a note instead of an error.
     pub allow_coarse: bool,
     /// RMS of the heights in the band to which the surface is scaled, m; usual values are 0.005 to 0.127.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub rms_m: Option<f64>,
     /// Which RMS the scaling starts from.
     pub scaling: Scaling,

@@ -31,10 +31,10 @@ use super::measure::{Made, RawRoughness, Roughness, finish, memory_bytes};
 use super::perlin::{self, Layer, Perlin};
 use super::{DEFAULT_CELL_M, DEFAULT_HI_MAG_M, DEFAULT_SIZE_PX, MAVS_VARIABLE, VAN_DEUSEN};
 use crate::generator::{Generator, Input, Terrain, TerrainError};
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_roughness::WaveBand;
-use sastrugi_schemas::{ParameterError, shown};
+use sastrugi_schemas::{ParameterError, limits, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -60,19 +60,24 @@ const PUBLISHED_EXPONENT: f64 = 3.0;
 pub struct RawVariable {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples); half of the shortest wave.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
     /// Amplitude of the shortest waves, m (listings: 0.2 in one place, 0.1 in another; recommended: below 0.15).
+    #[schemars(transform = limits::positive)]
     pub hi_mag_m: f64,
     /// Longest wave, m; by default 100 m or a quarter of the shorter side, whichever is less. Tiles of one world need the same
     /// value.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub wavelength_max_m: Option<f64>,
     /// Vary the roughness by a field of scales with a wavelength of 100 m.
     pub modulation: bool,
@@ -105,29 +110,37 @@ impl Default for RawVariable {
 pub struct RawVanDeusen {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples); half of the shortest wave.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
     /// Exponent n of the PSD c f^-n, between 1 and 3 (Van Deusen: 2).
+    #[schemars(transform = limits::between(1.0, 3.0))]
     pub exponent: f64,
     /// Amplitude of the shortest waves, m; alternative to `psd_constant`, 0.05 if neither is given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub hi_mag_m: Option<f64>,
     /// Constant c of the mean one-sided PSD c f^-n (f in cycles/m), m^(3 - n); alternative to `hi_mag_m`. A c of 1 ft (n = 2)
     /// is 0.3048 m.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub psd_constant: Option<f64>,
     /// Ratio of successive wavelengths, above 1, at most 4. Published: 2; the square root of 2 gives less ripple about the
     /// power law.
+    #[schemars(transform = limits::above(1.0, 4.0))]
     pub lacunarity: f64,
     /// Longest wave, m; by default 100 m or a quarter of the shorter side, whichever is less. Tiles of one world need the same
     /// value.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub wavelength_max_m: Option<f64>,
     /// Vary the roughness by a field of scales with a wavelength of 100 m.
     pub modulation: bool,

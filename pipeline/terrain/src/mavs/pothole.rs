@@ -7,10 +7,10 @@
 use super::frame::Frame;
 use super::{DEFAULT_CELL_M, DEFAULT_SIZE_PX, POTHOLE};
 use crate::generator::{Generator, Input, Terrain, TerrainError};
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -29,21 +29,28 @@ const HOLES_MAX: usize = 100_000;
 pub struct RawPothole {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 666 x 666 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
     /// Mean diameter, m.
+    #[schemars(transform = limits::positive)]
     pub diameter_m: f64,
     /// Mean depth, m.
+    #[schemars(transform = limits::positive)]
     pub depth_m: f64,
     /// Centres of the holes in the world, m; alternative to `holes`.
+    #[schemars(length(max = HOLES_MAX))]
     pub places_m: Vec<[f64; 2]>,
     /// Number of holes, at positions drawn uniformly over the surface.
+    #[schemars(range(max = HOLES_MAX))]
     pub holes: u32,
 }
 

@@ -7,10 +7,10 @@
 
 use super::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_SIZE_PX, MAVS_PROFILE};
 use crate::generator::{Generator, Input, Terrain, TerrainError};
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use sastrugi_numeric::fft::{Complex64, Transform, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Streams};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -26,15 +26,20 @@ const LENGTH_MAX_CELLS: f64 = 10_000.0;
 pub struct RawProfile {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 666 x 666 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// RMS of the heights, m.
+    #[schemars(transform = limits::positive)]
     pub rms_m: f64,
     /// Length a of the filter, m, at least one cell (listing: two).
+    #[schemars(transform = limits::positive)]
     pub correlation_length_m: f64,
 }
 

@@ -11,10 +11,10 @@ use super::measure::{Made, RawRoughness, Roughness, finish, memory_bytes};
 use super::perlin::{self, Layer, Perlin};
 use super::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_LO_LEN_M, DEFAULT_SIZE_PX, MAVS_PERLIN};
 use crate::generator::{Generator, Input, Terrain, TerrainError};
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_roughness::WaveBand;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::Value;
@@ -26,21 +26,28 @@ use std::f64::consts::PI;
 pub struct RawTwoLayers {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples).
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// South-west corner in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],
     /// RMS of the high layer, m (listings: 0.2 in one place, 0.1 in another; recommended: below 0.15).
+    #[schemars(transform = limits::not_negative)]
     pub hi_mag_m: f64,
     /// Length scale of the high layer, m (listing).
+    #[schemars(transform = limits::positive)]
     pub hi_len_m: f64,
     /// Peak of the low layer, m (listings: 0 in one place, 10 in another).
+    #[schemars(transform = limits::not_negative)]
     pub lo_mag_m: f64,
     /// Wavelength of the low layer, m (listing).
+    #[schemars(transform = limits::positive)]
     pub lo_len_m: f64,
     /// True: the lattice cell of the high layer is `hi_len_m` itself, not 3.93 times that.
     pub true_wavelength: bool,

@@ -1,11 +1,11 @@
 //! Parameters of the multifractal.
 
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use crate::weierstrass_mandelbrot::{
     DEFAULT_CELL_M, DEFAULT_FREQUENCIES, DEFAULT_FREQUENCY_RATIO, DEFAULT_SAMPLING_LENGTH_M, Mode,
     RawWeierstrassMandelbrot, WeierstrassMandelbrot,
 };
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -26,13 +26,17 @@ pub enum Scaling {
 #[schemars(transform = without_required)]
 pub struct RawLayer {
     /// Number of ridge directions M (Table 1: 16, 32, 64).
+    #[schemars(range(min = 1))]
     pub ridges: u32,
     /// Fractal dimension D, between 2 and 3 (Table 1: 2.2, 2.45, and 2.3, 2.45 or 2.6).
+    #[schemars(transform = limits::between(2.0, 3.0))]
     pub fractal_dimension: f64,
     /// Elevation scaling G, m (Table 1: 1e-6, 8e-8, 1e-8). Has no effect on the product, because all layers are scaled to the
     /// same range; kept because the paper lists it.
+    #[schemars(transform = limits::positive)]
     pub elevation_scale_m: f64,
     /// Standard deviation of the Gaussian low-pass filter, cells (not published; 8, 8 and 1 are our reading).
+    #[schemars(transform = limits::not_negative)]
     pub sigma_px: f64,
 }
 
@@ -42,20 +46,27 @@ pub struct RawLayer {
 pub struct RawMultifractal {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 1009 x 1009 if no size is given (Majhor and Bos, section 2.2).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (section 2.2).
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// Highest frequency index n_max (Table 1); the mode may end the sum earlier.
+    #[schemars(range(min = 1))]
     pub frequencies: u32,
     /// Ratio gamma of successive frequencies, above 1 (Table 1).
+    #[schemars(transform = limits::between(1.0, f64::INFINITY))]
     pub frequency_ratio: f64,
     /// Sampling length L, m (Table 1).
+    #[schemars(transform = limits::positive)]
     pub sampling_length_m: f64,
     /// Upper bound of the phases, which are uniform from 0, rad. The paper prints pi, which adds the same spike in one corner to
     /// every layer; 2 pi does not.
+    #[schemars(transform = limits::positive)]
     pub phase_max_rad: f64,
     /// Which waves the layers contain.
     pub mode: Mode,
@@ -68,6 +79,7 @@ pub struct RawMultifractal {
     /// How the product is scaled to levels (not published; symmetric is our reading).
     pub scaling: Scaling,
     /// Vertical scale of the 16-bit levels, per cent: one level is this / 128 cm (section 2.2: 0.75 %, or 3.84 m over all levels).
+    #[schemars(transform = limits::positive)]
     pub z_scale_percent: f64,
 }
 

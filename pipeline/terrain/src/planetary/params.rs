@@ -7,9 +7,9 @@ use super::rocks::potential::Potential;
 use super::world::World;
 use super::{tiles, widest_tile};
 use crate::generator::{Input, TerrainError};
-use crate::size::Size;
+use crate::size::{MIN_SIDE_PX, Size};
 use sastrugi_numeric::Streams;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -34,17 +34,22 @@ const OBJECTS_MAX: f64 = (1u64 << 28) as f64;
 pub struct RawPlanetary {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Samples east and north; 512 x 512 if no size is given.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Distance between samples, m: the basic spacing times a power of 2 (the paper's rovers: 0.02).
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// Distance between lattice points, m (the paper: a few millimetres to 0.01). Part of the world: another spacing gives another world.
     /// By default `cell_m` divided by the smallest power of 2 that gives at most 0.0125 m.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub basic_spacing_m: Option<f64>,
     /// K: the coarsest points of the texture are 2^K basic spacings apart; at most 40 (our choice: 20).
+    #[schemars(range(max = ANCHOR_LEVEL_MAX))]
     pub anchor_level: u32,
     /// Position of the south-west sample in the world, m; whole multiples of the cell.
     pub origin_m: [f64; 2],

@@ -3,7 +3,7 @@
 use super::craters::population::{PowerLawParameters, SecondaryParameters, Style};
 use super::rocks::{COVERAGE_MAX, RockParameters};
 use crate::generator::NamedInput;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,6 +20,8 @@ const CRATERS_PER_DIAMOND_MAX: f64 = 40.0;
 const EXPONENTS: [f64; 2] = [0.1, 20.0];
 /// Smallest ratio of the smallest to the largest secondary, for the same reason.
 const SMALLEST_SHARE_MIN: f64 = 1e-3;
+/// Maximum number of secondaries around a primary.
+const PER_PRIMARY_MAX: u32 = 100_000;
 
 /// A smooth slope.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -38,8 +40,10 @@ pub struct RawBaseSlope {
 #[serde(deny_unknown_fields, default)]
 pub struct RawTexture {
     /// Standard deviation of a point about the mean of its parents 1 m away, m; 0 or above (not published; our choice).
+    #[schemars(transform = limits::not_negative)]
     pub roughness_m: f64,
     /// Hurst exponent H, above 0 to 1: the PSD of profiles falls as f^-(2 H + 1) (not published; our choice).
+    #[schemars(transform = limits::above(0.0, 1.0))]
     pub hurst: f64,
 }
 
@@ -65,18 +69,24 @@ pub enum Datum {
 pub struct RawPrimaryCraters {
     /// Craters wider than 1 m per square metre, if the power law extended to 1 m (0.079 is saturation: Trask, 1966; 0.008, a tenth of it,
     /// is our choice).
+    #[schemars(transform = limits::not_negative)]
     pub density: f64,
     /// Exponent A of N(>D) = density D^-A, 0.1 to 20 (the paper: about 2).
+    #[schemars(transform = limits::within(EXPONENTS[0], EXPONENTS[1]))]
     pub exponent: f64,
     /// Smallest diameter, m; at least 4 basic spacings.
+    #[schemars(transform = limits::positive)]
     pub diameter_min_m: f64,
     /// Largest diameter, m (the paper's example: 1000).
+    #[schemars(transform = limits::positive)]
     pub diameter_max_m: f64,
     /// Depth over diameter of small craters (the paper: 0.2); no crater is deeper than 6 km.
+    #[schemars(transform = limits::between(0.0, 1.0))]
     pub depth_ratio: f64,
     /// Level from which the depth is measured.
     pub datum: Datum,
     /// Roughness of new floors over that of the surface (not published; our choice).
+    #[schemars(transform = limits::not_negative)]
     pub floor_roughness: f64,
 }
 
@@ -100,29 +110,40 @@ impl Default for RawPrimaryCraters {
 pub struct RawSecondaryCraters {
     /// Uniformly distributed secondaries of primaries that are not in the list: craters wider than 1 m per square metre, if the power law
     /// extended to 1 m; 0 for none.
+    #[schemars(transform = limits::not_negative)]
     pub density: f64,
     /// Smallest diameter of these uniform secondaries, m; at least 4 basic spacings.
+    #[schemars(transform = limits::positive)]
     pub diameter_min_m: f64,
     /// Largest diameter of these uniform secondaries, m.
+    #[schemars(transform = limits::positive)]
     pub diameter_max_m: f64,
     /// Exponent A of N(>D) = density D^-A, also for secondaries around primaries, 0.1 to 20 (the paper: 3.5).
+    #[schemars(transform = limits::within(EXPONENTS[0], EXPONENTS[1]))]
     pub exponent: f64,
     /// Secondaries around each wide crater of the nearest preceding `primary_craters`; 0 for none (our choice: the number for which the
     /// power law gives one of the largest size).
+    #[schemars(range(max = PER_PRIMARY_MAX))]
     pub per_primary: u32,
     /// Smallest crater with secondaries, m (our choice).
+    #[schemars(transform = limits::positive)]
     pub primary_min_m: f64,
     /// Largest secondary over its primary (our choice).
+    #[schemars(transform = limits::between(0.0, 1.0))]
     pub largest_ratio: f64,
     /// Smallest over largest secondary of a primary, above 0.001 and below 1 (our choice).
+    #[schemars(transform = limits::between(SMALLEST_SHARE_MIN, 1.0))]
     pub smallest_share: f64,
     /// Nearest and farthest secondary, radii of the primary; their density falls with the square of the distance (our choice).
+    #[schemars(transform = limits::within(1.0, 100.0))]
     pub ring_radii: [f64; 2],
     /// Depth over diameter (Pike and Wilhelms, 1978: about half that of primaries).
+    #[schemars(transform = limits::between(0.0, 1.0))]
     pub depth_ratio: f64,
     /// Level from which the depth is measured.
     pub datum: Datum,
     /// Roughness of new floors over that of the surface.
+    #[schemars(transform = limits::not_negative)]
     pub floor_roughness: f64,
 }
 
@@ -160,28 +181,36 @@ pub enum RockLaw {
 #[serde(deny_unknown_fields, default)]
 pub struct RawRocks {
     /// Share of the ground that all rocks cover, 0 to 0.6 (Golombek and Rapp, 1997: 0.069 at Viking 1, 0.176 at Viking 2).
+    #[schemars(transform = limits::within(0.0, COVERAGE_MAX))]
     pub coverage: f64,
     /// Raster of spatially varying coverage, in the coordinates of the surface: an id in a study (`<id>.rock-potential` for the map of a
     /// terrain) or a file. Bilinear between its cells; where it has no data, `coverage` is used.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 1))]
     pub potential: Option<String>,
     /// Smallest diameter, m; at least a basic spacing (our choice).
+    #[schemars(transform = limits::positive)]
     pub diameter_min_m: f64,
     /// Largest diameter, m; at most 50 (our choice).
+    #[schemars(transform = limits::above(0.0, ROCK_MAX_M))]
     pub diameter_max_m: f64,
     /// How many rocks give a coverage.
     pub law: RockLaw,
     /// Height over diameter where rocks cover 0.069 (our choice, after Golombek and Rapp, 1997).
+    #[schemars(transform = limits::not_negative)]
     pub height_ratio: f64,
     /// Increase of that ratio per unit of coverage (giving 0.506 at 0.176; our choice: rockier ground has taller rocks).
     pub height_gain: f64,
     /// Offset added to every height, m (our choice).
     pub height_offset_m: f64,
     /// Coverage by the rocks that a wide crater strews, at its rim (our choice).
+    #[schemars(transform = limits::within(0.0, COVERAGE_MAX))]
     pub crater_peak: f64,
     /// Distance over which that coverage falls by a factor e, crater radii (our choice).
+    #[schemars(transform = limits::positive)]
     pub crater_decay_radii: f64,
     /// Craters narrower than this strew no rocks, m (our choice).
+    #[schemars(transform = limits::not_negative)]
     pub crater_min_m: f64,
 }
 
@@ -208,12 +237,16 @@ impl Default for RawRocks {
 #[serde(deny_unknown_fields, default)]
 pub struct RawAlbedo {
     /// Mean albedo of sand (our choice).
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub sand: f64,
     /// Standard deviation of the sand's albedo from point to point.
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub sand_deviation: f64,
     /// Mean albedo of rocks (our choice).
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub rock: f64,
     /// Standard deviation of the rocks' albedo from rock to rock.
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub rock_deviation: f64,
 }
 
@@ -228,10 +261,13 @@ impl Default for RawAlbedo {
 #[serde(deny_unknown_fields, default)]
 pub struct RawDust {
     /// Thickness, m: rocks protrude by that much less and cover less ground; lower ones vanish (our choice).
+    #[schemars(transform = limits::not_negative)]
     pub thickness_m: f64,
     /// Albedo of the dust (our choice).
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub albedo: f64,
     /// Share of every point that the dust covers, 0 to 1 (our choice).
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub cover: f64,
 }
 
@@ -474,7 +510,7 @@ impl RawSecondaryCraters {
         ParameterError::positive("primary_min_m", self.primary_min_m)?;
         ParameterError::between("largest_ratio", self.largest_ratio, 0.0, 1.0)?;
         ParameterError::between("smallest_share", self.smallest_share, SMALLEST_SHARE_MIN, 1.0)?;
-        within("per_primary", f64::from(self.per_primary), 0.0, 1e5)?;
+        within("per_primary", f64::from(self.per_primary), 0.0, f64::from(PER_PRIMARY_MAX))?;
         let [near, far] = self.ring_radii;
         if !(near >= 1.0 && far > near && far <= 100.0) {
             let message = format!("is [{near}, {far}]; it must rise from 1 or more to 100 or less");

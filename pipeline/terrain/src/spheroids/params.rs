@@ -1,7 +1,7 @@
 //! Parameters of the spheroids.
 
-use crate::size::Size;
-use sastrugi_schemas::ParameterError;
+use crate::size::{MIN_SIDE_PX, Size};
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -43,22 +43,28 @@ impl Preset {
 pub struct RawSpheroids {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 1000 x 1000 if no size is given (Bayrak, 2008, section 5.1).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m: one map unit of the thesis.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// Hilliness: plain, rough or very_rough.
     pub preset: Preset,
     /// Number of hills; at least 1.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = SPHEROIDS_MAX))]
     pub spheroids: Option<u32>,
     /// Longest horizontal semi-axis, cells.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = AXIS_MAX_PX))]
     pub major_max_px: Option<u32>,
     /// Longest vertical semi-axis, cells; a hill's vertical semi-axis never exceeds its horizontal one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = AXIS_MAX_PX))]
     pub minor_max_px: Option<u32>,
     /// Treat the drawn lengths as full axes, twice the semi-axes (the other reading of the thesis).
     pub full_axis: bool,

@@ -1,7 +1,7 @@
 //! Parameters of the monofractal.
 
-use crate::size::Size;
-use sastrugi_schemas::ParameterError;
+use crate::size::{MIN_SIDE_PX, Size};
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -41,26 +41,36 @@ pub enum Mode {
 pub struct RawWeierstrassMandelbrot {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 1009 x 1009 if no size is given (Majhor and Bos, section 2.2).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (section 2.2).
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// Number of ridge directions M (Table 1, high-frequency layer).
+    #[schemars(range(min = 1))]
     pub ridges: u32,
     /// Highest frequency index n_max (Table 1); the mode may end the sum earlier.
+    #[schemars(range(min = 1))]
     pub frequencies: u32,
     /// Ratio gamma of successive frequencies, above 1 (Table 1).
+    #[schemars(transform = limits::between(1.0, f64::INFINITY))]
     pub frequency_ratio: f64,
     /// Fractal dimension D, between 2 and 3 (Table 1, high-frequency layer).
+    #[schemars(transform = limits::between(2.0, 3.0))]
     pub fractal_dimension: f64,
     /// Sampling length L, m (Table 1).
+    #[schemars(transform = limits::positive)]
     pub sampling_length_m: f64,
     /// Elevation scaling G, m (Table 1, high-frequency layer).
+    #[schemars(transform = limits::positive)]
     pub elevation_scale_m: f64,
     /// Upper bound of the phases, which are uniform from 0, rad. The paper prints pi, which adds the same spike in one corner to
     /// every surface; 2 pi does not.
+    #[schemars(transform = limits::positive)]
     pub phase_max_rad: f64,
     /// Which waves the sum contains.
     pub mode: Mode,

@@ -3,7 +3,7 @@
 use super::Trail;
 use super::bed::{Bed, Ruts};
 use sastrugi_numeric::Geometry;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -43,44 +43,59 @@ pub struct RawTrail {
     /// What the trail follows (MAVS: ridges).
     pub follows: Follows,
     /// Width within which heights change, m, at least two cells.
+    #[schemars(transform = limits::positive)]
     pub width_m: f64,
     /// Width on either side, within `width_m`, over which the bed blends into the ground, m.
+    #[schemars(transform = limits::positive)]
     pub shoulder_m: f64,
     /// Standard deviation of the Gaussian that smooths the bed's height along the trail, m; 0 keeps the ground's own height.
+    #[schemars(transform = limits::not_negative)]
     pub smoothing_m: f64,
     /// Distance between the centres of the two ruts, m.
+    #[schemars(transform = limits::positive)]
     pub track_m: f64,
     /// Width of the ruts' level bottom, m.
+    #[schemars(transform = limits::positive)]
     pub tyre_width_m: f64,
     /// Depth of the ruts below the bed after one pass, m.
+    #[schemars(transform = limits::not_negative)]
     pub rut_depth_m: f64,
     /// Number of vehicle passes; 0 leaves the bed without ruts.
     pub passes: u32,
     /// The depth grows as `passes^(1 / multipass_coefficient)`; 1 or above, larger for denser soil (our choice: 3).
+    #[schemars(transform = limits::half_open(1.0, f64::INFINITY))]
     pub multipass_coefficient: f64,
     /// Width of the berm on either side of a rut, m; by default twice the tyre width.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub berm_width_m: Option<f64>,
     /// Share of the ruts' volume that the berms hold, 0 to 1; the rest is compacted.
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub berm_share: f64,
     /// Wheelbase of the vehicle that made the trail, m.
+    #[schemars(transform = limits::positive)]
     pub wheelbase_m: f64,
     /// Smallest radius of the centre line, m; by default two wheelbases.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub turning_radius_m: Option<f64>,
     /// Minimum distance of the centre line from the edges, m; by default the largest of 3 m, 2 % of the diagonal, and half the
     /// width plus one cell.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub border_m: Option<f64>,
     /// For `ridges` and `valleys`: extra cost of a metre on the least favoured ground, where the most favoured costs 1; 20 by
     /// default.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::not_negative)]
     pub attraction: Option<f64>,
     /// For `loop`: semi-axes over the sides of the surface; 0.4 by default.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::between(0.0, 0.5))]
     pub loop_share: Option<f64>,
     /// For `loop`: how far it wanders in or out, over its semi-axes; 0.1 by default.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::half_open(0.0, 1.0))]
     pub loop_wander_share: Option<f64>,
 }
 

@@ -4,8 +4,8 @@ use super::{Rolling, embedding};
 use crate::mavs::frame::Frame;
 use crate::mavs::measure::{RawRoughness, Roughness, Scaling};
 use crate::mavs::{DEFAULT_CELL_M, DEFAULT_HI_LEN_M, DEFAULT_HI_MAG_M, DEFAULT_LO_LEN_M, DEFAULT_SIZE_PX};
-use crate::size::Size;
-use sastrugi_schemas::ParameterError;
+use crate::size::{MIN_SIDE_PX, Size};
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -35,21 +35,28 @@ pub enum Covariance {
 pub struct RawGaussian {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples).
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// South-west corner in the world, m; whole multiples of the cell. It positions the rolling ground, not the field.
     pub origin_m: [f64; 2],
     /// RMS of the field, m (listings: 0.2 in one place, 0.1 in another; recommended: below 0.15).
+    #[schemars(transform = limits::positive)]
     pub hi_mag_m: f64,
     /// Correlation length of the field, m (listing).
+    #[schemars(transform = limits::positive)]
     pub hi_len_m: f64,
     /// Peak of the rolling ground, m (listings: 0 in one place, 10 in another).
+    #[schemars(transform = limits::not_negative)]
     pub lo_mag_m: f64,
     /// Wavelength of the rolling ground, m (listing).
+    #[schemars(transform = limits::positive)]
     pub lo_len_m: f64,
     /// True: the listing with its defects (a wrong correlation, and none from column to column). False: the separable field
     /// that was intended.
@@ -81,11 +88,14 @@ impl Default for RawGaussian {
 pub struct RawOrnsteinUhlenbeck {
     /// Size east and north, m; alternative to `size_px`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Number of cells east and north; 666 x 666 if no size is given (100 m in the examples).
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = MIN_SIDE_PX)))]
     pub size_px: Option<[u32; 2]>,
     /// Side of a cell, m (examples).
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// South-west corner in the world, m; whole multiples of the cell. It positions the rolling ground, not the field.
     pub origin_m: [f64; 2],
@@ -94,12 +104,16 @@ pub struct RawOrnsteinUhlenbeck {
     /// Covariance of the field.
     pub covariance: Covariance,
     /// RMS of the field, m.
+    #[schemars(transform = limits::positive)]
     pub rms_m: f64,
     /// Correlation length a, m (listing), at least one cell.
+    #[schemars(transform = limits::positive)]
     pub correlation_length_m: f64,
     /// Peak of the rolling ground, m.
+    #[schemars(transform = limits::not_negative)]
     pub lo_mag_m: f64,
     /// Wavelength of the rolling ground, m (listing).
+    #[schemars(transform = limits::positive)]
     pub lo_len_m: f64,
     /// Band in which roughness is measured, and the RMS to which it is scaled.
     pub roughness: RawRoughness,
