@@ -2,7 +2,7 @@
 //!
 //! `[anisotropic:]MODEL[+MODEL][+nugget]`, such as `exponential`, `matern+nugget`, `anisotropic:exponential+gaussian`.
 
-use super::{Covariance, Model, Structure, model};
+use super::{Covariance, MODELS, Model, Structure, model};
 use sastrugi_schemas::ParameterError;
 use std::collections::BTreeMap;
 
@@ -61,6 +61,19 @@ impl Parameter {
 }
 
 impl Form {
+    /// Regular expression of the names of forms, for JSON Schemas. It has no place for the rule that `self_affine` cannot be part of a sum.
+    ///
+    /// ```
+    /// use sastrugi_texture::covariance::Form;
+    ///
+    /// assert!(Form::pattern().starts_with(r"(anisotropic:)?(exponential|gaussian|"));
+    /// ```
+    pub fn pattern() -> String {
+        let names: Vec<&str> = MODELS.iter().map(|model| model.kind().kind).collect();
+        let term = format!("({})", names.join("|"));
+        format!(r"(anisotropic:)?{term}(\+{term}){{0,{}}}(\+nugget)?", TERMS_MAX - 1)
+    }
+
     /// Parses the name of a form.
     ///
     /// # Errors

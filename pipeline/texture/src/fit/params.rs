@@ -6,9 +6,9 @@ use crate::noise::Noise;
 use crate::synth::EMPIRICAL;
 use sastrugi_numeric::Geometry;
 use sastrugi_roughness::background::{AtPartial, BoxWindow};
-use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::kind::read_parameters;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -44,36 +44,48 @@ pub struct FitParameters {
     pub mode: Mode,
     /// Outer scale: width of the moving average that defines the background, m. Default 2 (Vecherin et al. 2022,
     /// section 2); at least 3 cells, at most a third of the DEM.
+    #[schemars(transform = limits::positive)]
     pub outer_scale_m: f64,
     /// Significance level at which residuals are trimmed on both sides, in (0, 0.5). Default 0.05 (Vecherin et al.
     /// 2022, section 2).
+    #[schemars(transform = limits::between(0.0, 0.5))]
     pub trim: f64,
-    /// Covariance model, or several separated by commas, or `auto` for the usual ones: the best by AICc is used, all are listed.
-    /// Adding `empirical` stores the measured covariance by lag for textures; the best of the other models extrapolates it. A
-    /// model is `exponential`, `gaussian`, `spherical`, `matern` or `self_affine`, or a sum of two (`exponential+gaussian`),
-    /// optionally followed by `+nugget` or preceded by `anisotropic:`. Default `exponential` (Vecherin et al. 2022, Eq. 9).
+    /// Covariance model, such as `exponential` or `anisotropic:matern+nugget`, or several separated by commas, or `auto` for the usual ones: the
+    /// best by AICc is used, all are listed. A model is `exponential`, `gaussian`, `spherical`, `matern` or `self_affine`, or a sum of two
+    /// (`exponential+gaussian`), optionally followed by `+nugget`, preceded by `anisotropic:`, or both. `empirical`, with others (`auto,empirical`)
+    /// or alone, stores the measured covariance by lag for textures; the best of the other models extrapolates it, `exponential` if there is none.
+    /// Default `exponential` (Vecherin et al. 2022, Eq. 9).
+    #[schemars(regex(pattern = model_pattern()))]
     pub model: String,
     /// Largest lag of the covariance, m. Default: half the outer scale, at least 3 cells.
+    #[schemars(transform = limits::positive)]
     pub max_lag_m: Option<f64>,
     /// A cell is used only if more than this share of its window has data. Default 0.5; 0.9 in `paper` mode.
+    #[schemars(transform = limits::half_open(0.0, 1.0))]
     pub min_valid_share: Option<f64>,
     /// Whether objects (trees, rocks, structures) are found and left out before the moving average. Default true. On a bare
     /// site with steep steps (gullies, cliffs) the search removes up to a tenth of the cells: set it to false there. Not used in
     /// `paper` mode.
     pub find_objects: bool,
-    /// Replicates of the parametric bootstrap for the intervals; 0 for no intervals. Default 99. Not used in `paper` mode.
+    /// Replicates of the parametric bootstrap for the intervals: 39 or more, the fewest that give a 95 % interval, or 0 for no intervals. Default 99.
+    /// Not used in `paper` mode.
+    #[schemars(range(max = BOOTSTRAP_MAX), extend("not" = { "minimum": 1, "maximum": BOOTSTRAP_MIN - 1 }))]
     pub bootstrap: u32,
     /// Standard deviation of the Gaussian point spread function that blurred the DEM (smoothing by photogrammetry), m.
     /// Default 0.
+    #[schemars(transform = limits::not_negative)]
     pub inner_scale_m: f64,
     /// Standard deviation of the DEM's white noise per cell, m. Default 0. If unknown, estimate it from a smooth part of the DEM
     /// (`noise_reference` of a study's fit, `--noise-reference`) or fit it as a nugget (`+nugget`).
+    #[schemars(transform = limits::not_negative)]
     pub noise_sigma_m: f64,
     /// Standard deviation of spatially correlated noise, as left by dense image matching, m: covariance
     /// sigma^2 exp(-(lag / range)^2) (Hugonnet et al. 2022). Default 0. A noise reference estimates it too.
+    #[schemars(transform = limits::not_negative)]
     pub correlated_noise_sigma_m: f64,
     /// Range of the correlated noise, m: 0.6 times the width of the matched patches if each cell has its own patch. Must be
     /// below the outer scale; 0 without correlated noise.
+    #[schemars(transform = limits::not_negative)]
     pub correlated_noise_range_m: f64,
     /// Whether the statistics of the residual are stored, from which the texture methods `modulated` and `wavelet_statistics` work without
     /// the DEM. Default false. Not in `paper` mode.
@@ -202,6 +214,12 @@ impl FitParameters {
     fn noise(&self) -> Result<Noise, ParameterError> {
         Noise::new(self.noise_sigma_m, self.correlated_noise_sigma_m, self.correlated_noise_range_m)
     }
+}
+
+/// Regular expression of a `model` parameter, for its JSON Schema.
+fn model_pattern() -> String {
+    let one = format!(r"\s*({}|auto|{EMPIRICAL})\s*", Form::pattern());
+    format!("^{one}(,{one})*$")
 }
 
 /// The forms that a `model` parameter names, and whether it includes `empirical`. On its own, `empirical` is extrapolated by

@@ -5,8 +5,8 @@ use super::marginal::Marginal;
 use crate::covariance::Covariance;
 use crate::covariance::form::half_turn;
 use sastrugi_numeric::{Geometry, Grid};
-use sastrugi_schemas::ParameterError;
 use sastrugi_schemas::kind::{read_parameters, schema_of};
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::de::DeserializeOwned;
 use serde::{Deserialize, Serialize};
@@ -25,6 +25,10 @@ const RATIO_MIN: f64 = 0.02;
 /// Width in ranges that a periodic tile needs for a Matern covariance, and a non-periodic one.
 const SELF_AFFINE_RANGES: [f64; 2] = [16.0, 4.0];
 
+/// Meaning of `cell_m` for a method that repeats a site.
+const CELL_OF_SITE: &str = "Cell size of the site, that is of the DEM of the fit, m: one number, or east-west and north-south. These methods work on \
+    no other cells. Default: that cell size.";
+
 /// Keys of a tile that only textures from a covariance have, and what a method that repeats a site keeps instead.
 pub(super) const OF_COVARIANCE: [(&str, &str); 5] = [
     ("ratio", "directions"),
@@ -37,6 +41,7 @@ pub(super) const OF_COVARIANCE: [(&str, &str); 5] = [
 /// Size of a cell.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(untagged, expecting = "must be a number, or two numbers: east-west and north-south, m")]
+#[schemars(transform = limits::positive)]
 pub enum Cell {
     /// The same in both directions, m.
     Square(f64),
@@ -69,18 +74,22 @@ pub enum Heights {
 #[serde(deny_unknown_fields, default)]
 pub struct TileParameters {
     /// Size of one tile, east-west and north-south, m; instead of `size_px`. Default 20 x 20 (Vecherin et al. 2022,
-    /// Figure 5).
+    /// Figure 5). With `onto`, the result has the size of the base.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub size_m: Option<[f64; 2]>,
     /// Size of one tile in cells, columns and rows; instead of `size_m`.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(range(min = 1)))]
     pub size_px: Option<[u32; 2]>,
-    /// Cell size, m: one number, or east-west and north-south. Default 0.1 (Vecherin et al. 2022, section 3.2).
+    /// Cell size, m: one number, or east-west and north-south; with `onto`, that of the base. Default 0.1 (Vecherin et al. 2022, section 3.2).
     pub cell_m: Cell,
     /// How many times a periodic tile is repeated, as rows and columns of tiles. Default 1 x 1.
+    #[schemars(inner(range(min = 1)))]
     pub tile: [u32; 2],
     /// Range across the long axis over range along it, in [0.02, 1]; replaces the fit's.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::within(RATIO_MIN, 1.0))]
     pub ratio: Option<f64>,
     /// Direction of the long axis, degrees clockwise from north; replaces the fit's.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -88,12 +97,14 @@ pub struct TileParameters {
     /// Range of the stationary covariance that replaces a self-affine fit, m. Default: 1/16 of the shorter side of a periodic tile, 1/4 of
     /// that of a non-periodic one.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub outer_m: Option<f64>,
     /// Height distribution: `normal` (default), or `measured`, the shape of the fitted residual's distribution, scaled to the variance of the
     /// covariance (trimming has cut its tails).
     pub marginal: Heights,
     /// Height distribution, instead of `marginal`: heights in m at equally spaced probabilities from 0 to 1, ascending. Default: normal.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(length(min = 2))]
     pub marginal_m: Option<Vec<f64>>,
 }
 
@@ -362,6 +373,10 @@ pub(super) fn schema_of_site<T: JsonSchema>() -> Value {
     let mut all = schema::<T>();
     if let Some(properties) = all["properties"].as_object_mut() {
         properties.retain(|key, _| !is_of_covariance(key));
+    }
+    if let Some(cell) = all.pointer_mut("/properties/cell_m").and_then(Value::as_object_mut) {
+        cell.remove("default");
+        cell.insert("description".to_owned(), CELL_OF_SITE.into());
     }
     // The type of `marginal`.
     if let Some(types) = all["$defs"].as_object_mut() {

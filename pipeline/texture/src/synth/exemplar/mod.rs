@@ -48,14 +48,14 @@
 
 pub mod sampling;
 
-use super::fft_ma::CovarianceOf;
+use super::fft_ma::{CovarianceOf, without_default};
 use super::measured::{self, Collage, Measured};
 use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
 use super::{Cost, SynthesisError};
 use sampling::{Field, Sampling};
 use sastrugi_numeric::{Counter, Geometry, Streams};
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::sync::Arc;
@@ -75,20 +75,24 @@ const GRIDS_MAX: usize = 16;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ExemplarParameters {
-    /// Least spacing of the first cells, which are drawn at random, m; rounded up to a power of 2 in cells. Default: twice the lag at which the
-    /// residual's correlation is 1/e. On a periodic tile they are nearer, down to half of that, where only so two fit on each side.
+    /// Spacing of the first cells, which copy random places of the site, m; rounded up to a power of 2 in cells. Default: twice the lag at which the
+    /// residual's correlation is 1/e. On a periodic tile it is reduced, by half at most, so that at least two of them fit along each side.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub spacing_m: Option<f64>,
     /// Known cells around a cell that are compared, in [4, 64]. Default 12.
+    #[schemars(range(min = 4, max = 64))]
     pub neighbours: u32,
     /// Places compared at random for each cell of grids of 8 cells and wider, in [1, 100 000]; an eighth on each finer one, at least 8. Default
     /// 2000.
+    #[schemars(range(min = 1, max = 100_000))]
     pub scan: u32,
     /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
-    /// Base that the texture is for: `surface` (level or synthetic ground; the texture has the covariance of the residual) or `residual` (a measured
-    /// background; wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site).
-    /// Default: `residual` on a measured DEM, otherwise `surface`.
+    /// Base that the texture is for: with `surface`, for level or synthetic ground, it repeats the residual as it was measured; with `residual`, for a
+    /// measured background, wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site.
+    /// Default: `residual` on a measured DEM or the background of a fit, otherwise `surface`.
+    #[schemars(transform = without_default)]
     pub covariance: CovarianceOf,
 }
 

@@ -49,7 +49,7 @@ use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums, turns};
 use sastrugi_schemas::{Kind, ParameterError};
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use spectrum::Spectrum;
 
@@ -93,15 +93,20 @@ pub enum SpectrumOf {
     Eq10,
 }
 
-/// What the covariance describes.
+/// Base for which a texture is made.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum CovarianceOf {
-    /// The surface: for textures on flat or synthetic ground.
+    /// For level or synthetic ground, or no base.
     #[default]
     Surface,
-    /// The part of the surface that the background over the fit's window lacks: for textures on a measured background.
+    /// For a measured background.
     Residual,
+}
+
+/// The default depends on the base of the texture; the description tells how.
+pub(super) fn without_default(schema: &mut Schema) {
+    schema.remove("default");
 }
 
 /// Raw parameters of an FFT-MA texture, without those of its tile.
@@ -114,8 +119,10 @@ pub struct FftMaParameters {
     pub periodic: bool,
     /// `covariance` (default) or `eq10` (the published spectrum of an isotropic exponential, which loses variance).
     pub spectrum: SpectrumOf,
-    /// `surface` (the fit's covariance) or `residual` (the part of it that a moving average over the fit's window lacks, so that a
-    /// measured background and the texture together have that covariance). Default: `residual` on a measured DEM, otherwise `surface`.
+    /// Base that the texture is for: with `surface`, for level or synthetic ground, it has the covariance of the fit; with `residual`, for a measured
+    /// background, the part of it that a moving average over the fit's window lacks, so that background and texture together have that covariance.
+    /// Default: `residual` on a measured DEM or the background of a fit, otherwise `surface`.
+    #[schemars(transform = without_default)]
     pub covariance: CovarianceOf,
 }
 

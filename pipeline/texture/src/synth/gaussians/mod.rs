@@ -17,7 +17,7 @@ use super::tile::{self, Tile};
 use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted, fft_ma, reach};
 use crate::covariance::Covariance;
 use sastrugi_numeric::{Geometry, Streams};
-use sastrugi_schemas::{Kind, ParameterError, counted};
+use sastrugi_schemas::{Kind, ParameterError, counted, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,9 +32,11 @@ const COUNT_MAX: u64 = 100_000_000;
 pub struct GaussiansParameters {
     /// Half axis a of a bump along the long axis, m. Default: the correlation is 1/2 where the fit's is.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub scale_m: Option<f64>,
     /// Number G of bumps. Default 10 per area of their half axes.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 1, max = COUNT_MAX))]
     pub bumps: Option<u64>,
 }
 

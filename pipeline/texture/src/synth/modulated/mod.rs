@@ -68,12 +68,12 @@ use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::statistics::{lags, spectrum};
 use super::tile::{self, Tile};
 use super::{Cost, SynthesisError};
-use crate::synth::fft_ma::{CovarianceOf, Phase, random_column};
+use crate::synth::fft_ma::{CovarianceOf, Phase, random_column, without_default};
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Streams, sums};
 use sastrugi_schemas::statistics::{Modulation, Statistics};
-use sastrugi_schemas::{Kind, ParameterError, counted};
+use sastrugi_schemas::{Kind, ParameterError, counted, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -119,13 +119,16 @@ pub struct ModulatedParameters {
     pub periodic: bool,
     /// Variance of the logarithm of the amplitude, in [0, 2]; replaces the fit's.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::within(0.0, LOG_VARIANCE_MAX))]
     pub log_variance: Option<f64>,
     /// Distance over which the correlation of the logarithm of the amplitude falls to 1/e, m; replaces the fit's.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub range_m: Option<f64>,
-    /// Base that the texture is for: `surface` (level or synthetic ground; the texture has the covariance of the residual) or `residual` (a measured
-    /// background; wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site).
-    /// Default: `residual` on a measured DEM, otherwise `surface`.
+    /// Base that the texture is for: with `surface`, for level or synthetic ground, it repeats the residual as it was measured; with `residual`, for a
+    /// measured background, wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site.
+    /// Default: `residual` on a measured DEM or the background of a fit, otherwise `surface`.
+    #[schemars(transform = without_default)]
     pub covariance: CovarianceOf,
 }
 

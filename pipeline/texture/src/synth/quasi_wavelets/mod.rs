@@ -27,7 +27,7 @@ use super::tile::{self, Tile};
 use super::{Cost, Kernel, Made, MethodParameters, SynthesisError, Wanted, fft_ma, reach};
 use crate::covariance::Covariance;
 use sastrugi_numeric::{Geometry, Streams};
-use sastrugi_schemas::{Kind, ParameterError, counted};
+use sastrugi_schemas::{Kind, ParameterError, counted, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -56,10 +56,13 @@ const PACKING_MIN: f64 = 0.01;
 #[serde(deny_unknown_fields, default)]
 pub struct QuasiWaveletsParameters {
     /// Ratio q of the sizes of neighbouring classes, in [0.3, 0.9]. Default 0.6.
+    #[schemars(transform = limits::within(0.3, 0.9))]
     pub size_ratio: f64,
     /// Bumps per area of their half axes in the largest class. Default 1.
+    #[schemars(transform = limits::half_open(PACKING_MIN, f64::INFINITY))]
     pub packing: f64,
     /// Exponent with which the packing decreases with size, in [0, 2]. Default 0 (no intermittency).
+    #[schemars(transform = limits::within(0.0, 2.0))]
     pub intermittency: f64,
 }
 

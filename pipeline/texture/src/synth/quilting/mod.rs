@@ -58,14 +58,14 @@ pub mod cut;
 mod search;
 
 use super::exemplar::sampling::{self, Field};
-use super::fft_ma::CovarianceOf;
+use super::fft_ma::{CovarianceOf, without_default};
 use super::measured::{self, Collage, Holes, Measured};
 use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::tile::{self, Tile};
 use super::{Cost, SynthesisError};
 use cut::Strips;
 use sastrugi_numeric::{Grid, Streams};
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, limits};
 use schemars::JsonSchema;
 use search::{Search, Wanted};
 use serde::{Deserialize, Serialize};
@@ -97,20 +97,25 @@ pub struct QuiltingParameters {
     /// Side of a patch, m. Default: 6 times the lag at which the residual's correlation is 1/e, at most a third of the site and (periodic)
     /// half of the tile, and as narrow as the gaps of the site require.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub patch_m: Option<f64>,
     /// Overlap of neighbouring patches as a share of their side, in [0.1, 0.5]. Default 0.25.
+    #[schemars(transform = limits::within(0.1, 0.5))]
     pub overlap: f64,
     /// Patches are drawn from those whose root mean square difference over the overlap, relative to the heights there, is at most
     /// `1 + tolerance` times the least, in [0, 1]. Default 0.1 (Efros and Freeman 2001).
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub tolerance: f64,
-    /// How evenly the site is used, in [0, 100]: the squared difference of a patch whose cells were laid n times more, on average, than those of
-    /// the site counts `1 + evenness * n` times. Default 4.
+    /// How evenly the site is used, in [0, 100]: the squared difference of a patch is multiplied by `1 + evenness * n` if its cells, on average, have
+    /// been used n more times than those of the site. Default 4.
+    #[schemars(transform = limits::within(0.0, 100.0))]
     pub evenness: f64,
     /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
-    /// Base that the texture is for: `surface` (level or synthetic ground; the texture has the covariance of the residual) or `residual` (a measured
-    /// background; wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site).
-    /// Default: `residual` on a measured DEM, otherwise `surface`.
+    /// Base that the texture is for: with `surface`, for level or synthetic ground, it repeats the residual as it was measured; with `residual`, for a
+    /// measured background, wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site.
+    /// Default: `residual` on a measured DEM or the background of a fit, otherwise `surface`.
+    #[schemars(transform = without_default)]
     pub covariance: CovarianceOf,
 }
 

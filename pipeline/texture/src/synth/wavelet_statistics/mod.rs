@@ -60,7 +60,7 @@ mod target;
 
 pub use measure::measure;
 
-use super::fft_ma::{CovarianceOf, Phase, random_spectrum};
+use super::fft_ma::{CovarianceOf, Phase, random_spectrum, without_default};
 use super::residual::{ResidualKernel, ResidualParameters, Site};
 use super::statistics::lags;
 use super::statistics::spectrum::{self, Modes};
@@ -105,10 +105,12 @@ pub struct WaveletStatisticsParameters {
     /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
     /// Number of rounds, 1 to 200. Default 10.
+    #[schemars(range(min = 1, max = ROUNDS_MAX))]
     pub rounds: u32,
-    /// Base that the texture is for: `surface` (level or synthetic ground; the texture has the covariance of the residual) or `residual` (a measured
-    /// background; wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site).
-    /// Default: `residual` on a measured DEM, otherwise `surface`.
+    /// Base that the texture is for: with `surface`, for level or synthetic ground, it repeats the residual as it was measured; with `residual`, for a
+    /// measured background, wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site.
+    /// Default: `residual` on a measured DEM or the background of a fit, otherwise `surface`.
+    #[schemars(transform = without_default)]
     pub covariance: CovarianceOf,
 }
 
