@@ -3,7 +3,7 @@
 use crate::photometry::Photometry;
 use crate::pose::CameraPose;
 use crate::sun::Sun;
-use sastrugi_schemas::{ParameterError, shown};
+use sastrugi_schemas::{ParameterError, limits, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -12,8 +12,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct Noise {
     /// Part proportional to the brightness.
+    #[schemars(transform = limits::not_negative)]
     pub relative: f64,
     /// Constant part, in units of the image (I/F).
+    #[schemars(transform = limits::not_negative)]
     pub absolute: f64,
 }
 

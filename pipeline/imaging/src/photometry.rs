@@ -14,7 +14,7 @@
 //! photoclinometry and other applications, Icarus 92 (1991): the brightness of a facet that faces light and view equals its albedo.
 
 use crate::direction::{Vector, dot};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,8 +23,10 @@ use serde::{Deserialize, Serialize};
 #[serde(deny_unknown_fields, default)]
 pub struct Photometry {
     /// Weight of Lambert's law (the paper: 0.35).
+    #[schemars(transform = limits::not_negative)]
     pub lambert: f64,
     /// Weight of the Lommel-Seeliger law (the paper: 0.65).
+    #[schemars(transform = limits::not_negative)]
     pub lommel_seeliger: f64,
 }
 

@@ -5,9 +5,9 @@
 
 use crate::camera::{Camera, ParallelCamera, PinholeCamera};
 use crate::direction::{Vector, cross, direction, dot, minus};
-use crate::sun::check_direction;
+use crate::sun::{AZIMUTHS_DEG, check_direction};
 use sastrugi_numeric::{Geometry, Grid, Surface};
-use sastrugi_schemas::{ParameterError, shown};
+use sastrugi_schemas::{ParameterError, limits, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,19 +26,24 @@ pub enum CameraParameters {
     Nadir {
         /// Pixel size, m; the surface's cell size when absent.
         #[serde(default)]
+        #[schemars(transform = limits::positive)]
         pixel_m: Option<f64>,
     },
     /// Parallel rays from a direction, as from orbit.
     Parallel {
         /// Azimuth of the camera as seen from the ground, clockwise from north, deg.
+        #[schemars(transform = limits::within(AZIMUTHS_DEG[0], AZIMUTHS_DEG[1]))]
         azimuth_deg: f64,
         /// Elevation of the camera above the horizon, above 0 to 90 deg.
+        #[schemars(transform = limits::above(0.0, 90.0))]
         elevation_deg: f64,
         /// Pixel size perpendicular to the rays, m; the surface's cell size when absent.
         #[serde(default)]
+        #[schemars(transform = limits::positive)]
         pixel_m: Option<f64>,
         /// Columns and rows; the complete surface when absent.
         #[serde(default)]
+        #[schemars(inner(range(min = 1)))]
         size_px: Option<[usize; 2]>,
         /// Ground point `[x, y]` at the centre of the image, m; the centre of the surface when absent.
         #[serde(default)]
@@ -55,9 +60,11 @@ pub enum CameraParameters {
         above_ground: bool,
         /// Horizontal field of view, deg.
         #[serde(default = "field_of_view_deg")]
+        #[schemars(transform = limits::above(0.0, FIELD_OF_VIEW_MAX_DEG))]
         field_of_view_deg: f64,
         /// Columns and rows.
         #[serde(default = "size_px")]
+        #[schemars(inner(range(min = 1)))]
         size_px: [usize; 2],
     },
 }

@@ -1,20 +1,22 @@
 //! Position of the sun.
 
 use crate::direction::{Vector, direction};
-use sastrugi_schemas::{ParameterError, shown};
+use sastrugi_schemas::{ParameterError, limits, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Range of azimuths accepted for a light, deg.
-const AZIMUTHS_DEG: [f64; 2] = [-360.0, 720.0];
+pub(crate) const AZIMUTHS_DEG: [f64; 2] = [-360.0, 720.0];
 
 /// A distant sun with parallel rays.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct Sun {
     /// Azimuth from which the light comes, clockwise from north, deg.
+    #[schemars(transform = limits::within(AZIMUTHS_DEG[0], AZIMUTHS_DEG[1]))]
     pub azimuth_deg: f64,
     /// Elevation above the horizon, above 0 to 90 deg.
+    #[schemars(transform = limits::above(0.0, 90.0))]
     pub elevation_deg: f64,
 }
 

@@ -6,7 +6,7 @@
 
 use crate::map::{Node, TravelMap};
 use sastrugi_numeric::Streams;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,8 +18,10 @@ const DRAWS_MAX: u32 = 100_000;
 #[serde(deny_unknown_fields, default)]
 pub struct PairParameters {
     /// Least straight-line distance from start to goal, m; half the shorter side of the terrain if absent.
+    #[schemars(transform = limits::positive)]
     pub distance_min_m: Option<f64>,
     /// Least distance of starts and goals from the edge of the terrain, m.
+    #[schemars(transform = limits::not_negative)]
     pub border_m: f64,
 }
 

@@ -4,7 +4,7 @@ use crate::cost::SlopeCost;
 use crate::map::{Neighbourhood, SlopeLimits};
 use crate::route::{self, RouteSettings};
 use crate::vertices::VertexSettings;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -81,46 +81,63 @@ pub struct RouteParameters {
     /// Search method.
     pub method: Search,
     /// Neighbours of a cell: 4, or 8 with the diagonals, which never cut the corner of a blocked cell.
+    #[schemars(range(min = 4, max = 8), extend("multipleOf" = 4))]
     pub neighbours: u8,
     /// Plan on cells of about this size, m, each the mean of an integer number of terrain cells; the terrain's own cells if absent.
+    #[schemars(transform = limits::positive)]
     pub plan_cell_m: Option<f64>,
     /// `roadmap`: drop critical points that differ in height from the adjacent ones by no more than this, m; the cell size if absent.
+    #[schemars(transform = limits::not_negative)]
     pub step_over_m: Option<f64>,
     /// `roadmap`: height-difference threshold: change of height after which a line of cells gets another vertex, m; none if absent.
+    #[schemars(transform = limits::positive)]
     pub threshold_m: Option<f64>,
     /// `roadmap`: add vertices until the roadmap connects everything that the ground connects.
     pub repair: bool,
     /// `roadmap`: follow the thesis' listings as printed, even where they contradict its text or have no effect.
     pub literal: bool,
     /// `anytime`: the first path costs at most this many times the optimum.
+    #[schemars(transform = limits::half_open(1.0, f64::INFINITY))]
     pub suboptimality: f64,
     /// `anytime`: number of expansions after which the best path so far is used.
+    #[schemars(range(min = 1))]
     pub expansions_max: Option<u64>,
     /// Cost that smoothing may add for each waypoint that it removes, metres of level ground.
+    #[schemars(transform = limits::not_negative)]
     pub smoothing_tolerance_m: f64,
     /// Steepest climb, degrees; the vehicle's if absent, or 30 without a vehicle.
+    #[schemars(transform = limits::between(0.0, 90.0))]
     pub max_up_deg: Option<f64>,
     /// Steepest descent, degrees; the vehicle's if absent, or 30 without a vehicle.
+    #[schemars(transform = limits::between(0.0, 90.0))]
     pub max_down_deg: Option<f64>,
     /// Costs of travel besides length.
     pub cost: Cost,
     /// Weight of climbing.
+    #[schemars(transform = limits::not_negative)]
     pub up_weight: f64,
     /// Weight of descending.
+    #[schemars(transform = limits::not_negative)]
     pub down_weight: f64,
     /// `cost = "energy"`: least cost per metre, above 0 and at most 1, because descents return no energy.
     pub energy_floor: f64,
     /// `cost = "class"`: factors of low, semi and high roughness.
+    #[schemars(transform = limits::positive)]
     pub class_factors: [f64; 3],
     /// `cost = "band_rms"`: weight of the RMS, 1/m.
+    #[schemars(transform = limits::not_negative)]
     pub band_rms_weight_per_m: f64,
     /// Width of the team, m: narrower gaps cost more (CanFit); gaps are ignored if absent.
+    #[schemars(transform = limits::positive)]
     pub width_m: Option<f64>,
     /// Weight of narrow gaps: cost is multiplied by `1 + weight (width / gap - 1)`, at most `clearance_max`.
+    #[schemars(transform = limits::not_negative)]
     pub clearance_weight: f64,
     /// Largest factor for a narrow gap.
+    #[schemars(transform = limits::half_open(1.0, f64::INFINITY))]
     pub clearance_max: f64,
     /// Distance kept from obstacles, m.
+    #[schemars(transform = limits::not_negative)]
     pub obstacle_margin_m: f64,
 }
 

@@ -7,7 +7,7 @@ use crate::description::ImageDescription;
 use crate::pose::CameraPose;
 use crate::sun::Sun;
 use sastrugi_numeric::Geometry;
-use sastrugi_schemas::{ParameterError, shown};
+use sastrugi_schemas::{ParameterError, limits, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -25,6 +25,7 @@ pub struct FirstImageErrors {
     /// Added to the elevation of its sun, deg.
     pub sun_elevation_deg: f64,
     /// Relative error of its exposure; positive if too high.
+    #[schemars(transform = limits::between(-1.0, f64::INFINITY))]
     pub exposure: f64,
     /// Added to its haze, I/F.
     pub haze: f64,

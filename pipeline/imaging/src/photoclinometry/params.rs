@@ -3,7 +3,7 @@
 use super::described::FirstImageErrors;
 use crate::description::Noise;
 use crate::photometry::Photometry;
-use sastrugi_schemas::{ParameterError, shown};
+use sastrugi_schemas::{ParameterError, limits, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,12 +33,16 @@ pub enum Integration {
 #[serde(deny_unknown_fields, default)]
 pub struct Stereo {
     /// Spacing of the points, cells.
+    #[schemars(range(min = 1, max = 4096))]
     pub spacing: usize,
     /// Cells from the centre of a window to its edge: a window has `2 reach + 1` cells along a side.
+    #[schemars(range(min = 2, max = 64))]
     pub reach: usize,
     /// Largest offset searched, pixels.
+    #[schemars(range(min = 1, max = 64))]
     pub search: usize,
     /// Smallest normalised correlation of an accepted point.
+    #[schemars(transform = limits::between(0.0, 1.0))]
     pub quality: f64,
 }
 
@@ -53,6 +57,7 @@ impl Default for Stereo {
 #[serde(deny_unknown_fields, default)]
 pub struct Settings {
     /// Cell size of the map, m; the finest pixel of parallel cameras when absent.
+    #[schemars(transform = limits::positive)]
     pub cell_m: Option<f64>,
     /// Window of the map, `[x0, y0, x1, y1]`, m; the ground common to all images when absent.
     pub window_m: Option<[f64; 4]>,
@@ -65,12 +70,16 @@ pub struct Settings {
     /// Scale `noise` to the residuals of cells lit in four or more images.
     pub estimate_noise: bool,
     /// A pixel darker than this share of its image's median (minus haze) counts as shadow and is not used.
+    #[schemars(transform = limits::not_negative)]
     pub shadow: f64,
     /// Maximum number of re-projection rounds, up to 20.
+    #[schemars(range(min = 1, max = ROUNDS_MAX))]
     pub rounds: usize,
     /// Rounds end when heights change by less than this (rms, cells).
+    #[schemars(transform = limits::positive)]
     pub tolerance: f64,
     /// Albedo of the complete surface, if it is known; otherwise it is estimated in every cell.
+    #[schemars(transform = limits::positive)]
     pub albedo: Option<f64>,
     /// Estimate the exposure of every image, up to a common factor.
     pub free_exposure: bool,
@@ -79,17 +88,22 @@ pub struct Settings {
     /// Method of integrating slopes to heights.
     pub integration: Integration,
     /// Number of paths of the published integration, up to 450.
+    #[schemars(range(min = 1, max = PATHS_MAX))]
     pub paths: usize,
     /// Correlate windows for stereo points.
     pub stereo: Option<Stereo>,
     /// Cells whose slopes and albedo have a condition number above this get the prior of poorly lit cells.
+    #[schemars(transform = limits::positive)]
     pub condition_max: f64,
     /// Largest share of the cells that may take their albedo from their neighbours, 0 to 1; an inversion with a larger share is refused. Ignored
     /// if `albedo` is given.
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub leaning_max: f64,
     /// Standard deviation of the slopes of poorly lit cells about those of the current surface.
+    #[schemars(transform = limits::positive)]
     pub slope_prior: f64,
     /// Number of perturbed solutions for the uncertainty of heights; 0 to omit it.
+    #[schemars(range(max = SAMPLES_MAX))]
     pub samples: usize,
 }
 

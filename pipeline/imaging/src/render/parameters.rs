@@ -4,7 +4,7 @@ use crate::description::{Noise, check_radiometry};
 use crate::photometry::Photometry;
 use crate::pose::CameraParameters;
 use crate::sun::Sun;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -23,14 +23,17 @@ pub struct RenderParameters {
     /// Photometric function.
     pub photometry: Photometry,
     /// Albedo where the surface has no albedo map, 0 to 1 (default: sand of `planetary`).
+    #[schemars(transform = limits::within(0.0, 1.0))]
     pub albedo: f64,
     /// Factor applied to the brightness.
+    #[schemars(transform = limits::positive)]
     pub exposure: f64,
     /// Brightness added to every pixel (I/F).
     pub haze: f64,
     /// Noise of the camera; none when absent.
     pub noise: Noise,
     /// Rays along a side of a pixel: a pixel is the mean of `samples` x `samples` rays.
+    #[schemars(range(min = 1, max = SAMPLES_MAX))]
     pub samples: u32,
     /// Whether to render cast shadows; facets that face away from the sun are dark either way.
     pub shadows: bool,

@@ -1,6 +1,6 @@
 //! Parameters of random straight missions.
 
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -20,12 +20,16 @@ const COUNT_MAX: u32 = 9999;
 #[serde(deny_unknown_fields, default)]
 pub struct MissionParameters {
     /// Missions per terrain, 1 to 9999 (Majhor and Bos, section 2.3: 20).
+    #[schemars(range(min = 1, max = COUNT_MAX))]
     pub count: u32,
     /// Straight distance from start to goal, m (section 2.3: 35).
+    #[schemars(transform = limits::positive)]
     pub length_m: f64,
     /// Starts and goals lie farther than this from the edge of the terrain, m (section 2.3: 5).
+    #[schemars(transform = limits::not_negative)]
     pub border_m: f64,
     /// Maximum number of draws of start and heading per mission; beyond it the terrain is rejected.
+    #[schemars(range(min = 1))]
     pub max_draws: u32,
 }
 

@@ -10,7 +10,7 @@
 
 use super::{Mission, normalized};
 use sastrugi_numeric::Streams;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::TAU;
@@ -29,10 +29,13 @@ const REPLICATES_MAX: u32 = 1000;
 #[serde(deny_unknown_fields, default)]
 pub struct ReplicateParameters {
     /// Starts driven for each mission, 1 to 1000: the drawn one, which is recorded, and perturbed ones.
+    #[schemars(range(min = 1, max = REPLICATES_MAX))]
     pub replicates: u32,
     /// Perturbed starts lie within this distance of the drawn one, m; below the missions' length.
+    #[schemars(transform = limits::not_negative)]
     pub start_tolerance_m: f64,
     /// Perturbed starts face within this angle of the drawn heading, deg, 0 to 180.
+    #[schemars(transform = limits::within(0.0, 180.0))]
     pub start_tolerance_deg: f64,
 }
 

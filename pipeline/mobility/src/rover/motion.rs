@@ -3,7 +3,7 @@
 use super::draws::{CycleDraws, Purpose};
 use super::policies::Command;
 use super::pose::Pose;
-use sastrugi_schemas::{ParameterError, shown};
+use sastrugi_schemas::{ParameterError, limits, shown};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -15,14 +15,19 @@ const DEVIATION_MAX: f64 = 10.0;
 #[serde(deny_unknown_fields, default)]
 pub struct NoiseParameters {
     /// Standard deviation of sensed heights, m.
+    #[schemars(transform = limits::not_negative)]
     pub height_m: f64,
     /// Share of a commanded distance that is lost to slip, below 1.
+    #[schemars(transform = limits::half_open(0.0, 1.0))]
     pub slip: f64,
     /// Standard deviation of that share from cycle to cycle.
+    #[schemars(transform = limits::within(0.0, DEVIATION_MAX))]
     pub slip_deviation: f64,
     /// Relative standard deviation of a turn.
+    #[schemars(transform = limits::within(0.0, DEVIATION_MAX))]
     pub turn: f64,
     /// Standard deviation of the heading drift over 1 m of driving, rad; it grows with the square root of the distance.
+    #[schemars(transform = limits::within(0.0, DEVIATION_MAX))]
     pub drift_rad: f64,
     /// Whether the rover estimates its position from its own commands alone, so turn errors, drift and slip go unnoticed.
     pub dead_reckoning: bool,

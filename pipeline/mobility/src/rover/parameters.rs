@@ -7,7 +7,7 @@ use super::sensing::{RaySensor, RectangleSensor, Sensor};
 use super::starts::{self, Disk, Facing, Start};
 use super::trial::Task;
 use sastrugi_numeric::Streams;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -26,43 +26,62 @@ const PARTS_MAX: usize = 64;
 pub struct SojournerParameters {
     /// Scale factor of all lengths of body, sensor and drives. It does not apply to the hazard heights, the clearance, the
     /// goal tolerance and the distance limit.
+    #[schemars(transform = limits::between(0.0, SCALE_MAX))]
     pub scale: f64,
     /// Distance of the axles from the centre, m (our choice, approximately that of the flight rover).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub axle_m: f64,
     /// Distance of the wheels from the centre line, m (our choice).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub track_m: f64,
     /// Distance of the nose ahead of the centre, m (our choice).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub nose_m: f64,
     /// Height of the sensor above the plane of the wheel contacts, m (our choice).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub sensor_height_m: f64,
     /// Lateral offsets of the ray columns from the centre line, left positive, from left to right, m (the paper: 20 rays; their
     /// positions are our choice).
+    #[schemars(length(min = 1, max = PARTS_MAX))]
     pub columns_m: Vec<f64>,
     /// Distances beyond the nose at which the rays of a column are aimed, m (our choice).
+    #[schemars(length(min = 1, max = PARTS_MAX), transform = limits::positive)]
     pub rows_m: Vec<f64>,
     /// Hazard height, m (our choice: the wheel radius).
+    #[schemars(transform = limits::positive)]
     pub hazard_step_m: f64,
     /// Largest height difference in a view without a hazard, m (our choice: the wheel diameter).
+    #[schemars(transform = limits::positive)]
     pub hazard_span_m: f64,
     /// Largest tilt, deg (our choice).
+    #[schemars(transform = limits::between(0.0, 90.0))]
     pub tilt_max_deg: f64,
     /// Turn per cycle, deg (our choice).
+    #[schemars(transform = limits::between(0.0, 90.0))]
     pub turn_deg: f64,
     /// Standard deviation of a turn away from a hazard, rad (our choice).
+    #[schemars(transform = limits::not_negative)]
     pub turn_noise_rad: f64,
     /// Distance driven straight on after a hazard, m (our choice).
+    #[schemars(transform = limits::not_negative)]
     pub pass_m: f64,
     /// Distance driven per cycle, m (the paper: at most the wheel radius, 65 mm).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub step_m: f64,
     /// Bearing error to the goal that is not corrected, rad (our choice).
+    #[schemars(transform = limits::not_negative)]
     pub bearing_tolerance_rad: f64,
     /// Distance from the goal within which a rover has arrived, whatever its `scale`, m (our choice).
+    #[schemars(transform = limits::positive)]
     pub goal_tolerance_m: f64,
     /// Height above the sand over which a rock under the rover counts as a contact, m (our choice: the wheel diameter).
+    #[schemars(transform = limits::positive)]
     pub clearance_m: f64,
     /// Largest distance driven, m (our choice; the longest in the paper: 902.5).
+    #[schemars(transform = limits::positive)]
     pub distance_limit_m: f64,
     /// Maximum number of cycles (our choice).
+    #[schemars(range(min = 1))]
     pub cycle_limit: u32,
 }
 
@@ -98,45 +117,65 @@ impl Default for SojournerParameters {
 pub struct SchoppersParameters {
     /// Scale factor of all lengths of body, sensor and drives, including `progress_m`. It does not apply to the clearance, the
     /// goal tolerance and the distance limit.
+    #[schemars(transform = limits::between(0.0, SCALE_MAX))]
     pub scale: f64,
     /// Distance of the axles from the centre, m (our choice).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub axle_m: f64,
     /// Distance of the wheels from the centre line, m (our choice).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub track_m: f64,
     /// Distance of the near edge of the sensor ahead of the centre, m (our choice).
+    #[schemars(transform = limits::not_negative)]
     pub sensor_near_m: f64,
     /// Length of the sensed area, m (the paper: 1).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub sensor_length_m: f64,
     /// Total width of the sensed area, m (the paper: 2).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub sensor_width_m: f64,
     /// Rectangles of the sensor, side by side, at least 2 (the paper: 4).
+    #[schemars(range(min = 2, max = PARTS_MAX))]
     pub rectangles: u32,
     /// Height above the sand over which a rock makes a rectangle unsafe, and counts as a contact under the rover, m (our choice:
     /// the wheel diameter).
+    #[schemars(transform = limits::positive)]
     pub clearance_m: f64,
     /// Steepest safe sand, deg (our choice).
+    #[schemars(transform = limits::between(0.0, 90.0))]
     pub slope_max_deg: f64,
     /// Largest tilt of the rover itself, deg (our choice).
+    #[schemars(transform = limits::between(0.0, 90.0))]
     pub tilt_max_deg: f64,
     /// Turn per cycle, deg (our choice).
+    #[schemars(transform = limits::between(0.0, 90.0))]
     pub turn_deg: f64,
     /// Distance driven per cycle, m (our choice).
+    #[schemars(transform = limits::between(0.0, LENGTH_MAX_M))]
     pub step_m: f64,
     /// Bearing error below which it turns to the goal even if the outer rectangle on that side is unsafe, rad (our choice).
+    #[schemars(transform = limits::not_negative)]
     pub bearing_tolerance_rad: f64,
     /// Commitment: distance driven after turning away before it turns to the goal again, m (our choice).
+    #[schemars(transform = limits::positive)]
     pub commit_m: f64,
     /// Growth factor of the commitment after a full turn without finding a way (our choice).
+    #[schemars(transform = limits::half_open(1.0, f64::INFINITY))]
     pub commit_growth: f64,
     /// Largest commitment, m (our choice).
+    #[schemars(transform = limits::positive)]
     pub commit_max_m: f64,
     /// Progress towards the goal after which the commitment is reset to `commit_m`, m (our choice).
+    #[schemars(transform = limits::positive)]
     pub progress_m: f64,
     /// Distance from the goal within which a rover has arrived, whatever its `scale`, m (our choice).
+    #[schemars(transform = limits::positive)]
     pub goal_tolerance_m: f64,
     /// Largest distance driven, m (our choice).
+    #[schemars(transform = limits::positive)]
     pub distance_limit_m: f64,
     /// Maximum number of cycles (our choice).
+    #[schemars(range(min = 1))]
     pub cycle_limit: u32,
 }
 
@@ -210,8 +249,10 @@ pub struct PlannerMap {
     #[serde(skip_serializing)]
     pub sensor: PlannerSensor,
     /// Cell size of its map, m (our choice: that of the oracle's map).
+    #[schemars(transform = limits::positive)]
     pub map_cell_m: f64,
     /// Initial margin of its map around start and goal, m; the map grows if a path needs more (our choice).
+    #[schemars(transform = limits::positive)]
     pub map_beyond_m: f64,
 }
 
@@ -249,24 +290,31 @@ pub enum Starts {
 #[serde(deny_unknown_fields, default)]
 pub struct RoverParameters {
     /// Rovers on each world, 1 to 9999 (the paper: 100).
+    #[schemars(range(min = 1, max = ROVERS_MAX))]
     pub rovers: u32,
     /// Where they start.
     pub starts: Starts,
     /// Centre of the circle or disk, m; on a circle it is the goal.
     pub centre_m: [f64; 2],
     /// Radius of the circle or disk, m (the paper: 25).
+    #[schemars(transform = limits::positive)]
     pub radius_m: f64,
     /// Distance from drawn starts to their goals, m.
+    #[schemars(transform = limits::positive)]
     pub distance_m: f64,
     /// Which way rovers face at the start (our choice; rovers that face the goal do better).
     pub facing: Facing,
     /// Radius around starts and goals that is kept free of rocks, m (our choice); on planetary worlds only.
+    #[schemars(transform = limits::not_negative)]
     pub clear_m: f64,
     /// Sample spacing of the ground, m (the paper: 0.02); on planetary worlds only, other terrains use their own cells.
+    #[schemars(transform = limits::positive)]
     pub cell_m: f64,
     /// Driving speed, m/s (our choice).
+    #[schemars(transform = limits::between(1e-5, 1e3))]
     pub speed_m_s: f64,
     /// Turn rate, deg/s (our choice).
+    #[schemars(transform = limits::between(1e-3, 1e5))]
     pub turn_rate_deg_s: f64,
     /// Noise of sensing and motion.
     pub noise: NoiseParameters,

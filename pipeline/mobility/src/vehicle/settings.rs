@@ -6,7 +6,7 @@ use super::surface::SurfaceParameters;
 use super::vector::{Vec3, add};
 use crate::metrics::Differentiator;
 use crate::registry;
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
@@ -15,35 +15,46 @@ use serde_json::{Map, Value};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct TraverseParameters {
-    /// Kind of vehicle (see `sastrugi kinds`), or `custom`, in which case `vehicle_changes` holds all parameters.
+    /// Kind of vehicle (see `sastrugi kinds vehicle`), or `custom`, in which case `vehicle_changes` holds all parameters.
     pub vehicle: String,
-    /// Vehicle parameters that differ from its data file, such as `{ drive = { torque_limit_n_m = 30 } }`.
+    /// Vehicle parameters that differ from its data file, such as `{ drive = { torque_limit_n_m = 30 } }`; `sastrugi kinds husky_a200` lists all.
     pub vehicle_changes: Map<String, Value>,
     /// Friction and rolling resistance of the ground.
     pub surface: SurfaceParameters,
     /// Path following.
     pub controller: ControllerParameters,
     /// Commanded speed, m/s (Majhor and Bos, section 2.3: 1).
+    #[schemars(transform = limits::positive)]
     pub speed_m_s: f64,
     /// The goal counts as reached within this horizontal distance, m (chosen here).
+    #[schemars(transform = limits::positive)]
     pub goal_tolerance_m: f64,
     /// Pitch or roll beyond this angle is a tip-over, deg, below 90 (Majhor and Bos, section 2.4: 75).
+    #[schemars(transform = limits::between(0.0, 90.0))]
     pub tip_deg: f64,
     /// A vehicle that moves less than this horizontally within `stuck_time_s` is stuck, m (section 2.4: 0.2).
+    #[schemars(transform = limits::positive)]
     pub stuck_distance_m: f64,
     /// Time without motion after which a vehicle is stuck, s (section 2.4: 30).
+    #[schemars(transform = limits::positive)]
     pub stuck_time_s: f64,
     /// Time limit of a mission, s (chosen here: about seven times the undisturbed drive).
+    #[schemars(transform = limits::between(0.0, TIME_MAX_S))]
     pub timeout_s: f64,
     /// Settling time on the ground before the clock starts, s; up to ten times as long while the suspension still moves.
+    #[schemars(transform = limits::half_open(0.0, TIME_MAX_S))]
     pub settle_s: f64,
     /// Time steps per second, Hz (500; 1000 to check convergence).
+    #[schemars(range(min = 1, max = STEP_RATE_MAX_HZ))]
     pub step_rate_hz: u32,
     /// Rate of recorded poses, wheels and commands, Hz; divides `step_rate_hz` (section 2.4: 20).
+    #[schemars(range(min = 1))]
     pub sample_rate_hz: u32,
     /// Rate of recorded inertial measurements, Hz; divides `step_rate_hz`.
+    #[schemars(range(min = 1))]
     pub imu_rate_hz: u32,
     /// Rate of the steering, Hz; divides `step_rate_hz`.
+    #[schemars(range(min = 1))]
     pub control_rate_hz: u32,
     /// How the recorded poses are differentiated for the metrics.
     pub differentiator: Differentiator,
@@ -54,18 +65,24 @@ pub struct TraverseParameters {
 #[serde(deny_unknown_fields, default)]
 pub struct ControllerParameters {
     /// Look-ahead distance, measured along the line from the vehicle's foot point, m; three wheelbases when absent (assumed).
+    #[schemars(transform = limits::positive)]
     pub lookahead_m: Option<f64>,
     /// Look-ahead time, s: the look-ahead distance is the larger of `lookahead_m` and the commanded speed times this; it does
     /// not grow with speed when absent.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(transform = limits::positive)]
     pub lookahead_time_s: Option<f64>,
     /// Factor on the yaw rate of the pursuit arc (assumed: 1, the plain arc).
+    #[schemars(transform = limits::positive)]
     pub steering_gain: f64,
     /// Bearing of the look-ahead point beyond which the vehicle turns on the spot, deg (assumed: the point is behind).
+    #[schemars(transform = limits::between(0.0, 180.0))]
     pub turn_start_deg: f64,
     /// Bearing below which it resumes driving, deg; below `turn_start_deg` (assumed).
+    #[schemars(transform = limits::between(0.0, 180.0))]
     pub turn_stop_deg: f64,
     /// Yaw rate of a turn on the spot, rad/s (assumed: half of the vehicle's limit).
+    #[schemars(transform = limits::positive)]
     pub turn_rate_rad_s: f64,
 }
 

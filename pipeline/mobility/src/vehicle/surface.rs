@@ -5,7 +5,7 @@
 //! coefficients, not a soil model.
 
 use sastrugi_numeric::Grid;
-use sastrugi_schemas::{ParameterError, RoughnessClass};
+use sastrugi_schemas::{ParameterError, RoughnessClass, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,10 +16,13 @@ pub struct SurfaceParameters {
     /// Material of the ground.
     pub preset: SurfacePreset,
     /// Friction coefficient between tyre and ground; the preset's when absent.
+    #[schemars(transform = limits::not_negative)]
     pub wheel_friction: Option<f64>,
     /// Friction coefficient between chassis and ground; the preset's when absent.
+    #[schemars(transform = limits::not_negative)]
     pub belly_friction: Option<f64>,
     /// Rolling resistance coefficient (resistance divided by normal force); the preset's when absent.
+    #[schemars(transform = limits::not_negative)]
     pub rolling_resistance: Option<f64>,
     /// Surface of cells of low roughness, if it differs.
     pub low: Option<ClassSurfaceParameters>,
@@ -36,10 +39,13 @@ pub struct ClassSurfaceParameters {
     /// Material of the ground; the study's surface when absent.
     pub preset: Option<SurfacePreset>,
     /// Friction coefficient between tyre and ground.
+    #[schemars(transform = limits::not_negative)]
     pub wheel_friction: Option<f64>,
     /// Friction coefficient between chassis and ground.
+    #[schemars(transform = limits::not_negative)]
     pub belly_friction: Option<f64>,
     /// Rolling resistance coefficient (resistance divided by normal force).
+    #[schemars(transform = limits::not_negative)]
     pub rolling_resistance: Option<f64>,
 }
 

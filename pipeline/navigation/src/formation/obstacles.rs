@@ -1,7 +1,7 @@
 //! Moving obstacles: discs that follow polylines and give way to nobody.
 
 use super::plane::{Vector, add, distance, scale, sub};
-use sastrugi_schemas::ParameterError;
+use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -13,13 +13,17 @@ mod tests;
 #[serde(deny_unknown_fields)]
 pub struct MovingObstacle {
     /// Polyline `[[x, y], ...]` in the terrain's coordinates, m; the obstacle stays at the first point until it starts.
+    #[schemars(length(min = 1))]
     pub points_m: Vec<Vector>,
     /// Speed, above 0, m/s.
+    #[schemars(transform = limits::positive)]
     pub speed_m_s: f64,
     /// Radius, above 0, m.
+    #[schemars(transform = limits::positive)]
     pub radius_m: f64,
     /// Start time, at least 0, s.
     #[serde(default)]
+    #[schemars(transform = limits::not_negative)]
     pub start_s: f64,
 }
 

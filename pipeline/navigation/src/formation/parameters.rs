@@ -2,9 +2,9 @@
 
 use super::crowd::CrowdSettings;
 use super::obstacles::MovingObstacle;
-use super::shape::{Formation, FormationError, Pattern, SlotParameters};
+use super::shape::{Formation, FormationError, MEMBERS_MAX, Pattern, SlotParameters};
 use super::speeds::{Bands, SpeedLimits};
-use sastrugi_schemas::{ParameterError, counted};
+use sastrugi_schemas::{ParameterError, counted, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -51,6 +51,7 @@ impl Shape {
 #[serde(deny_unknown_fields)]
 pub struct Loss {
     /// Time since the start, 0 or later, s.
+    #[schemars(transform = limits::not_negative)]
     pub time_s: f64,
     /// Member, counted from 1.
     pub member: u32,
@@ -63,47 +64,64 @@ pub struct TeamParameters {
     /// Formation.
     pub formation: Shape,
     /// Number of members; 4 if absent. A custom formation has one per slot.
+    #[schemars(range(min = 1, max = MEMBERS_MAX))]
     pub members: Option<u32>,
     /// Distance between adjacent slots, m. Errors up to 20 % of it count as in range, up to 40 % as tolerable.
+    #[schemars(transform = limits::positive)]
     pub spacing_m: f64,
     /// Slots of a custom formation.
     pub slots: Vec<SlotParameters>,
     /// Radius of a member, m.
+    #[schemars(transform = limits::positive)]
     pub radius_m: f64,
     /// Clearance between the discs of two members at their targets, m.
+    #[schemars(transform = limits::not_negative)]
     pub margin_m: f64,
     /// Mean speed, m/s.
+    #[schemars(transform = limits::positive)]
     pub speed_m_s: f64,
     /// Lowest speed of a moving member, m/s.
+    #[schemars(transform = limits::positive)]
     pub speed_min_m_s: f64,
     /// Highest speed, m/s.
+    #[schemars(transform = limits::positive)]
     pub speed_max_m_s: f64,
     /// Acceleration, m/s^2.
+    #[schemars(transform = limits::positive)]
     pub accelerate_m_s2: f64,
     /// Deceleration, m/s^2.
+    #[schemars(transform = limits::positive)]
     pub slow_m_s2: f64,
     /// Tolerated deviation from a slot's depth before speeds change, as a share of the depth, or of the spacing if that is larger.
+    #[schemars(transform = limits::between(0.0, 0.5))]
     pub tolerance: f64,
     /// Adjust speeds as in the listing of Algorithm 8, which slows down a member that lags.
     pub literal_speeds: bool,
     /// Largest distance between waypoints, m: longer legs of the route are divided; `spacing_m` if absent.
+    #[schemars(transform = limits::positive)]
     pub waypoint_spacing_m: Option<f64>,
     /// Use only the waypoints of the route, as in the thesis.
     pub literal_waypoints: bool,
     /// Let a member plan a detour if the directions of Algorithm 7 make no progress; the thesis has none.
     pub detours: bool,
     /// Distance at which a target counts as reached, m.
+    #[schemars(transform = limits::positive)]
     pub arrive_m: f64,
     /// Time step, s.
+    #[schemars(transform = limits::positive)]
     pub step_s: f64,
     /// Number of steps that members check ahead on the ground.
+    #[schemars(range(min = 1))]
     pub look_ahead: u32,
     /// Distance from the leader within which the team sees the ground, m: it then plans from start to goal on the ground seen so far. If absent, it
     /// follows the route.
+    #[schemars(transform = limits::positive)]
     pub sensing_radius_m: Option<f64>,
     /// Time limit of the run, s; if absent, ten times the time for the route at mean speed, plus ten minutes.
+    #[schemars(transform = limits::positive)]
     pub time_max_s: Option<f64>,
     /// Rate of the recorded samples, Hz; it must be the rate of the steps divided by an integer.
+    #[schemars(transform = limits::positive)]
     pub sample_rate_hz: f64,
     /// Members lost during the run.
     pub losses: Vec<Loss>,
@@ -241,8 +259,9 @@ impl TeamParameters {
             }
             Some(pattern) => {
                 let members = self.members.unwrap_or(MEMBERS);
-                if !(1..=1000).contains(&members) {
-                    return Err(ParameterError::new("members", format!("is {members}; it must be from 1 to 1000")));
+                if !(1..=MEMBERS_MAX as u32).contains(&members) {
+                    let message = format!("is {members}; it must be from 1 to {MEMBERS_MAX}");
+                    return Err(ParameterError::new("members", message));
                 }
                 return Formation::new(&pattern.slots(members, self.spacing_m), self.radius_m)
                     .map_err(|e| refused("spacing_m", &e));

@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 mod tests;
 
 /// Largest number of members of a team.
-const MEMBERS_MAX: usize = 1000;
+pub(super) const MEMBERS_MAX: usize = 1000;
 
 /// A slot as stated in a study.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
