@@ -31,6 +31,22 @@ impl Kind {
     pub fn sources(&self) -> Option<&Value> {
         self.parameters.get("x-sources")
     }
+
+    /// Summary and source, as two sentences.
+    ///
+    /// ```
+    /// use sastrugi_schemas::Kind;
+    ///
+    /// let (summary, source) = ("a trench across level ground", "MAVS random_scene.cpp");
+    /// let kind = Kind { family: "terrain", kind: "gap", summary, source, parameters: serde_json::json!({}) };
+    /// assert_eq!(kind.description(), "A trench across level ground. Source: MAVS random_scene.cpp.");
+    /// ```
+    pub fn description(&self) -> String {
+        let [summary, source] = [self.summary, self.source].map(|text| text.trim_end_matches('.'));
+        let first = summary.chars().take(1).flat_map(char::to_uppercase);
+        let summary: String = first.chain(summary.chars().skip(1)).collect();
+        format!("{summary}. Source: {source}.")
+    }
 }
 
 /// An invalid parameter.

@@ -4,13 +4,19 @@
 //! every reference can be resolved. Each kind of a section is one alternative, with all keys of its tables.
 
 use crate::registry::{Form, SECTIONS, Section};
+use sastrugi_mobility::registry::CUSTOM;
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::study::StudyHead;
+use sastrugi_texture::covariance::Form as CovarianceForm;
 use serde_json::{Map, Value, json};
 
 /// Key of a table that names several kinds at once and accepts the keys of all of them.
 const SEVERAL: &str = "methods";
+/// Keys of a size, of which a table may have one.
+const SIZES: [&str; 2] = ["size_m", "size_px"];
+/// Key with the lists of values of swept parameters.
+const SWEEP: &str = "sweep";
 
 /// Title of the schema, by which a file that holds one is recognised.
 const TITLE: &str = "sastrugi study";
@@ -35,6 +41,7 @@ pub fn study_schema() -> Value {
         };
         properties.insert(section.name.to_owned(), section_schema);
     }
+    add_names(&mut definitions);
     json!({
         "$schema": "https://json-schema.org/draft/2020-12/schema",
         "title": TITLE,
@@ -57,6 +64,25 @@ pub fn study_schema() -> Value {
 /// ```
 pub fn is_own(text: &[u8]) -> bool {
     serde_json::from_slice::<Value>(text).is_ok_and(|schema| schema["title"] == TITLE)
+}
+
+/// Adds the names that the room of the envelopes does not know: those of covariance models and of vehicles.
+fn add_names(definitions: &mut Map<String, Value>) {
+    let fit = definitions.get_mut("texture.FitReference");
+    if let Some(model) = fit.and_then(|fit| fit.pointer_mut("/anyOf/1/properties/model")) {
+        model["pattern"] = format!("^{}$", CovarianceForm::pattern()).into();
+    }
+    let kinds = sastrugi_mobility::registry::kinds().into_iter().filter(|kind| kind.family == "vehicle");
+    let mut names: Vec<Value> = kinds.map(|kind| json!({ "const": kind.kind, "description": kind.summary })).collect();
+    let shipped = Value::Array(names.clone());
+    names.push(json!({ "const": CUSTOM, "description": "a vehicle of which `vehicle_changes` holds all parameters" }));
+    let all = Value::Array(names);
+    for definition in definitions.values_mut() {
+        let is_custom = definition.pointer("/properties/vehicle_changes").is_some();
+        if let Some(vehicle) = definition.pointer_mut("/properties/vehicle") {
+            vehicle["oneOf"] = if is_custom { all.clone() } else { shipped.clone() };
+        }
+    }
 }
 
 /// Moves a schema and its definitions to the root; returns the reference that replaces it.
@@ -92,7 +118,13 @@ fn rename(schema: &mut Value, name: &str) {
 
 /// A table of a section: the keys of the envelope and of its kind.
 fn table(section: &Section, definitions: &mut Map<String, Value>) -> Value {
-    let place = hoist(section.name, (section.envelope)(), definitions);
+    let mut envelope = (section.envelope)();
+    if let Some(sweep) = envelope.pointer_mut(&format!("/properties/{SWEEP}")) {
+        // The values become words of ids.
+        let value = json!({ "type": ["number", "string", "boolean"] });
+        sweep["additionalProperties"] = json!({ "type": "array", "minItems": 1, "items": value });
+    }
+    let place = hoist(section.name, envelope, definitions);
     let envelope = definitions.get(section.name).and_then(|e| e["properties"].as_object()).cloned().unwrap_or_default();
     let (selector, kinds) = (section.selector(), section.distinct_kinds());
     let mut own: Vec<(String, Map<String, Value>)> = Vec::new();
@@ -112,7 +144,14 @@ fn table(section: &Section, definitions: &mut Map<String, Value>) -> Value {
     for (name, properties) in own.into_iter().chain(side_by_side) {
         let Some(definition) = definitions.get_mut(&name) else { continue };
         let title = definition["title"].clone();
+        let swept = swept(&properties);
         definition["properties"] = Value::Object(envelope.clone().into_iter().chain(properties).collect());
+        if envelope.contains_key(SWEEP) {
+            definition["properties"][SWEEP]["propertyNames"] = swept;
+        }
+        if SIZES.iter().all(|key| definition["properties"].get(key).is_some()) {
+            definition["not"] = json!({ "required": SIZES });
+        }
         if let Some(key) = selector.filter(|_| title != SEVERAL) {
             definition["properties"][key] = json!({ "const": title });
         }
@@ -129,13 +168,19 @@ fn table(section: &Section, definitions: &mut Map<String, Value>) -> Value {
     place
 }
 
+/// The parameters that a sweep may name: keys of the kind, and those of tables below them.
+fn swept(parameters: &Map<String, Value>) -> Value {
+    let keys: Vec<&str> = parameters.keys().map(String::as_str).collect();
+    json!({ "pattern": format!("^({})(\\..+)?$", keys.join("|")) })
+}
+
 /// The keys of a kind. None is required here, since a required key may come from a sweep.
 fn parameters_of(kind: &Kind) -> Value {
     let mut parameters = kind.parameters.clone();
     if let Some(object) = parameters.as_object_mut() {
         ["required", "default"].into_iter().for_each(|key| drop(object.remove(key)));
         object.insert("title".to_owned(), kind.kind.into());
-        object.insert("description".to_owned(), format!("{} Source: {}", kind.summary, kind.source).into());
+        object.insert("description".to_owned(), kind.description().into());
     }
     parameters
 }
@@ -143,8 +188,11 @@ fn parameters_of(kind: &Kind) -> Value {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::error::Error;
+    use crate::loaded::load_text;
     use crate::starting::STARTING;
-    use crate::study::StudyText;
+    use crate::study::{StudyError, StudyText};
+    use std::path::Path;
 
     /// Every `$ref` in a value.
     fn references<'a>(value: &'a Value, found: &mut Vec<&'a str>) {
@@ -191,6 +239,119 @@ mod tests {
         }
         assert!(definitions["terrain.multifractal"]["properties"].get("high").is_some());
         assert!(definitions["terrain.gap"]["properties"].get("high").is_none());
+    }
+
+    /// Vehicles and covariance models are named, and only where they may be; a sweep names keys of its kind.
+    #[test]
+    fn val_names_are_listed() {
+        let schema = study_schema();
+        let property = |definition: &str, key: &str| &schema["$defs"][definition]["properties"][key];
+        let vehicles = |definition: &str| -> Vec<&str> {
+            let all = property(definition, "vehicle")["oneOf"].as_array().unwrap();
+            all.iter().map(|vehicle| vehicle["const"].as_str().unwrap()).collect()
+        };
+        let shipped = ["husky_a200", "ugv_4x4", "rocker_bogie_rover"];
+        assert_eq!((vehicles("route.grid"), vehicles("missions.routed")), (shipped.to_vec(), shipped.to_vec()));
+        assert_eq!(vehicles("traverse.pure_pursuit"), [&shipped[..], &["custom"]].concat());
+        let model = &schema["$defs"]["texture.FitReference"]["anyOf"][1]["properties"]["model"]["pattern"];
+        assert!(model.as_str().unwrap().contains("(exponential|gaussian|"), "{model}");
+        let swept = |definition: &str| property(definition, "sweep")["propertyNames"]["pattern"].as_str().unwrap();
+        assert_eq!(
+            swept("terrain.cascade"),
+            r"^(size_m|size_px|cell_m|codimension|hurst_exponent|outer_scale_m|rms_height_m)(\..+)?$"
+        );
+        assert!(swept("texture.methods").contains("|packing|") && !swept("texture.fft_ma").contains("|packing|"));
+    }
+
+    /// Tables of a study that needs no files, by section.
+    const TABLES: [(&str, &str); 10] = [
+        ("terrain", "id = \"t\""),
+        ("texture", "id = \"x\"\nfit = { model = \"exponential\", sigma_m = 0.03, range_m = 0.3 }"),
+        ("image", "id = \"i\"\nsurface = \"t\"\nsweep.\"sun.azimuth_deg\" = [0.0, 120.0, 240.0]"),
+        ("photoclinometry", "id = \"p\"\nimages = [\"i\"]"),
+        ("missions", "id = \"m\"\nterrains = [\"t\"]"),
+        ("traverse", "id = \"d\"\nmissions = \"m\""),
+        ("route", "id = \"r\"\nterrains = [\"t\"]"),
+        ("navigate", "id = \"n\"\nroute = \"r\""),
+        ("rover", "id = \"v\"\nterrains = [\"t\"]"),
+        ("roughness", ""),
+    ];
+
+    /// The study with `line` in the table of a section, of a kind.
+    fn study_with(place: &Section, kind: Option<&str>, line: &str) -> String {
+        let mut text = "[study]\nname = \"x\"\nseed = 3\ndate = \"2026-01-01\"\n".to_owned();
+        for section in &SECTIONS {
+            let Some((name, keys)) = TABLES.iter().find(|(name, _)| *name == section.name) else { continue };
+            let heading = if section.form == Form::Table { format!("[{name}]") } else { format!("[[{name}]]") };
+            let usual = match *name {
+                "terrain" => Some("gap"),
+                "rover" => Some("sojourner_like"),
+                _ => None,
+            };
+            let here = section.name == place.name;
+            let chosen = kind.filter(|_| here).or(usual);
+            let selected = section.selector().zip(chosen).map(|(key, kind)| format!("{key} = \"{kind}\"\n"));
+            let line = if here { line } else { "" };
+            text += &format!("{heading}\n{}{keys}\n{line}\n", selected.unwrap_or_default());
+        }
+        text
+    }
+
+    /// The nearest values that a schema of a number, or of a list of numbers, excludes.
+    fn excluded(schema: &Value) -> Vec<Value> {
+        if let Some(items) = schema.get("items") {
+            let length = schema["minItems"].as_u64().unwrap_or(1) as usize;
+            return excluded(items).into_iter().map(|value| json!(vec![value; length])).collect();
+        }
+        let kinds = schema["type"].as_array().cloned().unwrap_or_else(|| vec![schema["type"].clone()]);
+        let is_whole = kinds.contains(&json!("integer"));
+        let steps = [("minimum", -1.0), ("exclusiveMinimum", 0.0), ("maximum", 1.0), ("exclusiveMaximum", 0.0)];
+        let beyond = steps.iter().filter_map(|(keyword, step)| Some(schema.get(*keyword)?.as_f64()? + step));
+        beyond.map(|value| if is_whole { json!(value as i64) } else { json!(value) }).collect()
+    }
+
+    /// The kinds of a section with their properties and those of the envelope, apart from kinds that need other tables; a section without kinds
+    /// has its envelope.
+    fn kinds_of(section: &Section) -> Vec<(Option<&'static str>, Map<String, Value>)> {
+        let envelope = (section.envelope)()["properties"].as_object().cloned().unwrap_or_default();
+        let with = |kind: Kind| {
+            let own = kind.parameters["properties"].as_object().cloned().unwrap_or_default();
+            let name = section.selector().map(|_| kind.kind);
+            (name, own.into_iter().chain(envelope.clone()).collect())
+        };
+        let alone = |kind: &Kind| !["elaborate", "routed", "trail"].contains(&kind.kind);
+        let kinds: Vec<(Option<&'static str>, Map<String, Value>)> =
+            section.distinct_kinds().into_iter().filter(alone).map(with).collect();
+        if kinds.is_empty() { vec![(None, envelope)] } else { kinds }
+    }
+
+    /// A study is refused for what the schema of a number excludes, with the key: limits are not narrower than the checks.
+    #[test]
+    fn val_limits_are_those_of_the_checks() {
+        let mut count = 0;
+        for section in SECTIONS.iter().filter(|section| TABLES.iter().any(|(name, _)| *name == section.name)) {
+            for (kind, properties) in kinds_of(section) {
+                for (key, value) in
+                    properties.iter().flat_map(|(key, schema)| excluded(schema).into_iter().map(move |v| (key, v)))
+                {
+                    let line = format!("{key} = {value}");
+                    let place = format!("[[{}]] {kind:?}: {line}", section.name);
+                    let found = load_text(&study_with(section, kind, &line), "study", Path::new(""));
+                    let Err(Error::Study { refusals, .. }) = found else { panic!("{place} passes") };
+                    let is_told = |error: &StudyError| error.message.contains(&format!("`{key}"));
+                    assert!(refusals.0.iter().any(is_told), "{place}: {refusals}");
+                    count += 1;
+                }
+            }
+        }
+        assert!(count > 300, "{count}");
+    }
+
+    /// The study itself is valid.
+    #[test]
+    fn val_the_study_of_these_tests_is_valid() {
+        let terrain = SECTIONS.iter().find(|section| section.name == "terrain").unwrap();
+        assert!(load_text(&study_with(terrain, None, ""), "study", Path::new("")).is_ok());
     }
 
     /// The sections of the starting studies are those of the schema.

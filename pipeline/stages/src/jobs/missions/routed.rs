@@ -36,7 +36,8 @@ const STEEPEST_DEG: f64 = 85.0;
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct RoutedParameters {
-    /// Vehicle that sets the slope limits, the rolling resistance and the wavelength band; required for `cost = "energy"` and `"band_rms"`.
+    /// Vehicle that sets the slope limits, the rolling resistance and the wavelength band (see `sastrugi kinds vehicle`); required for
+    /// `cost = "energy"` and `"band_rms"`.
     pub vehicle: Option<String>,
     /// Settings of the route planner.
     pub route: RouteParameters,
