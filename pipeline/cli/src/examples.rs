@@ -2,7 +2,7 @@
 
 /// Example values of keys that have no default and appear in no starting study. The key is the full name or its last part, preceded by
 /// `section: ` where sections differ.
-pub const EXAMPLES: [(&str, &str); 151] = [
+pub const EXAMPLES: [(&str, &str); 153] = [
     ("license_file", r#""site.license.txt""#),
     ("basic_spacing_m", "0.01"),
     ("pixel_m", "0.64"),
@@ -98,6 +98,8 @@ pub const EXAMPLES: [(&str, &str); 151] = [
     ("spacing_m", "1.0"),
     ("scale_m", "0.2"),
     ("bumps", "4000"),
+    ("texture: covariance", r#""residual""#),
+    ("texture: cell_m", "0.1"),
     ("methods", r#"["fft_ma", "gaussians"]"#),
     ("modulate", "{ slope_deg = [0.0, 30.0], factor = [1.0, 0.3] }"),
     ("fill", r#""site""#),

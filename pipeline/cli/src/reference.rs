@@ -5,11 +5,15 @@ use crate::parameters::{Parameter, parameters, text_of};
 use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::study::StudyHead;
-use sastrugi_stages::registry::{Form, SECTIONS, Section};
+use sastrugi_stages::registry::{self, Form, SECTIONS, Section};
 use sastrugi_stages::starting::STARTING;
+use sastrugi_stages::verbs::parameters::to_toml;
 use serde_json::Value;
 
 const INTRODUCTION: &str = include_str!("reference.md");
+
+/// The section whose vehicles are listed below it.
+const DRIVING: &str = "traverse";
 
 /// Where a reader of the page goes from here.
 const NEXT: &str = "Next: [what a release contains](release.md), or [run the study on a cluster](cluster.md).";
@@ -32,6 +36,9 @@ pub fn study() -> String {
     for section in &SECTIONS {
         parts.push(chapter(section.name, section.form, &(section.envelope)()));
         parts.extend(kinds(section));
+        if section.name == DRIVING {
+            parts.extend(vehicles());
+        }
     }
     parts.push(NEXT.to_owned());
     parts.join("\n\n")
@@ -69,19 +76,67 @@ fn kinds(section: &Section) -> Vec<String> {
         Some(selector) => format!("### `{selector} = \"{}\"`", kind.kind),
         None => format!("### Parameters of [[{}]]", section.name),
     };
-    let said = |kind: &Kind| {
-        format!("{}. Source: {}.", capital(kind.summary.trim_end_matches('.')), kind.source.trim_end_matches('.'))
-    };
     let text = |kind: &Kind| {
         let summary = match kinds.len() == distinct.len() {
-            true => said(kind),
-            false => kinds.iter().map(|k| format!("* `{}`: {}", k.kind, said(k))).collect::<Vec<_>>().join("\n"),
+            true => kind.description(),
+            false => {
+                kinds.iter().map(|k| format!("* `{}`: {}", k.kind, k.description())).collect::<Vec<_>>().join("\n")
+            }
         };
         let place = Place { section: section.name, kind: section.selector().map(|selector| (selector, kind.kind)) };
         let rows = table(&place, &kind.parameters);
         format!("{}\n\n{summary}{}{rows}", of_kind(kind), if rows.is_empty() { "" } else { "\n\n" })
     };
     distinct.iter().map(text).collect()
+}
+
+/// The vehicles, and the keys that change them.
+fn vehicles() -> [String; 2] {
+    let all: Vec<Kind> = registry::kinds().into_iter().filter(|kind| kind.family == "vehicle").collect();
+    let rows: Vec<String> = all.iter().filter_map(vehicle).collect();
+    let schema = all.first().map_or(Value::Null, |kind| kind.parameters.clone());
+    let keys: Vec<String> = parameters(&schema).iter().map(|p| changed(&all, p)).collect();
+    [
+        format!(
+            "### Vehicles\n\n| vehicle | what it is | length, width, wheelbase | mass with wheels |\n|---|---|---|---|\n{}",
+            rows.join("\n")
+        ),
+        format!(
+            "### Keys of `vehicle_changes`\n\nThe example is the value of the first vehicle that has the key; `sastrugi kinds husky_a200` prints all \
+             values of a vehicle with their sources. With another `kind`, a suspension or a drive is replaced as a whole.\n\n\
+             | key | holds | example | meaning |\n|---|---|---|---|\n{}",
+            keys.join("\n")
+        ),
+    ]
+}
+
+/// A row of the table of vehicles.
+fn vehicle(kind: &Kind) -> Option<String> {
+    let values = kind.values()?;
+    let number = |path: &str| values.pointer(path).and_then(Value::as_f64);
+    let axles_m: Vec<f64> = values.pointer("/wheels/axles_m")?.as_array()?.iter().filter_map(Value::as_f64).collect();
+    let wheelbase_m = axles_m.first()? - axles_m.last()?;
+    let length_m = number("/chassis/size_m/0")?.max(wheelbase_m + 2.0 * number("/wheels/radius_m")?);
+    let width_m = number("/chassis/size_m/1")?.max(number("/wheels/track_m")? + number("/wheels/width_m")?);
+    let mass_kg = number("/chassis/mass_kg")? + 2.0 * axles_m.len() as f64 * number("/wheels/mass_kg")?;
+    let (name, summary) = (kind.kind, capital(kind.summary));
+    Some(format!("| `{name}` | {summary}. | {length_m:.2}, {width_m:.2}, {wheelbase_m:.2} m | {mass_kg:.0} kg |"))
+}
+
+/// A row of the table of keys that change a vehicle.
+fn changed(vehicles: &[Kind], p: &Parameter) -> String {
+    let values = vehicles.iter().filter_map(|kind| value_at(kind.values()?, &p.name));
+    let example = values.filter(|value| !value.is_object()).find_map(|value| to_toml(value).ok());
+    let example = example.map(|value| format!("`{}`", value.to_string().trim())).unwrap_or_default();
+    format!("| `{}` | {} | {example} | {} |", p.name, p.holds, p.meaning)
+}
+
+/// The value of a vehicle at a key such as `drive[ackermann].spot_turn`, if its drive is of that kind.
+fn value_at<'a>(vehicle: &'a Value, key: &str) -> Option<&'a Value> {
+    key.split('.').try_fold(vehicle, |at, word| match word.strip_suffix(']').and_then(|word| word.split_once('[')) {
+        Some((name, kind)) => at.get(name).filter(|table| table["kind"] == kind),
+        None => at.get(word),
+    })
 }
 
 /// A table of keys; empty if there are none.
@@ -156,6 +211,7 @@ fn value_in(table: &str, key: &str) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use serde_json::json;
 
     #[test]
     fn val_values_in_the_lines_of_a_table() {
@@ -180,6 +236,25 @@ mod tests {
         let terrain = example("[[terrain]]").unwrap();
         assert!(terrain.contains("kind = \"multifractal\"") && !terrain.contains("weierstrass"), "{terrain}");
         assert_eq!(example("[[nothing]]"), None);
+    }
+
+    /// Vehicles are told apart, and every key has a value of some vehicle.
+    #[test]
+    fn val_vehicles_and_their_keys() {
+        let [table, keys] = vehicles();
+        // By hand: 1360 kg and four wheels of 35 kg; axles 2.7 m apart; a track of 1.6 m and wheels 0.27 m wide.
+        assert!(table.contains("| 4.00, 1.87, 2.70 m | 1500 kg |"), "{table}");
+        assert!(table.lines().filter(|line| line.starts_with("| `")).count() >= 3, "{table}");
+        let lines: Vec<&str> = keys.lines().filter(|line| line.starts_with("| `")).collect();
+        assert!(lines.len() > 50, "{keys}");
+        for line in lines {
+            let cells: Vec<&str> = line.split(" | ").collect();
+            let is_table = cells[0].ends_with("]`") || cells[1] == "table";
+            assert!(cells.len() == 4 && (is_table || cells[2].starts_with('`')), "{line}");
+        }
+        let car = json!({ "drive": { "kind": "ackermann", "spot_turn": false } });
+        assert_eq!(value_at(&car, "drive[ackermann].spot_turn"), Some(&json!(false)));
+        assert_eq!((value_at(&car, "drive[skid_steer].spot_turn"), value_at(&car, "wheels.radius_m")), (None, None));
     }
 
     /// Of a key that is listed twice, the second example would never be shown.
