@@ -54,7 +54,7 @@ fn val_readers_agree_with_a_release() {
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
 }
 
-/// Every shipped study, and every study that `init` writes, is valid under the schema that editors use; wrong keys and values are not.
+/// Every shipped study, and every study that `init` writes, is valid under the schema that editors use; wrong keys, values and combinations are not.
 #[test]
 fn val_studies_are_valid_under_their_schema() {
     let Some(python) = sastrugi_tests::python("schema", "./test") else { return };
@@ -73,7 +73,7 @@ fn val_studies_are_valid_under_their_schema() {
     let call = check(&python, "check_schema.py", &paths);
     assert_eq!(call.code, 0, "{}{}", call.stdout, call.stderr);
     let counts: Value = serde_json::from_str(&call.stdout).unwrap();
-    assert!(counts["studies"].as_u64() >= Some(17) && counts["broken"].as_u64() >= Some(150), "{counts}");
+    assert!(counts["studies"].as_u64() >= Some(17) && counts["broken"].as_u64() >= Some(190), "{counts}");
 }
 
 /// The page on rovers: efficiencies, intraclass correlations and distance budgets are recomputed from the rows, and every query runs.
