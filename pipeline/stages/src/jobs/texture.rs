@@ -25,7 +25,7 @@ use sastrugi_texture::covariance::Covariance;
 use sastrugi_texture::synth::{conditional, fft_ma};
 use sastrugi_texture::{Cost, Method, Needs, Prospect, SlopeFactors, Synthesis, TextureOutcome, needs};
 use serde_json::{Map, Value, json};
-use std::collections::BTreeSet;
+use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
 
 /// Name of the stage.
@@ -152,6 +152,8 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let fill = item.fill.as_deref().map(|id| builder.surface(entry, "fill", id).cloned()).transpose()?;
     let modulation = modulation(builder, entry, &item)?;
     let mut ids = Vec::new();
+    // Replicates cost the same. To state the cost of a covariance may take a transform.
+    let mut costs: BTreeMap<(Arc<str>, String), Cost> = BTreeMap::new();
     for one in entry.expand(&item.id, item.count, &item.sweep, &params)? {
         let side_by_side = item.methods.is_some();
         let one = on_background(one, &base, &matched, &item);
@@ -165,6 +167,8 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             if let Some(field) = fill.as_ref().filter(|_| needs(method) != Some(Needs::Covariance)) {
                 on_cells_of(field, &mut own).map_err(|message| entry.error("fill", message))?;
             }
+            let alike = (Arc::clone(&one.part), method.clone());
+            let known = costs.get(&alike).copied();
             let checked = sastrugi_texture::method(method, &own).and_then(|synthesis| {
                 // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
                 if !side_by_side && fill.is_none() {
@@ -172,9 +176,11 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 } else if let Some(fit) = prospect.filter(|_| needs(method) != Some(Needs::Covariance)) {
                     synthesis.check_prospect(&fit)?;
                 }
-                Ok((matched.cost(synthesis.as_ref(), &builder.prospects)?, synthesis))
+                let cost = known.map_or_else(|| matched.cost(synthesis.as_ref(), &builder.prospects), Ok)?;
+                Ok((cost, synthesis))
             });
             let cost = checked.as_ref().ok().map(|(cost, _)| *cost);
+            costs.extend(cost.map(|cost| (alike, cost)));
             entrants.push(Entrant { method: method.clone(), parameters: own, cost });
             let (cost, synthesis) = match checked {
                 Ok(checked) => checked,

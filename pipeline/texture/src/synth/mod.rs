@@ -186,6 +186,23 @@ pub enum SynthesisError {
         /// A sufficient size, m.
         needed_m: f64,
     },
+    /// The covariance is not positive definite on any torus tried for a texture that does not repeat.
+    #[error(
+        "the covariance is not positive definite on a torus of {} m x {} m, the largest tried for this texture of {} m x {} m: \
+         {clip_share:.1e} of its spectrum is negative, more than {limit:.0e}; use larger cells, or turn the long axis to the grid's \
+         (`azimuth_deg` = 0 or 90)",
+        to_micrometres(.torus_m[0]), to_micrometres(.torus_m[1]), to_micrometres(.size_m[0]), to_micrometres(.size_m[1])
+    )]
+    NoTorus {
+        /// Size of the texture, east-west and north-south, m.
+        size_m: [f64; 2],
+        /// Size of the largest torus tried, m.
+        torus_m: [f64; 2],
+        /// Negative share of the spectrum there.
+        clip_share: f64,
+        /// Largest share that is accepted and set to 0.
+        limit: f64,
+    },
     /// A method that copies cells needs those of the site.
     #[error(
         "`{method}` copies cells of the site, which are {} m x {} m, but those of the texture are {} m x {} m; set `cell_m` to the site's, \

@@ -131,6 +131,11 @@ impl Spectrum {
     }
 }
 
+/// Whether the axes of anisotropy are not those of the grid.
+pub fn is_oblique(covariance: &Covariance) -> bool {
+    stretches(covariance).is_none()
+}
+
 /// Factors for lags east-west and north-south that make the covariance isotropic, if its axes are those of the grid.
 fn stretches(covariance: &Covariance) -> Option<[f64; 2]> {
     let across = 1.0 / covariance.ratio;

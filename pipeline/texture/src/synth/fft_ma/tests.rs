@@ -392,6 +392,49 @@ fn val_a_torus_too_small_is_refused_and_enlarged_when_not_periodic() {
     assert!(made.clip_share <= CLIP_SHARE_MAX);
 }
 
+/// Half way around a torus an oblique covariance jumps, which fine cells show. Of this one, on cells of 1/60 of its range, 7.4075e-6 is
+/// negative on the first torus of 960 x 960 cells and nothing on 1440 x 1440 (numpy); the texture is made on the latter, and its cost is for it.
+#[test]
+fn val_an_oblique_covariance_gets_a_larger_torus() {
+    let fitted = covariance("matern", &[("sigma_m", 0.35), ("range_m", 3.02), ("smoothness", 0.584)]);
+    let oblique = Covariance { ratio: 0.84, azimuth_deg: 44.6, ..fitted.clone() };
+    let share = |n: usize| Spectrum::of(&oblique, [n, n], [0.05; 2]).negative_share();
+    let first = share(960);
+    assert!((first / 7.4075e-6 - 1.0).abs() < 1e-3, "{first:e}");
+    assert_eq!(share(1440), 0.0);
+    let raw = |size_m: f64, periodic: bool| {
+        let axes = json!({ "ratio": 0.84, "azimuth_deg": 44.6, "cell_m": 0.05 });
+        let of_tile = tile_of([size_m; 2], "gaussian", periodic);
+        Value::Object(
+            [axes, of_tile]
+                .iter()
+                .filter_map(Value::as_object)
+                .flatten()
+                .map(|(k, v)| (k.clone(), v.clone()))
+                .collect(),
+        )
+    };
+    let cropped = texture(&raw(12.0, false), &fitted);
+    assert_eq!((cropped.kernel.torus, cropped.kernel.expected_torus()), ([960; 2], [1440; 2]));
+    assert_eq!(cropped.cost(), cost(1440 * 1440, 240 * 240, 0));
+    let made = cropped.generate(&streams(1)).unwrap();
+    assert_eq!((made.grid.rows(), made.grid.cols(), made.clip_share), (240, 240, 0.0));
+    // No more than 16 times the cells of the first torus, and no more than a texture may have.
+    let sizes: Vec<usize> =
+        std::iter::successors(Some([960; 2]), |torus| cropped.kernel.larger(*torus)).map(|t| t[0]).collect();
+    assert_eq!(sizes, [960, 1440, 2160, 3240]);
+    assert_eq!(cropped.kernel.larger([1 << 14; 2]), None);
+    // A periodic tile that is as wide as the reach suggests is told a size that it has not yet.
+    let error = texture(&raw(48.0, true), &fitted).generate(&streams(1)).err().unwrap();
+    assert!(matches!(error, SynthesisError::NegativeSpectrum { needed_m, .. } if needed_m > 60.0), "{error}");
+    let error = cropped.kernel.refusal([3240; 2], 2e-6).to_string();
+    assert_eq!(
+        error,
+        "the covariance is not positive definite on a torus of 162 m x 162 m, the largest tried for this texture of 12 m x 12 m: 2.0e-6 of \
+         its spectrum is negative, more than 1e-6; use larger cells, or turn the long axis to the grid's (`azimuth_deg` = 0 or 90)"
+    );
+}
+
 #[test]
 fn val_sizes_are_whole_cells() {
     let covariance = exponential(0.1, 0.3);
