@@ -197,6 +197,40 @@ fn val_all_errors_of_a_table_are_told_at_once() {
     told("[[missions]]", &both, &["`fit` names \"other\"", "in tables with errors: f"]);
 }
 
+/// The parameters of a table with a wrong method, or with one that its fit does not permit, are not called unknown: they would be checked
+/// against another method. Its other errors are told.
+#[test]
+fn val_parameters_of_a_wrong_method_are_not_checked() {
+    let folder = area();
+    let head = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n";
+    let told = |table: &str, words: &[&str]| {
+        write(folder.path(), "study.toml", &format!("{head}{table}"));
+        let call = sastrugi_in(folder.path(), &["plan", "study.toml"]);
+        assert_eq!(call.code, 2, "{}", call.stderr);
+        let said: Vec<&str> = call.stderr.split_whitespace().filter(|word| *word != "│").collect();
+        let said = said.join(" ");
+        words.iter().for_each(|words| assert!(said.contains(words), "\"{words}\" is not in: {said}"));
+        assert!(!said.contains("unknown key") && !said.contains("is not a parameter"), "{said}");
+    };
+    let texture = |more: &str| {
+        format!("[[texture]]\nid = \"t\"\nfit = {{ model = \"exponential\", sigma_m = 0.03, range_m = 0.3 }}\n{more}\n")
+    };
+    let meant = "did you mean \"quasi_wavelets\"?";
+    told(
+        &texture("method = \"quasi_wavelet\"\nintermittency = 1.0"),
+        &["invalid study ×", "`method` is `quasi_wavelet`", meant],
+    );
+    told(&texture("method = \"quasi_wavelet\"\nsweep.intermittency = [0.5, 1.0]"), &["invalid study ×", meant]);
+    told(
+        &texture("method = \"quasi_wavelet\"\nintermittency = 1.0\namplitude = -1.0"),
+        &["2 errors", meant, "`amplitude` is -1"],
+    );
+    told(
+        &texture("method = \"modulated\"\nlog_variance = 0.3"),
+        &["invalid study ×", "needs the statistics of the residual"],
+    );
+}
+
 /// Tables that refer to a refused table lack what it would define. That is not reported, but their own errors are, in the same call.
 #[test]
 fn val_errors_behind_a_refused_table_are_told_at_once() {

@@ -7,7 +7,7 @@ use crate::operations::drawn::{Drawn, Routes};
 use crate::registry::SECTIONS;
 use crate::runner::graph::{Graph, InputFile, Node};
 use crate::study::entry::{ITEMS_MAX, leave_out};
-use crate::study::keys::{nearest, nearest_in};
+use crate::study::keys::{nearest, nearest_in, properties};
 use crate::study::{Entry, Refusals, Study, StudyError, UNKNOWN_SECTION};
 use sastrugi_imaging::Sun;
 use sastrugi_numeric::{Geometry, Streams};
@@ -41,6 +41,9 @@ const BYTES_PER_HEIGHT: u64 = 8;
 
 /// Sections of surfaces, whose `count` is a number of surfaces. Each of these is two items: it is generated, and its roughness measured.
 const GENERATED: [&str; 2] = [terrain::STAGE, texture::STAGE];
+
+/// Keys that choose the parameters of a table.
+const CHOICES: [&str; 3] = ["kind", "method", "methods"];
 
 /// Why a study has no graph.
 #[derive(Debug, thiserror::Error)]
@@ -325,6 +328,7 @@ impl<'a> Builder<'a> {
         let items = self.graph.len();
         let mut rest = Value::Object(entry.table().clone());
         let mut is_changed = leave_out(&mut rest, &told);
+        let own = envelope_keys(entry);
         self.is_reading_on = true;
         while is_changed && self.graph.len() == items {
             let Some(table) = rest.as_object() else { break };
@@ -334,7 +338,10 @@ impl<'a> Builder<'a> {
             };
             let found: Vec<StudyError> = found.into_iter().filter(is_new).collect();
             is_changed = leave_out(&mut rest, &found);
-            let found: Vec<StudyError> = found.into_iter().map(|error| self.explained(entry, error)).collect();
+            // Without the kind or method that was meant, its parameters were checked against another.
+            let is_by_choice = told.iter().any(|other| is_choice(other, &own));
+            let found = found.into_iter().filter(|error| !(is_by_choice && is_parameter(error, &own)));
+            let found: Vec<StudyError> = found.map(|error| self.explained(entry, error)).collect();
             self.refused.errors.extend(found.iter().cloned());
             told.extend(found);
         }
@@ -546,6 +553,22 @@ impl<'a> Builder<'a> {
 /// True if two errors refuse the same key, or one a key within that of the other.
 fn concerns_same(one: &StudyError, other: &StudyError) -> bool {
     one.key.starts_with(&other.key) || other.key.starts_with(&one.key)
+}
+
+/// Keys of a table that are not parameters of its kind.
+fn envelope_keys(entry: &Entry<'_>) -> Vec<String> {
+    let envelope = SECTIONS.iter().find(|section| section.name == entry.section()).map(|section| section.envelope);
+    envelope.map_or_else(Vec::new, |envelope| properties(&envelope()))
+}
+
+/// True if an error refuses the key that chooses the parameters of a table; `own` are its other keys.
+fn is_choice(error: &StudyError, own: &[String]) -> bool {
+    error.key.first().is_some_and(|key| CHOICES.contains(&key.as_str()) && own.contains(key))
+}
+
+/// True if an error refuses a parameter, written or swept; `own` are the other keys of its table.
+fn is_parameter(error: &StudyError, own: &[String]) -> bool {
+    error.key.first().is_some_and(|key| key == "sweep" || !own.contains(key))
 }
 
 /// The kind or vehicle that an error on an unknown one probably means.
