@@ -197,6 +197,27 @@ fn val_all_errors_of_a_table_are_told_at_once() {
     told("[[missions]]", &both, &["`fit` names \"other\"", "in tables with errors: f"]);
 }
 
+/// What is wrong with a swept parameter is told at the sweep, not at the head of the table; a key of the table is not a parameter.
+#[test]
+fn val_errors_of_sweeps_are_told_at_the_sweep() {
+    let folder = area();
+    let head = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n\
+        [[texture]]\nid = \"t\"\nfit = { model = \"exponential\", sigma_m = 0.03, range_m = 0.3 }\n";
+    for (sweep, words) in [
+        ("sweep.amplitude = [0.1, 0.2]", "`sweep` varies parameters, but `amplitude` is a key of [[texture]] itself"),
+        ("sweep.onto = [\"a\", \"b\"]", "`onto` is a key of [[texture]] itself; write one [[texture]] for each value"),
+        ("sweep.phases = [\"unit\"]", "`phases` is not a parameter of this method"),
+        ("sweep.cell_m = [0.1, -1.0]", "`cell_m` is -1"),
+    ] {
+        write(folder.path(), "study.toml", &format!("{head}{sweep}\n"));
+        let call = sastrugi_in(folder.path(), &["plan", "study.toml"]);
+        let said: Vec<&str> = call.stderr.split_whitespace().filter(|word| *word != "│").collect();
+        let said = said.join(" ");
+        assert!(call.code == 2 && said.contains(words), "{} {said}", call.code);
+        assert!(said.contains("[study.toml:9:") && said.contains(&format!("9 {sweep}")), "{said}");
+    }
+}
+
 /// The parameters of a table with a wrong method, or with one that its fit does not permit, are not called unknown: they would be checked
 /// against another method. Its other errors are told.
 #[test]

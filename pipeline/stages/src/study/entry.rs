@@ -65,8 +65,7 @@ impl<'a> Entry<'a> {
 
     /// True if a key of this table is written in the study.
     pub fn is_written(&self, key: &[String]) -> bool {
-        let path: Vec<String> = self.path().into_iter().chain(key.iter().cloned()).collect();
-        !key.is_empty() && self.text.exact_span(&path).is_some()
+        !key.is_empty() && self.text.exact_span(&self.path_to(key)).is_some()
     }
 
     /// Its section.
@@ -102,6 +101,7 @@ impl<'a> Entry<'a> {
         let id = envelope.get("id").and_then(Value::as_str);
         let mut errors: Vec<StudyError> =
             id.and_then(|id| check_id("id", id).err()).map(|e| self.refuse(e)).into_iter().collect();
+        errors.extend(self.swept_keys(&names));
         match read_all(Value::Object(envelope)) {
             Ok(envelope) => Refusals::none(errors).map(|()| (envelope, Value::Object(params))),
             Err(refused) => {
@@ -109,6 +109,27 @@ impl<'a> Entry<'a> {
                 Err(Refusals(errors))
             }
         }
+    }
+
+    /// Refuses to sweep the keys of the envelope, `own`: a sweep varies parameters.
+    fn swept_keys(&self, own: &[String]) -> Vec<StudyError> {
+        if !own.iter().any(|key| key == "sweep") {
+            return Vec::new();
+        }
+        let is_own = |swept: &&String| segments(swept).next().is_some_and(|first| own.iter().any(|key| key == first));
+        let section = self.section;
+        let refuse = |swept: &String| {
+            let message = format!(
+                "`sweep` varies parameters, but `{swept}` is a key of [[{section}]] itself; write one [[{section}]] for each value"
+            );
+            self.error_at(vec!["sweep".to_owned(), swept.clone()], &message)
+        };
+        self.sweeps().filter(is_own).map(refuse).collect()
+    }
+
+    /// Names of the swept parameters, dotted.
+    fn sweeps(&self) -> impl Iterator<Item = &'a String> {
+        self.table.get("sweep").and_then(Value::as_object).into_iter().flat_map(Map::keys)
     }
 
     /// The error of a table; if a required key is missing because it was given under another name, the error is that of the other name.
@@ -136,7 +157,17 @@ impl<'a> Entry<'a> {
             key.known.extend(keys::properties(&schema_of::<E>()));
             key.given = self.table.keys().cloned().collect();
         }
-        Refusals::none(unknown.iter().map(|key| unknown_key(self.text, &self.path(), key)).collect())
+        Refusals::none(unknown.iter().map(|key| self.refuse_unknown(key)).collect())
+    }
+
+    /// The error of an unknown key, at the sweep if that sets it.
+    fn refuse_unknown(&self, key: &UnknownKey) -> StudyError {
+        let error = unknown_key(self.text, &self.path(), key);
+        let place = self.place_of(&key.path.join("."));
+        if *place == *key.path {
+            return error;
+        }
+        StudyError { span: self.text.span(&self.path_to(&place), true), key: place.into(), ..error }
     }
 
     /// All keys, as unknown: for a schema without properties.
@@ -214,12 +245,35 @@ impl<'a> Entry<'a> {
         Ok(swept)
     }
 
-    /// An error at a key of this table (dotted path), or at the table if the key is not written.
+    /// An error at a key of this table (dotted path), at the sweep that sets it, or at the table if the key is not written.
     pub fn error(&self, key: &str, message: impl Into<String>) -> StudyError {
-        let path = self.path_of_dotted(key);
+        self.error_at(self.place_of(key), &message.into())
+    }
+
+    fn error_at(&self, place: Vec<String>, message: &str) -> StudyError {
         let id = self.id().map_or_else(|| format!("number {}", self.index + 1), |id| format!("\"{id}\""));
-        let error = StudyError::at(self.text.span(&path, false), format!("{} {id}: {}", self.section, message.into()));
-        StudyError { key: segments(key).map(str::to_owned).collect(), ..error }
+        let span = self.text.span(&self.path_to(&place), false);
+        let error = StudyError::at(span, format!("{} {id}: {message}", self.section));
+        StudyError { key: place.into(), ..error }
+    }
+
+    /// Path in this table of a dotted key; of the sweep that sets it or a part of it, unless it is written.
+    fn place_of(&self, key: &str) -> Vec<String> {
+        let own: Vec<String> = segments(key).map(str::to_owned).collect();
+        if own.is_empty() || self.is_written(&own) {
+            return own;
+        }
+        let is_within = |part: &str, whole: &str| part.strip_prefix(whole).is_some_and(|rest| rest.starts_with('.'));
+        let sets = |swept: &&String| *swept == key || is_within(swept, key) || is_within(key, swept);
+        match self.sweeps().find(sets) {
+            Some(swept) => vec!["sweep".to_owned(), swept.clone()],
+            None => own,
+        }
+    }
+
+    /// Path in the study of a path in this table.
+    fn path_to(&self, place: &[String]) -> Vec<String> {
+        self.path().into_iter().chain(place.iter().cloned()).collect()
     }
 
     /// A kernel's error, with its place.
@@ -394,6 +448,30 @@ mod tests {
         assert_eq!(table, serde_json::json!({"id": "a", "cell_m": 2, "low": {"s": 1}, "list": [{"y": 2}]}));
         assert!(!left(&[error(&[], None), error(&["none"], None), error(&["none", "x"], None)]).0);
         assert!(!left(&[StudyError { missing_id: Some("b".into()), ..error(&["id"], None) }]).0);
+    }
+
+    /// Errors of swept parameters are at the values of the sweep; keys of the table that are not parameters cannot be swept.
+    #[test]
+    fn val_errors_of_sweeps_are_at_the_sweep() {
+        let toml = "[[terrain]]\nid = \"a\"\nkind = \"k\"\nlow.s = 1\nsweep.d = [2]\nsweep.\"high.d\" = [3]\nsweep.count = [4]\n";
+        let place = |error: StudyError| (error.span.map(|span| toml[span].to_owned()), error.key.join("/"));
+        let at = |key: &str| with(toml, |entry| place(entry.error(key, "wrong")));
+        let is = |span: &str, key: &str| (Some(span.to_owned()), key.to_owned());
+        assert_eq!(at("d"), is("[2]", "sweep/d"));
+        assert_eq!((at("high.d"), at("high")), (is("[3]", "sweep/high.d"), is("[3]", "sweep/high.d")));
+        assert_eq!(
+            (at("low.s"), at("none"), at("")),
+            (is("1", "low/s"), is("[[terrain]]", "none"), is("[[terrain]]", ""))
+        );
+        let unknown = with(toml, |entry| {
+            let key = entry.unknown("d", vec!["cell_m".to_owned()]);
+            place(entry.refuse_unknown(&key))
+        });
+        assert_eq!(unknown, is("d", "sweep/d"));
+        let Refusals(errors) = with(toml, |entry| entry.read::<TerrainItem>().err().unwrap());
+        let [error] = &errors[..] else { panic!("{errors:?}") };
+        assert!(error.message.contains("`count` is a key of [[terrain]] itself"), "{}", error.message);
+        assert_eq!(place(error.clone()), is("[4]", "sweep/count"));
     }
 
     #[test]
