@@ -11,6 +11,7 @@ use crate::study::keys::{nearest, nearest_in, properties};
 use crate::study::{Entry, Refusals, Study, StudyError, UNKNOWN_SECTION};
 use sastrugi_imaging::Sun;
 use sastrugi_numeric::{Geometry, Streams};
+use sastrugi_schemas::counted;
 use sastrugi_schemas::fit::Source;
 use sastrugi_schemas::study::Pairing;
 use sastrugi_texture::Prospect;
@@ -385,6 +386,9 @@ impl<'a> Builder<'a> {
 
     /// Where a missing id is to be found: below its table, or in one that is refused.
     fn where_it_is(&self, entry: &Entry<'_>, error: &StudyError, id: &str) -> Option<String> {
+        if self.replicates(id).is_some() {
+            return None;
+        }
         let section = entry.section();
         let names_surface = GENERATED.contains(&section) && error.key.first().is_some_and(|key| key != "fit");
         let tables = self.study.entries(section).unwrap_or_default();
@@ -516,7 +520,30 @@ impl<'a> Builder<'a> {
     /// # Errors
     /// An id that is not an earlier heightfield.
     pub fn surface(&self, entry: &Entry<'_>, key: &str, id: &str) -> Result<&Heightfield, StudyError> {
-        self.heightfields.get(id).ok_or_else(|| unknown_id(entry, key, id, self.heightfields.keys()))
+        self.heightfields.get(id).ok_or_else(|| self.no_surface(entry, key, id))
+    }
+
+    /// The error for an id that no heightfield has. That of a table with several is told apart from an unknown one.
+    pub fn no_surface(&self, entry: &Entry<'_>, key: &str, id: &str) -> StudyError {
+        let family = self.families.get(id).filter(|ids| ids.iter().all(|id| self.heightfields.contains_key(id)));
+        let Some([first, ..]) = family.map(Vec::as_slice) else {
+            return unknown_id(entry, key, id, self.heightfields.keys());
+        };
+        let count = match self.replicates(id) {
+            Some(ids) => counted(ids.len(), "replicate"),
+            None => counted(family.map_or(0, Vec::len), "surface"),
+        };
+        let message = format!("`{key}` names \"{id}\", which has {count}; name one, such as \"{first}\"");
+        StudyError { missing_id: Some(id.into()), ..entry.error(key, message) }
+    }
+
+    /// The surfaces of a table that differ only by their random draws, in order; `None` for any other id.
+    pub fn replicates(&self, id: &str) -> Option<&[String]> {
+        let ids = self.families.get(id)?;
+        let is_next = |(k, id): (usize, &String)| {
+            self.heightfields.get(id).is_some_and(|field| field.replicate == Some(k as u64))
+        };
+        (ids.len() > 1 && ids.iter().enumerate().all(is_next)).then_some(ids.as_slice())
     }
 
     /// The source recorded in a fit file: the measured file, or the generated heightfield's path in the release.

@@ -264,6 +264,24 @@ mod tests {
         assert_eq!(number(&drawn, "a"), [6, 2, 2]);
     }
 
+    /// Replicate k of a texture is added to replicate k of a terrain that has as many, and stays with it: four independent sets.
+    #[test]
+    fn val_replicates_of_a_texture_have_bases_of_their_own() {
+        let texture = "[[texture]]\nid = \"t\"\nfit = { model = \"exponential\", sigma_m = 0.01, range_m = 0.3 }\nonto = \"h\"\ngroup = \"a\"\ncount = 4\nsize_m = [3.2, 3.2]\ncell_m = 0.05\n";
+        let text = format!("{HEAD}split = [0.5, 0.25, 0.25]\n{}{texture}", terrain("h", "", 4));
+        let loaded = load_text(&text, "study", Path::new("")).map_err(|e| e.to_string()).unwrap();
+        for k in 1..=4 {
+            let [base, own] = ["h", "t"].map(|id| format!("{id}-{k:04}"));
+            assert_eq!(loaded.splits[&base], loaded.splits[&own], "{base}");
+            let field = &loaded.heightfields[&own];
+            assert_eq!(field.parameters["onto"], base.as_str());
+            let position = loaded.graph.find(&field.item).unwrap();
+            let parents: Vec<&ItemRef> = loaded.graph.parents(position).map(|p| &loaded.graph.node(p).item).collect();
+            assert_eq!(parents, [&loaded.heightfields[&base].item]);
+        }
+        assert_eq!(number(&loaded.splits, "t"), [2, 1, 1]);
+    }
+
     /// Replicate k of a seed draws as seed + k - 1 does; equal heights are never in two splits.
     #[test]
     fn val_terrains_of_one_seed_stay_together() {

@@ -640,6 +640,49 @@ mod tests {
         assert!(refused.contains("size_m") && !refused.contains("across"), "{refused}");
     }
 
+    /// The id of a table with several surfaces is told apart from an unknown one, by every key that names one surface.
+    #[test]
+    fn val_a_table_with_replicates_is_not_one_surface() {
+        let head = STUDY.split_once("[[terrain]]").unwrap().0;
+        let hills = "[[terrain]]\nid = \"hills\"\nkind = \"multifractal\"\nsize_px = [64, 64]\ncount = 4\n\
+                     [[terrain]]\nid = \"steep\"\nkind = \"multifractal\"\nsize_px = [64, 64]\nsweep.cell_m = [0.05, 0.1]\n";
+        let texture = |more: &str| {
+            format!(
+                "[[texture]]\nid = \"t\"\nfit = {{ model = \"exponential\", sigma_m = 0.03, range_m = 0.3 }}\n{more}\n"
+            )
+        };
+        let set_count = "or set `count = 4`: each replicate is then added to its own";
+        for (table, named, first, help) in [
+            (
+                texture("onto = \"hills\"\ncount = 3"),
+                "`onto` names \"hills\", which has 4 replicates",
+                "hills-0001",
+                Some(set_count),
+            ),
+            (
+                texture("onto = \"hills\""),
+                "`onto` names \"hills\", which has 4 replicates",
+                "hills-0001",
+                Some(set_count),
+            ),
+            (texture("fill = \"hills\""), "`fill` names \"hills\", which has 4 replicates", "hills-0001", None),
+            (texture("onto = \"steep\""), "`onto` names \"steep\", which has 2 surfaces", "steep-0.05", None),
+            (
+                "[[fit]]\nid = \"f\"\ndem = \"hills\"\n".to_owned(),
+                "`dem` names \"hills\", which has 4 replicates",
+                "hills-0001",
+                None,
+            ),
+        ] {
+            let loaded = load_text(&format!("{head}{hills}{table}"), "study", Path::new(""));
+            let Err(Error::Study { refusals: Refusals(errors), .. }) = loaded else { panic!("{table} is not refused") };
+            let [error] = &errors[..] else { panic!("{errors:?}") };
+            let said = format!("{named}; name one, such as \"{first}\"");
+            assert!(error.message.ends_with(&said), "{} {said}", error.message);
+            assert_eq!(error.help.as_deref(), help, "{table}");
+        }
+    }
+
     /// Numbers, of which most parameters accept some.
     const NUMBERS: &[&str] =
         &["-1", "0", "1", "2", "3", "64", "300", "0.0", "0.05", "0.5", "2.5", "-2.5", "1e300", "1e-300"];

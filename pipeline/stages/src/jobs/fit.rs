@@ -5,7 +5,7 @@ use super::mask::{self, Mask};
 use super::photoclinometry;
 use super::rasters::Raster;
 use super::surface::{Surface, SurfaceRows};
-use crate::builder::{BuildError, Builder, HEIGHTS, unknown_id};
+use crate::builder::{BuildError, Builder, HEIGHTS};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
 use crate::operations::fits::{
@@ -156,7 +156,7 @@ struct Subtrahend {
 impl Subtrahend {
     fn of(builder: &Builder<'_>, entry: &Entry<'_>, id: &str) -> Result<Self, BuildError> {
         let Some(field) = builder.heightfields.get(id) else {
-            return Err(unknown_id(entry, "minus", id, builder.heightfields.keys()).into());
+            return Err(builder.no_surface(entry, "minus", id).into());
         };
         let source = builder.source_of(id, field);
         Ok(Self { id: id.to_owned(), dem: field.into(), source })
@@ -207,7 +207,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
     let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
     let settings = expanded.iter().map(|one| settings_of(entry, &item, one)).collect::<Result<Vec<_>, _>>()?;
     let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
-        return Err(unknown_id(entry, "dem", &item.dem, builder.heightfields.keys()).into());
+        return Err(builder.no_surface(entry, "dem", &item.dem).into());
     };
     expanded.iter().try_for_each(|one| builder.claim(entry, STAGE, &one.id))?;
     let masks = mask::add(builder, entry, &item)?;

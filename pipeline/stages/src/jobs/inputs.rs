@@ -4,7 +4,7 @@
 
 use super::original::{self, INPUT_STAGE, Original};
 use super::terrain;
-use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, InputPlace, unknown_id};
+use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, InputPlace};
 use crate::job::{ItemRef, JobError, Product, Work};
 use crate::operations::inputs::{check_systems, kept, read};
 use crate::study::Entry;
@@ -166,7 +166,7 @@ fn of_file(
     let path = builder.study.folder.join(&named.name);
     let is_raster = Format::of_name(&path).is_some() || path.is_file();
     if named.holds == Holds::Values && !is_raster {
-        return Err(unknown_id(entry, &named.key, &named.name, builder.heightfields.keys()).into());
+        return Err(builder.no_surface(entry, &named.key, &named.name).into());
     }
     if item.sweep.contains_key(&named.key) {
         let message =

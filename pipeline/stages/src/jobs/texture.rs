@@ -69,6 +69,30 @@ struct Base {
 }
 
 impl Base {
+    /// The bases of an item: one for all its replicates, or one for each if `onto` names as many replicates; none without `onto`.
+    fn all(
+        builder: &Builder<'_>,
+        entry: &Entry<'_>,
+        item: &TextureItem,
+        matched: &Matched,
+    ) -> Result<Vec<Self>, BuildError> {
+        let of = |onto: &Onto| Self::of(builder, entry, onto, matched);
+        let each = match &item.onto {
+            Some(Onto::Id(id)) => builder.replicates(id).map(|replicates| (id, replicates)),
+            _ => None,
+        };
+        match each {
+            None => item.onto.iter().map(of).collect(),
+            Some((_, replicates)) if item.count.is_some_and(|count| count as usize == replicates.len()) => {
+                replicates.iter().map(|id| of(&Onto::Id(id.clone()))).collect()
+            }
+            Some((id, replicates)) => {
+                let help = format!("or set `count = {}`: each replicate is then added to its own", replicates.len());
+                Err(builder.no_surface(entry, "onto", id).with_help(Some(help)).into())
+            }
+        }
+    }
+
     fn of(builder: &Builder<'_>, entry: &Entry<'_>, onto: &Onto, matched: &Matched) -> Result<Self, BuildError> {
         match onto {
             Onto::Id(id) => {
@@ -148,7 +172,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let matched = matched?;
     let site = matched.parent().and_then(|fit| builder.sites.get(&fit.id)).cloned();
     let exemplar_of = |method: &str| site.clone().filter(|_| needs(method) == Some(Needs::Residual));
-    let base = item.onto.as_ref().map(|onto| Base::of(builder, entry, onto, &matched)).transpose()?;
+    let bases = Base::all(builder, entry, &item, &matched)?;
     let fill = item.fill.as_deref().map(|id| builder.surface(entry, "fill", id).cloned()).transpose()?;
     let modulation = modulation(builder, entry, &item)?;
     let mut ids = Vec::new();
@@ -156,6 +180,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let mut costs: BTreeMap<(Arc<str>, String), Cost> = BTreeMap::new();
     for one in entry.expand(&item.id, item.count, &item.sweep, &params)? {
         let side_by_side = item.methods.is_some();
+        let base = bases.get(one.replicate as usize).or(bases.first()).cloned();
         let one = on_background(one, &base, &matched, &item);
         let streams = builder.streams(STAGE, &one.id, item.seed, one.replicate);
         let mut entrants = Vec::new();
@@ -202,7 +227,12 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
                 variant: one.sweep.clone().filter(|_| item.group.is_some()),
                 replicate: Some(one.replicate),
                 kind: method.clone(),
-                parameters: Arc::new(parameters(&item, &matched, synthesis.as_ref())),
+                parameters: Arc::new(parameters(
+                    &item,
+                    base.as_ref().filter(|_| bases.len() > 1),
+                    &matched,
+                    synthesis.as_ref(),
+                )),
                 streams: Some(streams.clone()),
                 release_path: format!("texture/{id}.tif"),
                 cells: match (&base, &fill) {
@@ -416,12 +446,12 @@ fn own_parameters(params: &Value, kinds: &[Kind], method: &str) -> Value {
     )
 }
 
-/// The parameters of a texture for the table `terrains`.
-fn parameters(item: &TextureItem, matched: &Matched, synthesis: &dyn Method) -> Value {
+/// The parameters of a texture for the table `terrains`; `own` is its base, if its replicates have one each.
+fn parameters(item: &TextureItem, own: Option<&Base>, matched: &Matched, synthesis: &dyn Method) -> Value {
     let mut all = Map::new();
     all.insert("fit".to_owned(), matched.describe());
     let more = [
-        ("onto", item.onto.as_ref().map(|onto| json!(onto))),
+        ("onto", own.map(|base| json!(base.item.id)).or_else(|| item.onto.as_ref().map(|onto| json!(onto)))),
         ("amplitude", (item.amplitude != 1.0).then(|| json!(item.amplitude))),
         ("modulate", item.modulate.as_ref().map(|m| json!(m))),
         ("fill", item.fill.as_ref().map(|id| json!(id))),

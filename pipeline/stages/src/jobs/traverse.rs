@@ -194,8 +194,7 @@ impl Prepared {
 /// The item that produces a raster of the surface.
 fn raster(builder: &Builder<'_>, entry: &Entry<'_>, key: &str, id: Option<&str>) -> Result<Option<Raster>, StudyError> {
     let Some(id) = id else { return Ok(None) };
-    let field = builder.heightfields.get(id);
-    field.map(|field| Some(field.into())).ok_or_else(|| unknown_id(entry, key, id, builder.heightfields.keys()))
+    builder.surface(entry, key, id).map(|field| Some(field.into()))
 }
 
 /// Refuses a terrain whose cells are known to be larger than the vehicle. A measured DEM is checked when it is read, because its file
