@@ -425,6 +425,7 @@ mod tests {
     use sastrugi_schemas::kind::schema_of;
     use sastrugi_schemas::manifest::Origin;
     use sastrugi_store::release::ReleaseBuilder;
+    use serde_json::json;
 
     const STUDY: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
         count = 2\nsize_px = [64, 64]\nhigh.fractal_dimension = 2.5\nsweep.cell_m = [0.05, 0.1]\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\n\n\
@@ -680,6 +681,46 @@ mod tests {
             let said = format!("{named}; name one, such as \"{first}\"");
             assert!(error.message.ends_with(&said), "{} {said}", error.message);
             assert_eq!(error.help.as_deref(), help, "{table}");
+        }
+    }
+
+    /// Cells and size of a texture that are not stated follow its base where the defaults do not suit it, and stay the defaults elsewhere. What
+    /// does not cover its base is refused before the run; what repeats over it, or is cut to it, is a doubt.
+    #[test]
+    fn val_textures_follow_their_bases() {
+        let head = STUDY.split_once("[[terrain]]").unwrap().0;
+        let loaded = |cell_m: f64, more: &str| {
+            let text = format!(
+                "{head}[[terrain]]\nid = \"hills\"\nkind = \"multifractal\"\nsize_px = [300, 64]\ncell_m = {cell_m}\n[[texture]]\nid = \"t\"\n\
+                 fit = {{ model = \"exponential\", sigma_m = 0.03, range_m = 0.3 }}\nonto = \"hills\"\n{more}\n"
+            );
+            load_text(&text, "study", Path::new(""))
+        };
+        for (cell_m, more, key, value) in [
+            (0.05, "", "size_px", json!([300, 64])),
+            (0.05, "", "cell_m", json!(0.05)),
+            (0.05, "size_m = [15.0, 3.2]", "cell_m", json!(0.05)),
+            (0.1, "", "size_m", json!([20.0, 20.0])),
+            (0.1, "", "cell_m", json!(0.1)),
+            (0.1, "periodic = false", "size_px", json!([300, 64])),
+        ] {
+            let loaded = loaded(cell_m, more).unwrap_or_else(|error| panic!("{cell_m} {more}: {error}"));
+            assert_eq!(loaded.heightfields["t"].parameters[key], value, "{cell_m} {more}");
+            assert!(loaded.doubts.is_empty(), "{:?}", loaded.doubts);
+        }
+        for (more, words) in [
+            ("size_m = [5.0, 5.0]", "texture \"t\": 5 m x 5 m repeats over its base of 30 m x 6.4 m"),
+            ("size_px = [300, 80]", "texture \"t\": 30 m x 8 m is cut to its base of 30 m x 6.4 m"),
+        ] {
+            let doubts = loaded(0.1, more).unwrap_or_else(|error| panic!("{more}: {error}")).doubts;
+            assert!(doubts.len() == 1 && doubts[0].starts_with(words), "{doubts:?}");
+        }
+        for (more, words) in [
+            ("size_m = [20.0, 20.0]\nperiodic = false", "`size_m` is too small: the base of 64 x 300 cells is larger"),
+            ("cell_m = 0.2", "`cell_m` does not match `onto`"),
+        ] {
+            let refused = loaded(0.1, more).err().unwrap().to_string();
+            assert!(refused.contains(words), "{refused}");
         }
     }
 

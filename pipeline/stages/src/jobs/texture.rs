@@ -10,7 +10,8 @@ use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
 use crate::operations::textures::{
-    completes_background, fill_note, has_its_texture, lay_onto, notes_on_filling, on_site_cells, scaled,
+    completes_background, fill_note, has_its_texture, lay_onto, notes_on_filling, on_base_cells, on_base_size,
+    on_site_cells, scaled, size_doubt, states_size, uncovered,
 };
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -192,9 +193,16 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             if let Some(field) = fill.as_ref().filter(|_| needs(method) != Some(Needs::Covariance)) {
                 on_cells_of(field, &mut own).map_err(|message| entry.error("fill", message))?;
             }
+            // Methods that are compared keep the default size and cells, on which the scoreboard compares them.
+            let place = base.as_ref().and_then(|base| base.expected).filter(|_| !side_by_side);
+            let states_size = states_size(&own);
+            let made = match &place {
+                Some(place) => on_base(place, method, &mut own),
+                None => sastrugi_texture::method(method, &own),
+            };
             let alike = (Arc::clone(&one.part), method.clone());
             let known = costs.get(&alike).copied();
-            let checked = sastrugi_texture::method(method, &own).and_then(|synthesis| {
+            let checked = made.and_then(|synthesis| {
                 // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
                 if !side_by_side && fill.is_none() {
                     check_before_run(prospect.as_ref(), base.as_ref(), synthesis.as_ref())?;
@@ -206,6 +214,13 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
             });
             let cost = checked.as_ref().ok().map(|(cost, _)| *cost);
             costs.extend(cost.map(|cost| (alike, cost)));
+            let stated = checked.as_ref().ok().filter(|_| states_size).map(|(_, synthesis)| synthesis.geometry());
+            let doubt = place.zip(stated).and_then(|(place, stated)| size_doubt(&place, &stated));
+            if let Some(doubt) = doubt.map(|doubt| format!("texture \"{}\": {doubt}", item.id))
+                && !builder.doubts.contains(&doubt)
+            {
+                builder.doubts.push(doubt);
+            }
             entrants.push(Entrant { method: method.clone(), parameters: own, cost });
             let (cost, synthesis) = match checked {
                 Ok(checked) => checked,
@@ -317,16 +332,36 @@ fn on_cells_of(dem: &Heightfield, parameters: &mut Value) -> Result<(), String> 
     Ok(())
 }
 
-/// Refuses, before the fit is computed, a texture that is known not to match the fit, and cells that do not match those of the base.
+/// The method for a texture on a base. Cells and size that are not stated are the base's where the defaults do not suit it: other cells, or a
+/// texture that does not repeat and is smaller.
+fn on_base(place: &Geometry, method: &str, own: &mut Value) -> Result<Box<dyn Method>, ParameterError> {
+    let states_size = states_size(own);
+    on_base_cells(place, own);
+    let made = sastrugi_texture::method(method, own);
+    let suits = |made: &dyn Method| made.is_periodic() || uncovered(place, &made.geometry()).is_none();
+    if states_size || made.as_ref().is_ok_and(|made| suits(made.as_ref())) {
+        return made;
+    }
+    on_base_size(place, own);
+    sastrugi_texture::method(method, own)
+}
+
+/// Refuses, before the fit is computed, a texture that is known not to match the fit, and one whose cells do not match those of the base or
+/// that does not cover it.
 fn check_before_run(
     prospect: Option<&Prospect>,
     base: Option<&Base>,
     synthesis: &dyn Method,
 ) -> Result<(), ParameterError> {
     prospect.map_or(Ok(()), |fit| synthesis.check_prospect(fit))?;
-    match base.and_then(|base| base.expected) {
-        Some(place) => sastrugi_texture::check_cells(place.cell, synthesis.geometry().cell)
-            .map_err(|error| ParameterError::new("cell_m", format!("does not match `onto`: {error}"))),
+    let Some(place) = base.and_then(|base| base.expected) else { return Ok(()) };
+    let geometry = synthesis.geometry();
+    sastrugi_texture::check_cells(place.cell, geometry.cell).map_err(|error| {
+        ParameterError::new("cell_m", format!("does not match `onto`: {error}, or leave out `cell_m`"))
+    })?;
+    let key = if synthesis.parameters()["size_px"].is_null() { "size_m" } else { "size_px" };
+    match uncovered(&place, &geometry).filter(|_| !synthesis.is_periodic()) {
+        Some(why) => Err(ParameterError::new(key, format!("is too small: {why}, or leave out `{key}`"))),
         None => Ok(()),
     }
 }

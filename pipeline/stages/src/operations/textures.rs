@@ -3,10 +3,11 @@
 use crate::error::Error;
 use crate::job::JobError;
 use crate::memory;
-use sastrugi_numeric::Grid;
+use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_texture::synth::fft_ma::{self, CovarianceOf};
 use sastrugi_texture::synth::residual::NO_LONG_WAVES;
+use sastrugi_texture::synth::tile::DEFAULT_CELL_M;
 use sastrugi_texture::{Needs, Prospect};
 use serde_json::{Value, json};
 
@@ -84,24 +85,91 @@ pub fn has_its_texture(background: &str) -> String {
 /// # Errors
 /// Different cell sizes, or a base larger than such a texture.
 pub fn lay_onto(base: &Grid, texture: &Grid, periodic: bool, factors: Option<&Grid>) -> Result<Grid, JobError> {
-    let larger = base.rows() > texture.rows() || base.cols() > texture.cols();
-    if larger && !periodic {
-        return Err(JobError::new(format!(
+    match uncovered(&base.geometry, &texture.geometry).filter(|_| !periodic) {
+        Some(why) => Err(JobError::new(why)),
+        None => sastrugi_texture::modulated_onto(base, texture, factors).map_err(JobError::new),
+    }
+}
+
+/// Why a texture that does not repeat cannot be added to a base: it is smaller.
+pub fn uncovered(base: &Geometry, texture: &Geometry) -> Option<String> {
+    let larger = base.rows > texture.rows || base.cols > texture.cols;
+    larger.then(|| {
+        format!(
             "the base of {} x {} cells is larger than the texture of {} x {} cells, which does not repeat without seams; make the \
              texture larger or periodic",
-            base.rows(),
-            base.cols(),
-            texture.rows(),
-            texture.cols()
-        )));
+            base.rows, base.cols, texture.rows, texture.cols
+        )
+    })
+}
+
+/// Sets the cells of a texture to those of its base, and its size too, where the study states neither and the default cells do not suit the base.
+pub fn on_base_cells(base: &Geometry, parameters: &mut Value) {
+    let suits = || sastrugi_texture::check_cells(base.cell, [DEFAULT_CELL_M; 2]).is_ok();
+    if !parameters["cell_m"].is_null() || suits() {
+        return;
     }
-    sastrugi_texture::modulated_onto(base, texture, factors).map_err(JobError::new)
+    let [x, y] = base.cell;
+    parameters["cell_m"] = if x == y { json!(x) } else { json!([x, y]) };
+    if !states_size(parameters) {
+        on_base_size(base, parameters);
+    }
+}
+
+/// Sets the size of a texture to that of its base.
+pub fn on_base_size(base: &Geometry, parameters: &mut Value) {
+    parameters["size_px"] = json!([base.cols, base.rows]);
+}
+
+/// Whether parameters of a texture state its size.
+pub fn states_size(parameters: &Value) -> bool {
+    ["size_m", "size_px"].iter().any(|key| !parameters[*key].is_null())
+}
+
+/// A doubt about a texture whose stated size is not that of its base, which has the same cells; `None` if it is.
+pub fn size_doubt(base: &Geometry, texture: &Geometry) -> Option<String> {
+    if [texture.rows, texture.cols] == [base.rows, base.cols] {
+        return None;
+    }
+    let [[x, y], [base_x, base_y]] = [texture, base].map(|g| g.size().map(|side| (1e6 * side).round() / 1e6));
+    let what = match uncovered(base, texture) {
+        Some(_) => "repeats over its base of",
+        None => "is cut to its base of",
+    };
+    let (cols, rows) = (base.cols, base.rows);
+    Some(format!("{x} m x {y} m {what} {base_x} m x {base_y} m, whose size is `size_px = [{cols}, {rows}]`"))
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
     use sastrugi_schemas::fit::CovarianceMap;
+
+    /// Cells that are not stated are the base's where the default of 0.1 m does not suit it, and then a size that is not stated is too.
+    #[test]
+    fn val_cells_follow_the_base() {
+        let set = |cell: [f64; 2], parameters: Value| {
+            let mut own = parameters;
+            on_base_cells(&Geometry { rows: 30, cols: 40, cell, origin: [7.0, 9.0] }, &mut own);
+            own
+        };
+        assert_eq!(set([0.05; 2], json!({})), json!({ "cell_m": 0.05, "size_px": [40, 30] }));
+        assert_eq!(set([0.05, 0.06], json!({ "size_m": [2, 2] })), json!({ "cell_m": [0.05, 0.06], "size_m": [2, 2] }));
+        for (cell, kept) in [([0.1; 2], json!({})), ([0.05; 2], json!({ "cell_m": 0.2 }))] {
+            assert_eq!(set(cell, kept.clone()), kept);
+        }
+    }
+
+    /// A larger texture is cut and a smaller one repeats, if it can.
+    #[test]
+    fn val_sizes_beside_the_base() {
+        let [base, small, large] = [[30, 40], [30, 20], [30, 50]].map(|[rows, cols]| Geometry::square(rows, cols, 0.1));
+        assert_eq!((uncovered(&base, &base), uncovered(&base, &large), size_doubt(&base, &base)), (None, None, None));
+        assert!(uncovered(&base, &small).is_some_and(|why| why.contains("30 x 40 cells is larger than")));
+        let doubt = |texture: &Geometry| size_doubt(&base, texture).unwrap();
+        assert_eq!(doubt(&small), "2 m x 3 m repeats over its base of 4 m x 3 m, whose size is `size_px = [40, 30]`");
+        assert!(doubt(&large).starts_with("5 m x 3 m is cut to its base of 4 m x 3 m"), "{}", doubt(&large));
+    }
 
     /// Where holes are filled, no base is recommended for long waves.
     #[test]

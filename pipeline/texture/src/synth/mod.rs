@@ -50,6 +50,9 @@ pub trait Method: Send + Sync {
     /// The checked parameters with every default written out.
     fn parameters(&self) -> Value;
 
+    /// Whether the texture repeats without seams.
+    fn is_periodic(&self) -> bool;
+
     /// Cost of a texture, as far as it is known without the covariance.
     fn cost(&self) -> Cost;
 
@@ -459,6 +462,10 @@ impl<P: MethodParameters> Method for Checked<P> {
 
     fn parameters(&self) -> Value {
         self.tile.parameters_with(&self.own)
+    }
+
+    fn is_periodic(&self) -> bool {
+        self.tile.periodic
     }
 
     fn cost(&self) -> Cost {

@@ -299,6 +299,10 @@ impl<P: ResidualParameters> Method for Checked<P> {
         self.tile.parameters_of_site(&self.own)
     }
 
+    fn is_periodic(&self) -> bool {
+        self.tile.periodic
+    }
+
     fn cost(&self) -> Cost {
         Checked::cost(self, None)
     }

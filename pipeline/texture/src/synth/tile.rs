@@ -13,9 +13,9 @@ use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 /// Vecherin et al. 2022, Figure 5.
-const DEFAULT_SIZE_M: [f64; 2] = [20.0; 2];
+pub const DEFAULT_SIZE_M: [f64; 2] = [20.0; 2];
 /// Vecherin et al. 2022, section 3.2.
-const DEFAULT_CELL_M: f64 = 0.1;
+pub const DEFAULT_CELL_M: f64 = 0.1;
 /// Most cells of a texture: 2 GiB of heights, the limit for rasters that are read back.
 pub const CELLS_MAX: u64 = 1 << 28;
 /// A quotient this close to an integer counts as that integer.
