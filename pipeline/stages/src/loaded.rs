@@ -1,6 +1,7 @@
 //! Loading of studies: reading, checking, and building the graph of items.
 
 use crate::builder::{BuildError, Builder, Heightfield, InputPlace, Origin};
+use crate::documents;
 use crate::error::{Error, of_build};
 use crate::hypotheses;
 use crate::registry::{self, SECTIONS};
@@ -151,7 +152,8 @@ fn build(study: &Study, errors: Vec<StudyError>) -> Result<Plan, BuildError> {
     builder.check()?;
     let splits = splits::draw(study, &builder.heightfields, &builder.graph)?;
     let origins = builder.take_origins();
-    let mut doubts = std::mem::take(&mut builder.doubts);
+    let mut doubts: Vec<String> = documents::license_warning(&study.head.license).into_iter().collect();
+    doubts.append(&mut builder.doubts);
     doubts.extend(hypotheses::doubts(&builder));
     let Builder { graph, inputs, heightfields, .. } = builder;
     Ok(Plan { graph, inputs, splits, origins, doubts, heightfields })

@@ -724,6 +724,34 @@ mod tests {
         }
     }
 
+    /// What a release says of licences is told before the run, each once: of the study's that is not an SPDX identifier, of data without one, and of
+    /// data whose licence may not permit the release, unless its text is supplied.
+    #[test]
+    fn val_doubts_about_licences_are_told_before_the_run() {
+        let folder = tempfile::tempdir().unwrap();
+        fs::write(folder.path().join("terms.txt"), "As you like.").unwrap();
+        fs::write(folder.path().join("site.asc"), "ncols 2\nnrows 2\nxllcorner 0\nyllcorner 0\ncellsize 1\n1 2\n3 4\n")
+            .unwrap();
+        let doubts = |license: &str, of_dem: &str| {
+            let head = format!("[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\nlicense = \"{license}\"\n");
+            let text = format!("{head}[[dem]]\nid = \"site\"\nfile = \"site.asc\"\n{of_dem}\n");
+            load_text(&text, "study", folder.path()).map_err(|e| e.to_string()).unwrap().doubts
+        };
+        let gpl = "license = \"GPL-3.0-only\"";
+        let unknown =
+            "dem \"site\": it is unknown whether data under \"GPL-3.0-only\" may be released under \"CC-BY-4.0\"";
+        for (license, of_dem, words) in [
+            ("CC BY 4", "license = \"CC-BY-4.0\"", "[study] license \"CC BY 4\" is not in the SPDX list"),
+            ("CC-BY-4.0", "", "dem \"site\": no `license` is stated"),
+            ("CC-BY-4.0", gpl, unknown),
+        ] {
+            let found = doubts(license, of_dem);
+            assert!(found.len() == 1 && found[0].starts_with(words), "{found:?}");
+        }
+        assert_eq!(doubts("CC-BY-4.0", "license = \"CC-BY-4.0\""), [""; 0]);
+        assert_eq!(doubts("CC-BY-4.0", &format!("{gpl}\nlicense_file = \"terms.txt\"")), [""; 0]);
+    }
+
     /// Numbers, of which most parameters accept some.
     const NUMBERS: &[&str] =
         &["-1", "0", "1", "2", "3", "64", "300", "0.0", "0.05", "0.5", "2.5", "-2.5", "1e300", "1e-300"];

@@ -95,6 +95,19 @@ pub fn objection(source: &DemItem, release: &str) -> Option<Objection> {
     )))
 }
 
+/// What a plan warns of: data without a stated licence, or one of which it is unknown whether it permits the release, unless the study supplies its
+/// text, and so has read it.
+pub fn doubt(source: &DemItem, release: &str) -> Option<String> {
+    let why = match objection(source, release) {
+        Some(Objection::Unknown(sentence)) if source.license_file.is_none() => sentence,
+        None if source.license.is_none() => format!(
+            "no `license` is stated; the release, which contains derivatives, is under \"{release}\": state the licence of the data"
+        ),
+        _ => return None,
+    };
+    Some(format!("dem \"{}\": {why}", source.id))
+}
+
 fn refusal(theirs: &Known, ours: &Known, stated: &str) -> Option<String> {
     let alike = ours.family == theirs.family && ours.version >= theirs.version;
     let non_commercial =

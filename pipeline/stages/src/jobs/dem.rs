@@ -46,6 +46,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     if let Some(Objection::Conflict(why)) = terms::objection(&item, &builder.study.head.license) {
         return Err(entry.error("license", format!("`license` {why}")).into());
     }
+    builder.doubts.extend(terms::doubt(&item, &builder.study.head.license));
     let id = item.id.clone();
     let mut original = Original::of(&format!("dem/{id}"), &builder.study.folder, &item.file)?;
     if let Some(text) = &item.license_file {
