@@ -155,6 +155,18 @@ fn val_places_are_refused_before_the_run() {
         ),
         (texture("empirical", "cell_m = 2.0\nmethod = \"gaussians\""), &["`method`", "made by `fft_ma` only"]),
         (
+            texture("exponential", "").replace("outer_scale_m = 6.0", "outer_scale_m = 7.0"),
+            &["fit \"f\"", "the outer scale of 7 m is more than a third of the DEM; it must be at most 6.66"],
+        ),
+        (
+            texture("exponential", "").replace("outer_scale_m = 6.0", "outer_scale_m = 5.0"),
+            &["fit \"f\"", "the outer scale of 5 m is less than three cells of 2 m"],
+        ),
+        (
+            texture("exponential", "").replace("outer_scale_m = 6.0", "outer_scale_m = 6.0\nmax_lag_m = 11.0"),
+            &["fit \"f\"", "`max_lag_m` is 11 m; it must be at most half the DEM's side, 10 m"],
+        ),
+        (
             texture("exponential", "cell_m = 1.0\nonto = \"site\""),
             &["`cell_m`", "generate the texture at the base's cell size"],
         ),

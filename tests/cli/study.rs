@@ -17,7 +17,7 @@ fn planned(folder: &Path, study: &str) -> (Value, String) {
 fn val_studies_to_start_from_can_be_run() {
     let folder = area();
     let path = folder.path();
-    std::fs::copy(sastrugi_fixtures::jacksboro(), path.join("site.tif")).unwrap();
+    std::fs::copy(sastrugi_fixtures::otira(), path.join("site.tif")).unwrap();
     for kind in KINDS {
         let file = format!("my-{kind}.toml");
         let call = sastrugi_in(path, &["init", kind, "-o", &file]);

@@ -209,6 +209,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
     let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
         return Err(builder.no_surface(entry, "dem", &item.dem).into());
     };
+    if let Some(place) = &field.expected {
+        settings.iter().try_for_each(|settings| check_place(entry, settings, place))?;
+    }
     expanded.iter().try_for_each(|one| builder.claim(entry, STAGE, &one.id))?;
     let masks = mask::add(builder, entry, &item)?;
     let noise_reference = mask::add_noise_reference(builder, entry, &item)?;
@@ -251,6 +254,14 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
         builder.fits.push(one.id);
     }
     Ok(())
+}
+
+/// Refuses settings that a fit of a DEM of this shape would refuse.
+fn check_place(entry: &Entry<'_>, settings: &FitSettings, dem: &Geometry) -> Result<(), StudyError> {
+    settings.check_place(dem).map_err(|error| match error {
+        FitError::Parameter(parameter) => entry.refuse(parameter),
+        other => entry.error("outer_scale_m", other.to_string()),
+    })
 }
 
 /// The settings of a fit.

@@ -173,7 +173,7 @@ mod tests {
     use crate::study::Study;
     use serde_json::Value;
 
-    /// Memory of an item of a study with a DEM of 9 cells, `site`, and another one, `large`.
+    /// Memory of an item of a study with a DEM of 144 cells, `site`, and another one, `large`.
     fn memory_bytes(folder: &Path, tables: &str, item: &ItemRef) -> u64 {
         let text = format!(
             "[study]\nname = \"masks\"\nseed = 1\ndate = \"2026-01-01\"\n[[dem]]\nid = \"site\"\nfile = \"site.asc\"\n\
@@ -189,7 +189,7 @@ mod tests {
         builder.graph.node(position).job.memory_bytes()
     }
 
-    /// A DEM of 9 cells takes little, but not what is read with it: 2^26 cells according to a header, or a million corners.
+    /// A DEM of 144 cells takes little, but not what is read with it: 2^26 cells according to a header, or a million corners.
     #[test]
     fn val_masks_obstacles_and_other_rasters_count_as_memory() {
         let folder = tempfile::tempdir().unwrap();
@@ -197,11 +197,11 @@ mod tests {
         let corners = "[0,1],".repeat(1_000_000);
         write("corners.geojson", &format!("{{\"type\": \"Polygon\", \"coordinates\": [[{corners}[0,0]]]}}"));
         let placed = "xllcorner 0\nyllcorner 0\ncellsize 1";
-        write("site.asc", &format!("ncols 3\nnrows 3\n{placed}\n1 2 3 4 5 6 7 8 9\n"));
+        write("site.asc", &format!("ncols 12\nnrows 12\n{placed}\n{}", "1 2 3 4 5 6 7 8 9 8 7 6\n".repeat(12)));
         write("large.asc", &format!("ncols 8192\nnrows 8192\n{placed}\n1\n"));
         let (heights, raster, polygon) = (8_u64 << 26, 16_u64 << 26, 5_000_000 * size_of::<Value>() as u64);
         let fit = |keys: &str| {
-            let table = format!("[[fit]]\nid = \"f\"\ndem = \"site\"\nouter_scale_m = 2.0\n{keys}\n");
+            let table = format!("[[fit]]\nid = \"f\"\ndem = \"site\"\nouter_scale_m = 3.0\n{keys}\n");
             memory_bytes(folder.path(), &table, &ItemRef::new(jobs::fit::STAGE, "f"))
         };
         let route = |keys: &str| {

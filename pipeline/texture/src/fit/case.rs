@@ -41,15 +41,7 @@ impl<'a> Case<'a> {
             return Err(ParameterError::new("model", message).into());
         }
         let window = settings.window(&geometry, profiles)?;
-        let max_lag_m = settings.max_lag_m(&geometry);
-        let [width_m, height_m] = geometry.size();
-        let half_m = 0.5 * if profiles { width_m } else { width_m.min(height_m) };
-        if max_lag_m > half_m {
-            let message = format!(
-                "is {max_lag_m} m; it must be at most half the DEM's side, {half_m} m, beyond which pairs are too few"
-            );
-            return Err(ParameterError::new("max_lag_m", message).into());
-        }
+        let max_lag_m = settings.max_lag_m(&geometry, profiles)?;
         let cells = |axis: usize| (max_lag_m / geometry.cell[axis] * (1.0 + 1e-9)) as usize;
         let max_lag = [if profiles { 0 } else { cells(1) }, cells(0)];
         if settings.empirical && profiles {

@@ -123,7 +123,7 @@ impl FitOutcome {
             return refused("needs a raster, but the heights are transects");
         }
         let geometry = heights.geometry();
-        let max_lag_m = self.settings.max_lag_m(&geometry);
+        let max_lag_m = self.settings.max_lag_m(&geometry, false)?;
         Ok(Case {
             heights,
             settings: &self.settings,

@@ -354,9 +354,27 @@ impl FitSettings {
         Ok(BoxWindow { half: [if profiles { 0 } else { rows }, cols] })
     }
 
-    /// Largest lag in m.
-    pub(super) fn max_lag_m(&self, dem: &Geometry) -> f64 {
+    /// Refuses a DEM of this shape as a fit of it would: one that is too small for the outer scale or the lags, or has too large cells.
+    ///
+    /// # Errors
+    /// [`FitError::DemTooSmall`], [`FitError::OuterScaleTooLarge`], [`FitError::OuterScaleTooSmall`], or the parameter `max_lag_m`.
+    pub fn check_place(&self, dem: &Geometry) -> Result<(), FitError> {
+        self.window(dem, false)?;
+        self.max_lag_m(dem, false).map(drop)
+    }
+
+    /// Largest lag on a DEM of this shape, m; for transects, along them.
+    pub(super) fn max_lag_m(&self, dem: &Geometry, profiles: bool) -> Result<f64, FitError> {
         let least = LAG_CELLS_MIN * dem.cell[0].max(dem.cell[1]);
-        self.parameters.max_lag_m.unwrap_or(0.5 * self.parameters.outer_scale_m).max(least)
+        let max_lag_m = self.parameters.max_lag_m.unwrap_or(0.5 * self.parameters.outer_scale_m).max(least);
+        let [width_m, height_m] = dem.size();
+        let half_m = 0.5 * if profiles { width_m } else { width_m.min(height_m) };
+        if max_lag_m > half_m {
+            let message = format!(
+                "is {max_lag_m} m; it must be at most half the DEM's side, {half_m} m, beyond which pairs are too few"
+            );
+            return Err(ParameterError::new("max_lag_m", message).into());
+        }
+        Ok(max_lag_m)
     }
 }
