@@ -328,18 +328,21 @@ impl Doubts {
                 .and_then(ScaleExplicit::structure)
                 .map(|s| format!(" and the structure function ({} m at 1 m, H {})", digits4(s.sigma_m), hurst(&s)));
             let growth = growth.unwrap_or_default();
-            format!("No single scale below {window_m} m: publish band RMS {rms_m} m{growth}, not sigma and b")
+            format!(
+                "No single scale below {window_m} m: publish band RMS {rms_m} m{growth}, with the outer scale, not sigma and b (range_m), which \
+                 change with it"
+            )
         } else if self.misfit.is_some() {
             format!(
-                "The {model} model does not fit the covariance below {window_m} m: publish band RMS {rms_m} m, or try --model auto"
+                "The {model} model does not fit the covariance below {window_m} m: publish band RMS {rms_m} m, or try model = \"auto\" (--model auto)"
             )
         } else if self.range.is_some() {
             let slope = sill_over_range(&estimate.covariance);
             let slope = slope.map_or_else(String::new, |slope| format!("sigma^2 / b = {} m and ", digits4(slope)));
-            format!("b is not identified below {window_m} m: publish {slope}band RMS {rms_m} m")
+            format!("b (range_m) is not identified below {window_m} m: publish {slope}band RMS {rms_m} m")
         } else {
             let interval =
-                if findings.intervals.is_some() { "with their intervals" } else { "once --bootstrap gives intervals" };
+                if findings.intervals.is_some() { "with their intervals" } else { "once `bootstrap` gives intervals" };
             format!(
                 "The {model} model describes the surface below {window_m} m{}: publish its parameters {interval}",
                 self.caveat()
@@ -371,7 +374,8 @@ fn carried_sentence(carried: &Carried, case: &Case) -> String {
     });
     let is_off = off(carried.rms_share, of_rms) || worst.is_some();
     let can_be_better = !case.settings.empirical && !case.heights.are_profiles();
-    let better = if is_off && can_be_better { "; --model empirical reproduces both" } else { "" };
+    let better =
+        if is_off && can_be_better { "; model = \"empirical\" (--model empirical) reproduces both" } else { "" };
     format!(" A texture reproduces {:.0} % of the residual's RMS{octave}{better}.", 100.0 * carried.rms_share)
 }
 
@@ -480,7 +484,7 @@ fn isotropy_warning(estimate: &Estimate, findings: &Findings) -> Option<String> 
     let found = findings.isotropy.as_ref().filter(|_| !estimate.form.is_anisotropic())?;
     (found.p <= TEST_LEVEL && found.ratio < RATIO_WORTH_A_WARNING).then(|| {
         format!(
-            "not isotropic ({}): ranges {:.2} times as long along azimuth {:.0} degrees; try --model anisotropic:{}",
+            "not isotropic ({}): ranges {:.2} times as long along azimuth {:.0} degrees; try model = \"anisotropic:{}\"",
             p_value(found.p, 0),
             1.0 / found.ratio,
             found.azimuth_deg,

@@ -601,6 +601,9 @@ fn val_no_scale_leads_with_scale_explicit_numbers() {
     let truth = covariance("self_affine", &[("increment_1m_m", 0.1), ("hurst", 0.8)]);
     let found = fit(&field_of(&truth, 400, 3), &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
     assert!(found.verdict.starts_with("No single scale below 1.980 m: publish band RMS"), "{}", found.verdict);
+    // Words for a study and for the verb, and what b is called in a fit file.
+    let advice = ", with the outer scale, not sigma and b (range_m), which change with it.";
+    assert!(found.verdict.contains(advice), "{}", found.verdict);
     assert!(found.warnings.iter().any(|w| w.starts_with("no scale separation")), "{:?}", found.warnings);
     let found = found.diagnostics;
     let [hurst, increment_m] = [found.hurst, found.increment_1m_m].map(Option::unwrap);
