@@ -74,6 +74,8 @@ pub fn of_file(table: &Table, file: &str, splits: &Splits) -> Option<&'static st
 /// Terrains that stay in the same split.
 struct Unit {
     terrains: Vec<String>,
+    /// Those of them without a label, such as the base of others.
+    unlabelled: Vec<String>,
     /// Labels of its terrains; empty when none has one.
     groups: BTreeSet<String>,
     /// Its rank in the draw.
@@ -110,12 +112,19 @@ fn too_few(study: &Study, groups: &BTreeSet<String>, units: &[Unit], shares: &[f
     let names: Vec<String> = groups.iter().map(|group| format!("\"{group}\"")).collect();
     let of = if names.is_empty() { "the study".to_owned() } else { format!("group {}", names.join(" with ")) };
     let parts = shares.iter().filter(|share| **share > 0.0).count();
-    let terrains = units.iter().map(|unit| unit.terrains.len()).sum::<usize>();
-    let tied = match units.iter().max_by_key(|unit| unit.terrains.len()) {
-        Some(Unit { terrains: tied, .. }) if terrains > units.len() => format!(
-            " in {} ({} belong together: one is made from the other or they share random draws)",
+    // In a group, terrains without a label only tie others together.
+    let is_counted = |unit: &Unit, id: &String| groups.is_empty() || !unit.unlabelled.contains(id);
+    let own = |unit: &Unit| unit.terrains.iter().filter(|id| is_counted(unit, id)).cloned().collect::<Vec<String>>();
+    let terrains = units.iter().map(|unit| own(unit).len()).sum::<usize>();
+    let tied = match units.iter().max_by_key(|unit| own(unit).len()) {
+        Some(unit) if terrains > units.len() => format!(
+            " in {} ({} belong together: {})",
             counted(units.len(), "independent set"),
-            tied.join(", ")
+            own(unit).join(", "),
+            match &unit.unlabelled[..] {
+                ties @ [_, ..] if !groups.is_empty() => format!("tied together through {}", ties.join(", ")),
+                _ => "one is made from the other or they share random draws".to_owned(),
+            }
         ),
         _ => String::new(),
     };
@@ -170,10 +179,12 @@ fn units(study: &Study, fields: &BTreeMap<String, Heightfield>, graph: &Graph) -
         let rank = || Streams::for_item(study.head.seed, STAGE, root.trim_start()).stream("rank").bits();
         let unit = units.entry(root.clone()).or_insert_with(|| Unit {
             terrains: Vec::new(),
+            unlabelled: Vec::new(),
             groups: BTreeSet::new(),
             rank: rank(),
         });
         unit.terrains.push(id.clone());
+        unit.unlabelled.extend((!field.is_grouped).then(|| id.clone()));
         unit.groups.extend(field.group.clone().filter(|_| field.is_grouped));
     }
     units.into_values().collect()
@@ -300,6 +311,13 @@ mod tests {
             size_m = [3.2, 3.2]\ncell_m = 0.05\n";
         let error = splits(&format!("{HEAD}split = [0.7, 0.15, 0.15]\n{}{onto}", terrain("a", "a", 2))).unwrap_err();
         assert!(error.contains("3 terrains in 2 independent sets (a-0001, t belong together"), "{error}");
+        // A base without a group is not one of the terrains, but ties those on it together.
+        let on_base = |id: &str| onto.replace("\"t\"", &format!("\"{id}\"")).replace("\"a-0001\"", "\"base\"");
+        let base = "[[terrain]]\nid = \"base\"\nkind = \"multifractal\"\nsize_px = [64, 64]\n";
+        let on_bases = ["t1", "t2", "t3", "t4"].map(on_base).concat();
+        let error = splits(&format!("{HEAD}split = [0.7, 0.15, 0.15]\n{base}{on_bases}")).unwrap_err();
+        let said = "group \"a\" has 4 terrains in 1 independent set (t1, t2, t3, t4 belong together: tied together through base)";
+        assert!(error.contains(said), "{error}");
         for (shares, words) in
             [("[0.5, 0.5, 0.5]", "add up to 1"), ("[1.2, -0.2, 0.0]", "0 to 1"), ("[1.0, 0.0, 0.0]", "two")]
         {
