@@ -20,7 +20,7 @@ use sastrugi_stages::studies::{self, RunRequest, RunSummary};
 use sastrugi_stages::verbs::{parameters, traverse as drive};
 use sastrugi_stages::verification::{self, Difference, Recompute};
 use serde_json::json;
-use std::path::{Path, PathBuf};
+use std::path::{Component, Path, PathBuf};
 use std::time::Instant;
 
 /// Default limit on the working memory of concurrent items, GiB.
@@ -246,6 +246,7 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     if let Some(largest) = plan.stale.iter().max_by_key(|s| s.memory_bytes) {
         text.push_str(&format!(", at most {} of memory (for {})", bytes(largest.memory_bytes as f64), largest.item));
     }
+    text.push_str(&format!("; compared with {}", compared_with(&args.place)));
     let shown = plan.stale.iter().take(PLAN_LINES);
     let rows: Vec<Vec<String>> =
         shown.map(|s| vec![format!("  {}", s.item), seconds(s.seconds), s.reason.to_string()]).collect();
@@ -256,6 +257,15 @@ pub fn plan(args: &Plan, common: &Common) -> Verdict {
     }
     print_long(common.json, &plan, &text)?;
     Ok(Code::Done)
+}
+
+/// What a plan compares the study with: the results of a release, or of another work area.
+fn compared_with(place: &Place) -> String {
+    let path = place.work.as_ref().unwrap_or(&place.output);
+    // A bare name does not look like a folder.
+    let is_bare = path.components().eq([Component::Normal(path.as_os_str())]);
+    let start = if is_bare { "./" } else { "" };
+    format!("{start}{}", path.display())
 }
 
 /// A table of shards, and what to know about them.
@@ -382,6 +392,24 @@ mod tests {
             unusable_input: false,
             skipped_for: skipped_for.map(|cause| ItemRef::new("fit", cause)),
             parameters: None,
+        }
+    }
+
+    /// A bare name looks like a folder; with a work area of its own that is what the study is compared with.
+    #[test]
+    fn val_a_plan_names_what_it_compares_with() {
+        let named = |output: &str, work: Option<&str>| {
+            compared_with(&Place { output: PathBuf::from(output), work: work.map(PathBuf::from) })
+        };
+        for (output, work, expected) in [
+            ("release", None, "./release"),
+            ("./release", None, "./release"),
+            ("out/snow", None, "out/snow"),
+            ("/data/snow", None, "/data/snow"),
+            ("s3://bucket/snow", None, "s3://bucket/snow"),
+            ("release", Some("scratch"), "./scratch"),
+        ] {
+            assert_eq!(named(output, work), expected);
         }
     }
 
