@@ -317,7 +317,7 @@ fn val_traverse_states_why_it_refuses() {
         assert!(!folder.path().join("drive").exists());
     };
     refused(&ascii(0.1, |_, _| 0.0), &[], "the terrain is 9.60 x 9.60 m, including a border of 5 m");
-    let steep = "from the edge; every cell is steeper than [roughness] low_max: use a smoother terrain";
+    let steep = "from the edge; every cell is steeper than [roughness] low_max: use a smoother terrain (a texture of smaller `amplitude`), larger cells";
     refused(&ascii(0.1, |row, col| f64::from((row + col) % 2)), &short, steep);
     // Spikes 0.8 m apart, between which no disc of the closing fits.
     let spikes = |row: u32, col: u32| if row.is_multiple_of(8) && col.is_multiple_of(8) { 1.0 } else { 0.0 };

@@ -55,10 +55,12 @@ impl StraightJob {
             let radius_m = self.closing_radius_m;
             return format!(
                 "; {percent:.2} % of the surface was low before closing with [roughness] closing_radius_m = {radius_m} m: reduce the radius if the \
-                 vehicle is smaller"
+                 vehicle is smaller, or raise `low_max`"
             );
         }
-        "; every cell is steeper than [roughness] low_max: use a smoother terrain, a narrower `border_m` or a larger `low_max`".to_owned()
+        "; every cell is steeper than [roughness] low_max: use a smoother terrain (a texture of smaller `amplitude`), larger cells, a narrower \
+         `border_m` or a larger `low_max`"
+            .to_owned()
     }
 }
 
