@@ -20,10 +20,18 @@ pub fn share() {
     let mut arguments = env::args_os();
     let Some(name) = arguments.next() else { return };
     let arguments: Vec<_> = arguments.collect();
-    if env::var_os(ARENAS).is_none() && arguments.iter().any(|argument| limits_memory(argument)) {
-        // On success this does not return; without a limit on arenas the program still works.
+    let is_limited = arguments.iter().any(|argument| limits_memory(argument));
+    if is_limited && env::var_os(ARENAS).is_none() && can_start_again() {
+        // Does not return, unless it fails.
         let _ = Command::new(PROGRAM).arg0(name).args(arguments).env(ARENAS, "1").exec();
     }
+}
+
+/// Whether the program can be started again: not without /proc, nor where the dynamic loader was given the program to start, since /proc then names
+/// the loader. A failed start changes how signals are handled, so it is not simply tried.
+fn can_start_again() -> bool {
+    let program = std::fs::read_link(PROGRAM);
+    program.is_ok_and(|path| path.file_name().is_some_and(|name| !name.as_encoded_bytes().starts_with(b"ld")))
 }
 
 fn limits_memory(argument: &OsStr) -> bool {

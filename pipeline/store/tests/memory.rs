@@ -168,7 +168,7 @@ fn val_rasters_allocate_no_memory_for_claimed_cells() {
     }
 }
 
-/// Nor for tiles larger than their raster, nor for the texts of its header.
+/// Nor for tiles larger than their raster, nor for the texts of its header. What is legal is read.
 #[test]
 fn val_rasters_allocate_no_memory_for_claimed_tiles_and_texts() {
     let _alone = ALONE.lock().unwrap();
@@ -176,6 +176,13 @@ fn val_rasters_allocate_no_memory_for_claimed_tiles_and_texts() {
     let path = folder.path().join("a.tif");
     let (nodata, metadata) = (42_113, 42_112);
     for is_placed in [false, true] {
+        // A strip with more rows than the raster is legal, and so is metadata that cannot be read.
+        let mut legal = tiff(5, None, is_placed, &[[metadata, 8]]);
+        let rows_per_strip = [278_u16.to_le_bytes(), 4_u16.to_le_bytes()].concat();
+        let at = legal.windows(4).position(|bytes| bytes == rows_per_strip).unwrap();
+        legal[at + 8..at + 12].fill(0xff);
+        std::fs::write(&path, legal).unwrap();
+        assert_eq!(dem::read(&path).unwrap().grid.values, [257.0; 25], "placed: {is_placed}");
         for (tile, texts) in [(Some(16_000), &[][..]), (None, &[[metadata, 1 << 30], [nodata, 0x7e00_0000]])] {
             std::fs::write(&path, tiff(5, tile, is_placed, texts)).unwrap();
             let (peak, read) = peak_of(|| dem::read(&path));

@@ -56,9 +56,6 @@ pub fn assemble(contents: &Contents<'_>, dest: &Path, progress: &dyn Progress) -
     for note in &sources.notes {
         builder.note(note.clone());
     }
-    if let Some(warning) = documents::license_warning(&contents.study.head.license) {
-        progress.phase(&warning);
-    }
     progress.phase("writing tables");
     let written = fragments.write(&mut builder, contents.splits, &changed);
     (contents.on_changed)(changed)?;

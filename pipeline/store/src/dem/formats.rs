@@ -23,7 +23,7 @@ type Render = fn(&Path, &Grid, &Crs, &WriteOptions) -> Result<(Vec<u8>, Vec<Stri
 
 /// Capabilities of a format.
 pub(super) struct Codec {
-    format: Format,
+    pub format: Format,
     /// Name in tables.
     name: &'static str,
     /// Endings of file names, in lower case.

@@ -19,7 +19,7 @@ use std::iter::successors;
 use std::ops::Range;
 use std::path::Path;
 use tiff::decoder::ifd::Value;
-use tiff::decoder::{Decoder, DecodingResult, IfdDecoder, Limits};
+use tiff::decoder::{ChunkType, Decoder, DecodingResult, IfdDecoder, Limits};
 use tiff::tags::Tag;
 use tiff_reader::TiffError;
 
@@ -206,7 +206,8 @@ impl<R: Read + Seek> Raster<R> {
             Err(e) => Err(refused(&e)),
         };
         let nodata = text(Tag::GdalNodata)?.and_then(|text| parse_nodata(&text));
-        let metadata = text(Tag::Unknown(band::TAG))?;
+        // Metadata may be in any encoding, and most of it is for other programs.
+        let metadata = text(Tag::Unknown(band::TAG)).ok().flatten();
         let values = metadata.map(|text| Values::of_metadata(&text)).unwrap_or_default();
         let mut notes = vec!["the TIFF has no georeferencing".to_owned()];
         notes.extend(values.note());
@@ -218,6 +219,8 @@ impl<R: Read + Seek> Raster<R> {
         if wide == 0 || high == 0 {
             return Err(Refusal::new("has empty strips or tiles"));
         }
+        // A strip may state more rows than the raster has, by default 2^32 - 1; a tile is decoded whole.
+        let high = if decoder.get_chunk_type() == ChunkType::Strip { high.min(rows) } else { high };
         affordable(high, wide, 8, size)?;
         let block_rows = (high as usize).min(geometry.rows);
         Ok(Self { pixels: Pixels::Plain(Box::new(decoder)), geometry, info, block_rows })

@@ -196,7 +196,8 @@ pub fn claimed(path: &Path, options: &ReadOptions) -> Option<Claimed> {
 /// The file beside a raster that [`read`] opens too: the `.prj` file of an ESRI ASCII grid, whatever the name of the grid.
 pub fn sidecar(path: &Path) -> Option<PathBuf> {
     let (_, first) = opened(path).ok()?;
-    Some(ascii::prj_beside(path)).filter(|prj| ascii::looks_like(&first) && prj.exists())
+    let is_grid = formats::of_header(path, &first).is_some_and(|codec| codec.format == Format::EsriAscii);
+    Some(ascii::prj_beside(path)).filter(|prj| is_grid && prj.exists())
 }
 
 /// Writes heights in the format given by the file name's ending: `.tif` (float32, tiles of 256, no data -9999, PixelIsArea),

@@ -525,6 +525,7 @@ fn val_a_prj_file_belongs_to_an_ascii_grid() {
     for name in ["a.asc", "a.txt", "a.grd", "a"] {
         assert_eq!(beside(name, grid), Some(prj.clone()), "{name}");
     }
+    assert_eq!(beside("a.asc", &[&[b'\n'; 100], &grid[3..]].concat()), Some(prj.clone()));
     assert_eq!(beside("a.csv", b"x,y,z\n0,0,1\n"), None);
     assert_eq!(sidecar(&folder.path().join("none.asc")), None);
 }
