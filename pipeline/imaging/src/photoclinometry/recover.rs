@@ -290,8 +290,7 @@ impl<'a> Inversion<'a> {
         let mut warnings = Vec::new();
         let beyond = known.points.len() - constraints.len();
         if beyond > 0 {
-            warnings
-                .push(format!("ignored {beyond} of {}, for lying off the map", counted(known.points.len(), "point")));
+            warnings.push(format!("ignored {beyond} of {} off the map", counted(known.points.len(), "point")));
         }
         if let Some(coarse) = &known.coarse {
             constraints.extend(Constraint::coarse(&g, &coarse.dem, coarse.sigma_m));

@@ -155,9 +155,7 @@ struct Subtrahend {
 
 impl Subtrahend {
     fn of(builder: &Builder<'_>, entry: &Entry<'_>, id: &str) -> Result<Self, BuildError> {
-        let Some(field) = builder.heightfields.get(id) else {
-            return Err(builder.no_surface(entry, "minus", id).into());
-        };
+        let field = builder.surface(entry, "minus", id)?;
         let source = builder.source_of(id, field);
         Ok(Self { id: id.to_owned(), dem: field.into(), source })
     }
@@ -206,9 +204,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>, recovered: bool) -> R
     check_noise_reference(item.noise_reference.is_some(), item.minus.is_some()).map_err(|e| entry.refuse(e))?;
     let expanded = entry.expand(&item.id, None, &item.sweep, &params)?;
     let settings = expanded.iter().map(|one| settings_of(entry, &item, one)).collect::<Result<Vec<_>, _>>()?;
-    let Some(field) = builder.heightfields.get(&item.dem).cloned() else {
-        return Err(builder.no_surface(entry, "dem", &item.dem).into());
-    };
+    let field = builder.surface(entry, "dem", &item.dem)?.clone();
     if let Some(place) = &field.expected {
         settings.iter().try_for_each(|settings| check_place(entry, settings, place))?;
     }

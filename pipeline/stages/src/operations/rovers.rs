@@ -207,7 +207,7 @@ fn unchecked_starts(parameters: &RoverParameters, streams: &Streams) -> Vec<Star
 pub fn redrawn(parameters: &RoverParameters, streams: &Streams, starts: &[Start]) -> Option<String> {
     let count = unchecked_starts(parameters, streams).iter().zip(starts).filter(|(first, kept)| first != kept).count();
     let all = counted(starts.len(), "start");
-    (count > 0).then(|| format!("redrew {count} of {all}, for lack of ground there or at the goal"))
+    (count > 0).then(|| format!("redrew {count} of {all}: no ground there or at the goal"))
 }
 
 /// Text on the extent of a terrain.

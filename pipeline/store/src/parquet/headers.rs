@@ -195,7 +195,7 @@ impl Header {
             }
         }
         let message = format!(
-            "the file is damaged: at byte {}, there is no page header that Parquet defines, or it claims more than {PAGE_MAX} bytes",
+            "the file is damaged: no valid page header at byte {}, or one that claims more than {PAGE_MAX} bytes",
             self.start
         );
         Err(io::Error::new(ErrorKind::InvalidData, message))

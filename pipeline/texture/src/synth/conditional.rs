@@ -93,7 +93,8 @@ impl std::fmt::Display for Filled {
     fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
         write!(f, "filled {}", counted(self.cells, "no-data cell"))?;
         if self.left > 0 {
-            write!(f, ", and left {} not enclosed by data", counted(self.left, "cell"))?;
+            let stay = if self.left == 1 { "stays" } else { "stay" };
+            write!(f, "; {} {stay} empty, not enclosed by data", self.left)?;
         }
         if let Some(range_m) = self.twin_range_m {
             write!(f, "; the self-affine covariance was replaced by a Matern one of range {range_m} m")?;
@@ -483,9 +484,9 @@ mod tests {
         assert!(filled.grid.at(12, 18).is_finite() && filled.grid.at(38, 20).is_nan());
         assert_eq!((filled.cells + filled.left, filled.grid.finite_count()), (480, 1120 + filled.cells));
         let one = Filled { cells: 1, left: 1, ..filled.clone() };
-        assert_eq!(one.to_string(), "filled 1 no-data cell, and left 1 cell not enclosed by data");
+        assert_eq!(one.to_string(), "filled 1 no-data cell; 1 stays empty, not enclosed by data");
         let many = Filled { cells: 80, left: 400, ..filled };
-        assert_eq!(many.to_string(), "filled 80 no-data cells, and left 400 cells not enclosed by data");
+        assert_eq!(many.to_string(), "filled 80 no-data cells; 400 stay empty, not enclosed by data");
         let empty = Grid::filled(dem.geometry, f64::NAN);
         assert_eq!(fill(&empty, &exponential(), &streams).unwrap_err(), FillError::NoData);
     }

@@ -53,7 +53,7 @@ pub(super) fn survey(chosen: &Chosen<'_>) -> Result<(Survey, Vec<String>), Refus
     })?;
     let total = counted(cloud.declared.points, "point");
     if points == 0 && other > 0 {
-        return Err(Refusal::new(format!("has {total}, none of class 2, ground")));
+        return Err(Refusal::new(format!("has {total}, but none of class 2, ground")));
     }
     if points == 0 {
         return Err(Refusal::new(format!("every point is withheld or noise, {total} in all")));

@@ -145,7 +145,7 @@ fn val_noise_and_other_classes_are_left_out() {
         assert!(bare.dem.info.notes.iter().any(|note| note == "left out 1 point not of class 2, ground"));
     }
     let error = grid_bytes(&plain(&shots[4..]), &settings).unwrap_err();
-    assert!(error.to_string().contains("has 1 point, none of class 2, ground"), "{error}");
+    assert!(error.to_string().contains("has 1 point, but none of class 2, ground"), "{error}");
     assert!(refusal(&plain(&shots[1..4])).contains("every point is withheld or noise, 3 points in all"));
     assert!(refusal(&plain(&shots[1..2])).contains("every point is withheld or noise, 1 point in all"));
 }
