@@ -13,7 +13,7 @@ pub const SECONDS_PER_WRITTEN_CELL: f64 = 6e-8;
 /// A heightfield that an item reads in addition to its own: a factor, a friction, heights to subtract.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Raster {
-    /// The item that produces it; its file is [`HEIGHTS`].
+    /// The item that produces it.
     pub item: ItemRef,
     /// Memory of its values once they are read, bytes.
     pub bytes: u64,
