@@ -63,7 +63,7 @@ use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::statistics::Statistics;
 use std::ops::Range;
 use survey::Survey;
-use verdicts::Windows;
+use verdicts::Area;
 
 /// A fit, with what is needed to recompute its rasters.
 #[derive(Clone)]
@@ -219,7 +219,9 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         (settings.bootstrap() > 0).then(|| resampling::parametric(&estimator, estimate, settings.bootstrap(), streams));
     let blocks = resampling::blocks(case, bins, settings.bootstrap() > 0)?;
     let resampled = resampling::block_replicates(&estimator, estimate, &blocks, settings.bootstrap(), streams);
-    let windows = Windows::of(examined(case)?.as_ref(), case, estimate)?;
+    let (part, at_scales) = (examined(case)?, Area::settings(case));
+    let area = Area::new(part.as_ref(), case, &at_scales)?;
+    let windows = area.windows(estimate);
     let rough = (!case.heights.are_profiles()).then(|| Estimator::rough(case, &by_direction));
     let rough_rings = directional.then(|| Estimator::rough(case, &case.bins));
     let on_rings = rough_rings.as_ref().unwrap_or(&estimator);
@@ -228,7 +230,7 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     let (map, carried) = measured.map_or_else(|| (None, carried::by_model(on_rings, estimate)), |(m, c)| (Some(m), c));
     let findings = Findings {
         scale_explicit: verdicts::no_scale_separation(disagreement)
-            .then(|| verdicts::scale_explicit(on_rings, &estimates, &windows)),
+            .then(|| verdicts::scale_explicit(on_rings, &estimates, &windows, &area)),
         intervals: replicates
             .as_ref()
             .and_then(|r| resampling::intervals(&estimator, estimate, &r.at))

@@ -55,6 +55,13 @@ pub struct Findings {
     pub directions: Vec<DirectionBin>,
 }
 
+impl Findings {
+    /// Scale-dependent numbers, if no other model has one scale at all windows.
+    fn without_scale(&self) -> Option<&ScaleExplicit> {
+        self.scale_explicit.as_ref().filter(|explicit| explicit.single_scale.is_none())
+    }
+}
+
 /// The fit file; `binned` is the model in the rings as the estimator sees it, m2.
 pub fn fit_file(case: &Case, naive: &Estimate, estimate: &Estimate, binned: Vec<f64>, findings: &Findings) -> FitFile {
     let summary = Summary::of(case, naive, estimate, &binned);
@@ -164,7 +171,7 @@ impl Summary {
 
     fn diagnostics(&self, case: &Case, naive: &Estimate, estimate: &Estimate, findings: &Findings) -> Diagnostics {
         let survey = &case.survey;
-        let self_affine = findings.scale_explicit.as_ref().and_then(ScaleExplicit::structure);
+        let self_affine = findings.without_scale().and_then(ScaleExplicit::structure);
         let (isotropy, stationarity) = (findings.isotropy.as_ref(), findings.stationarity.as_ref());
         Diagnostics {
             band_rms_m: Some(survey.trim.rms_m),
@@ -321,10 +328,14 @@ impl Doubts {
         let model = estimate.form.name();
         let described = if self.noise.is_some() {
             format!("Mostly noise below {window_m} m: do not publish texture parameters")
+        } else if let Some(other) = findings.scale_explicit.as_ref().and_then(|explicit| explicit.single_scale) {
+            format!(
+                "The {model} model does not fit the covariance below {window_m} m, but another with one scale may: publish band RMS {rms_m} m, \
+                 or try model = \"{other}\" (--model {other})"
+            )
         } else if self.scale.is_some() {
             let growth = findings
-                .scale_explicit
-                .as_ref()
+                .without_scale()
                 .and_then(ScaleExplicit::structure)
                 .map(|s| format!(" and the structure function ({} m at 1 m, H {})", digits4(s.sigma_m), hurst(&s)));
             let growth = growth.unwrap_or_default();
@@ -434,10 +445,14 @@ fn comparison_warning(findings: &Findings) -> Option<String> {
 /// Warns that fits at other windows disagree.
 fn separation_warning(findings: &Findings) -> Option<String> {
     let (z, explicit) = (findings.disagreement?, findings.scale_explicit.as_ref()?);
-    Some(format!(
-        "no scale separation: fits at half and twice the outer scale disagree by {z:.1} standard errors; band RMS on the same cells: {}",
-        explicit.bands_text()
-    ))
+    let bands = explicit.bands_text();
+    let disagree = format!("fits at half and twice the outer scale disagree by {z:.1} standard errors");
+    Some(match explicit.single_scale {
+        Some(other) => {
+            format!("wrong model: {disagree}, those of a {other} model do not; band RMS on the same cells: {bands}")
+        }
+        None => format!("no scale separation: {disagree}; band RMS on the same cells: {bands}"),
+    })
 }
 
 /// Effective resolution, m: the shortest lag beyond which the texture's increments (along its long axis) exceed those of the noise

@@ -1,10 +1,10 @@
 //! Tests of a fit against the data: scale separation, misfit, isotropy, stationarity, normality.
 
-use super::FitError;
 use super::case::Case;
 use super::estimator::{Estimate, Estimator};
 use super::heights::Heights;
 use super::resampling::{Block, Replicates, sill_over_range, two_sided_p, upper_p};
+use super::{FitError, FitSettings};
 use crate::covariance::Form;
 use crate::covariance::bins::Layout;
 use crate::covariance::form::Role;
@@ -18,9 +18,13 @@ const REPLICATES_MIN: usize = 99;
 /// Standard errors by which two windows may differ. Both use the same surface, so that their difference scatters less than
 /// this test assumes.
 const WINDOWS_Z: f64 = 2.58;
+/// AICc by which one model must be better than another for the other to have hardly any support (Burnham and Anderson 2002).
+const AICC_WORTH: f64 = 10.0;
 
 /// The form for surfaces without a characteristic scale.
 const SELF_AFFINE: &str = "self_affine";
+/// The form for surfaces with one, however smooth: it includes the exponential, and nearly the Gaussian.
+const SINGLE_SCALE: &str = "matern";
 
 /// The fit at another outer scale.
 pub struct AtWindow {
@@ -32,35 +36,60 @@ pub struct AtWindow {
     pub rms_m: f64,
 }
 
-/// Fits of one form to one area at several outer scales: the fit's own, and half and twice that where the DEM allows it.
+/// One area at several outer scales: the fit's own, and half and twice that where the DEM allows it.
+pub struct Area<'a> {
+    whole: &'a Case<'a>,
+    /// Whether the area is the complete DEM, whose estimates then serve at its own scale.
+    is_whole: bool,
+    /// The area at each scale, its own first.
+    cases: Vec<Option<Case<'a>>>,
+    /// Band RMS below each scale, m.
+    rms_m: Vec<f64>,
+}
+
+impl<'a> Area<'a> {
+    /// Outer scales at which an area is fitted, over the fit's own.
+    const FACTORS: [f64; 3] = [1.0, 0.5, 2.0];
+
+    /// The settings of a case at these outer scales.
+    pub fn settings(case: &Case) -> [FitSettings; 3] {
+        Self::FACTORS.map(|factor| case.settings.at_outer_scale(factor * case.settings.outer_scale_m()))
+    }
+
+    /// Detrends a part of a case's DEM at each of its [`Area::settings`].
+    ///
+    /// # Errors
+    /// Heights that cannot be read.
+    pub fn new(part: &'a dyn Heights, whole: &'a Case<'a>, settings: &'a [FitSettings]) -> Result<Self, FitError> {
+        let cases: Vec<Option<Case>> = settings.iter().map(|s| Case::new(part, s).ok()).collect();
+        let residuals =
+            cases.iter().map(|case| case.as_ref().map(Case::residual).transpose()).collect::<Result<Vec<_>, _>>()?;
+        // Roughness varies over a site, so windows are compared on the same cells.
+        let rms_m = common_rms_m(&residuals);
+        Ok(Self { whole, is_whole: part.geometry().len() == whole.geometry.len(), cases, rms_m })
+    }
+
+    /// Fits the form of an estimate of the complete DEM at each scale.
+    pub fn windows(&self, estimate: &Estimate) -> Windows {
+        let whole = |rms_m| AtWindow::of(self.whole, estimate.clone(), rms_m);
+        let mut at = self.cases.iter().zip(&self.rms_m);
+        let own = match at.next() {
+            Some((Some(_), rms_m)) if self.is_whole => whole(*rms_m),
+            Some((Some(own), rms_m)) => at_window(own, estimate, *rms_m),
+            _ => whole(self.whole.survey.trim.rms_m),
+        };
+        let others = at.filter_map(|(case, rms_m)| Some(at_window(case.as_ref()?, estimate, *rms_m))).collect();
+        Windows { own, others }
+    }
+}
+
+/// Fits of one form to one area at several outer scales.
 pub struct Windows {
     own: AtWindow,
     pub others: Vec<AtWindow>,
 }
 
 impl Windows {
-    /// Fits a part of the DEM at each outer scale. If the part is the complete DEM, `estimate` serves as the fit at the own scale.
-    ///
-    /// # Errors
-    /// Heights that cannot be read.
-    pub fn of(part: &dyn Heights, case: &Case, estimate: &Estimate) -> Result<Self, FitError> {
-        let scale_m = case.settings.outer_scale_m();
-        let is_whole = part.geometry().len() == case.geometry.len();
-        let settings = [1.0, 0.5, 2.0].map(|factor| case.settings.at_outer_scale(factor * scale_m));
-        // Roughness varies over a site, so windows are compared on the same cells.
-        let mut cases: Vec<Option<Case>> = settings.iter().map(|s| Case::new(part, s).ok()).collect();
-        let residuals =
-            cases.iter().map(|case| case.as_ref().map(Case::residual).transpose()).collect::<Result<Vec<_>, _>>()?;
-        let rms_m = common_rms_m(&residuals);
-        let others = cases.split_off(1).into_iter().zip(&rms_m[1..]);
-        let others = others.filter_map(|(case, rms_m)| Some(at_window(&case?, estimate, *rms_m))).collect();
-        let own = cases.pop().flatten().map(|own| match is_whole {
-            true => AtWindow::of(case, estimate.clone(), rms_m[0]),
-            false => at_window(&own, estimate, rms_m[0]),
-        });
-        Ok(Self { others, own: own.unwrap_or_else(|| AtWindow::of(case, estimate.clone(), case.survey.trim.rms_m)) })
-    }
-
     /// Largest over smallest `sigma^2 / b` of all windows.
     pub fn sill_over_range_spread(&self) -> Option<f64> {
         let all = self.others.iter().chain([&self.own]).map(|w| sill_over_range(&w.estimate.covariance));
@@ -102,20 +131,39 @@ pub struct ScaleExplicit {
     pub bands: Vec<[f64; 2]>,
     /// The self-affine surface with the same covariance: structure function and Hurst exponent.
     pub self_affine: Option<Estimate>,
+    /// A model with one scale whose fits at all windows agree, if there is one.
+    pub single_scale: Option<&'static str>,
 }
 
 /// Describes a surface whose fits at several windows disagree; `estimates` are the fits at this window.
-pub fn scale_explicit(estimator: &Estimator, estimates: &[Estimate], windows: &Windows) -> ScaleExplicit {
+pub fn scale_explicit(estimator: &Estimator, estimates: &[Estimate], windows: &Windows, area: &Area) -> ScaleExplicit {
     let all = windows.others.iter().chain([&windows.own]);
     let mut bands: Vec<[f64; 2]> = all.map(|w| [w.outer_scale_m, w.rms_m]).collect();
     bands.sort_by(|a, b| a[0].total_cmp(&b[0]));
     let known = estimates.iter().find(|e| e.form.name() == SELF_AFFINE).cloned();
-    let fitted = || {
-        let form = Form::parse(SELF_AFFINE).ok()?;
-        let from = &estimates.first()?.covariance;
-        Some(estimator.fit(&form, from.sigma_m(), from.range_m()))
-    };
-    ScaleExplicit { bands, self_affine: known.or_else(fitted) }
+    let self_affine = known.or_else(|| fitted(SELF_AFFINE, estimator, estimates));
+    let single_scale = self_affine.as_ref().and_then(|affine| single_scale(estimator, estimates, affine, area));
+    ScaleExplicit { bands, self_affine, single_scale }
+}
+
+fn fitted(form: &str, estimator: &Estimator, estimates: &[Estimate]) -> Option<Estimate> {
+    let form = Form::parse(form).ok()?;
+    let from = &estimates.first()?.covariance;
+    Some(estimator.fit(&form, from.sigma_m(), from.range_m()))
+}
+
+/// A model with one scale that describes the surface better than a self-affine one, and the same at every window. If it was a candidate, it
+/// has already been judged.
+fn single_scale(estimator: &Estimator, estimates: &[Estimate], affine: &Estimate, area: &Area) -> Option<&'static str> {
+    if estimates.iter().any(|e| e.form.name() == SINGLE_SCALE) {
+        return None;
+    }
+    let single = fitted(SINGLE_SCALE, estimator, estimates)?;
+    // Bins by direction and rings have different likelihoods.
+    let are_comparable = single.likelihood.as_ref()?.bins == affine.likelihood.as_ref()?.bins;
+    let is_better = are_comparable && single.aicc()? < affine.aicc()? - AICC_WORTH;
+    let has_scale = is_better && is_range_identified(area.whole, &single);
+    (has_scale && !no_scale_separation(window_disagreement(&area.windows(&single)))).then_some(SINGLE_SCALE)
 }
 
 /// Largest disagreement between fits at neighbouring windows, in standard errors: over sigma, b (or the shape) and sigma^2 / b.

@@ -631,7 +631,13 @@ fn val_windows_are_compared_on_the_same_cells() {
 fn val_a_wrong_model_is_not_a_surface_without_scale() {
     let dem = field_of(&covariance("gaussian", &[("sigma_m", 0.1), ("range_m", 0.28)]), 256, 8);
     let wrong = fit(&dem, &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
-    assert!(wrong.verdict.contains("--model"), "{}", wrong.verdict);
+    assert!(wrong.verdict.starts_with("The exponential model does not fit"), "{}", wrong.verdict);
+    assert!(wrong.verdict.contains("--model matern"), "{}", wrong.verdict);
+    assert!(wrong.warnings.iter().any(|w| w.starts_with("wrong model: ")), "{:?}", wrong.warnings);
+    assert!(wrong.diagnostics.hurst.is_none());
+    let smooth = covariance("matern", &[("sigma_m", 0.1), ("range_m", 0.2), ("smoothness", 1.5)]);
+    let wrong = fit(&field_of(&smooth, 256, 9), &with_bootstrap("exponential", 0), &streams()).unwrap().fit;
+    assert!(wrong.verdict.starts_with("The exponential model does not fit"), "{}", wrong.verdict);
     let right = fit(&dem, &with_bootstrap("gaussian", 0), &streams()).unwrap().fit;
     assert!(right.verdict.starts_with("The gaussian model describes"), "{}", right.verdict);
     // A Gaussian covariance has no slope at lag zero.

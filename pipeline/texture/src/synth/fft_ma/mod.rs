@@ -64,8 +64,8 @@ pub const CLIP_SHARE_MAX: f64 = 1e-6;
 const ENLARGEMENT: f64 = 1.5;
 /// Most cells of an enlarged torus, relative to the first: three enlargements.
 const ENLARGED_CELLS: f64 = 16.0;
-/// Most cells of a torus whose spectrum is computed just to state the cost.
-const TRIED_CELLS_MAX: usize = 1 << 20;
+/// Most cells of a torus whose spectrum is computed just to state the cost; a plan does so for every value of a sweep.
+const TRIED_CELLS_MAX: usize = 1 << 18;
 /// Width of a tile, in ranges, below which it is noted.
 const TILE_RANGES_NOTE: f64 = 4.0;
 /// Note on a texture of a measured covariance whose long waves, and with them its relief, are those of a model.
@@ -352,7 +352,7 @@ impl FftMa {
         (!self.parameters.periodic && self.aim.is_none() && cells(larger) <= most).then_some(larger)
     }
 
-    /// The torus that the field needs, for its cost: exactly as far as trying that out takes no more than about a second.
+    /// The torus to state the cost for. A small one is tried; a larger one with an oblique covariance is assumed to be enlarged once.
     fn expected_torus(&self) -> [usize; 2] {
         let is_oblique = spectrum::is_oblique(&self.covariance);
         let Some(larger) = self.larger(self.torus).filter(|_| is_oblique) else { return self.torus };
