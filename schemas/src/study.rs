@@ -436,11 +436,13 @@ pub struct TextureItem {
     #[schemars(range(min = 1, max = Self::REALISATIONS_MAX))]
     pub realisations: u32,
     /// Base to which the texture is added: the id of a terrain, DEM or other texture, or `{ background = "<fit id>" }`, the background that a fit
-    /// removed. Cells, size and position of the result are taken from the base, so a texture of other cells is refused. Default: no base, level
-    /// ground.
+    /// removed. The result has the base's cells, size and position: leave out `size_m`, `size_px` and `cell_m`, or state the same ones. A base with
+    /// `count` goes with the same `count` here: replicate k is added to replicate k of the base. Default: no base, level ground.
     #[serde(default)]
     pub onto: Option<Onto>,
-    /// Factor on the heights of the texture, above 0; 2 doubles their standard deviation. Not with `methods` or `fill`.
+    /// Factor on the heights of the texture, above 0; 2 doubles their standard deviation. Textures of a coarse DEM are steep on finer cells (RMS
+    /// slope of an exponential: about sigma sqrt(2 / (range times cell))); a smaller factor leaves ground of class `low` for missions. Not with
+    /// `methods` or `fill`.
     #[serde(default = "one")]
     #[schemars(transform = limits::positive)]
     pub amplitude: f64,

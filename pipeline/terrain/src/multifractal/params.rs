@@ -28,14 +28,16 @@ pub struct RawLayer {
     /// Number of ridge directions M (Table 1: 16, 32, 64).
     #[schemars(range(min = 1))]
     pub ridges: u32,
-    /// Fractal dimension D, between 2 and 3 (Table 1: 2.2, 2.45, and 2.3, 2.45 or 2.6).
+    /// Fractal dimension D, between 2 and 3 (Table 1: 2.2, 2.45, and 2.3, 2.45 or 2.6). A larger D has more of its height in short waves.
+    /// All layers are scaled to the same range: for steeper ground, raise `z_scale_percent`.
     #[schemars(transform = limits::between(2.0, 3.0))]
     pub fractal_dimension: f64,
     /// Elevation scaling G, m (Table 1: 1e-6, 8e-8, 1e-8). Has no effect on the product, because all layers are scaled to the
     /// same range; kept because the paper lists it.
     #[schemars(transform = limits::positive)]
     pub elevation_scale_m: f64,
-    /// Standard deviation of the Gaussian low-pass filter, cells (not published; 8, 8 and 1 are our reading).
+    /// Standard deviation of the Gaussian low-pass filter, cells, so that the ground changes with `cell_m` (not published; 8, 8 and 1 are our
+    /// reading).
     #[schemars(transform = limits::not_negative)]
     pub sigma_px: f64,
 }

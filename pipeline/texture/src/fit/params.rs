@@ -53,7 +53,8 @@ pub struct FitParameters {
     /// Covariance model, such as `exponential` or `anisotropic:matern+nugget`, or several separated by commas, or `auto` for the usual ones: the
     /// best by AICc is used, all are listed. A model is `exponential`, `gaussian`, `spherical`, `matern` or `self_affine`, or a sum of two
     /// (`exponential+gaussian`), optionally followed by `+nugget`, preceded by `anisotropic:`, or both. `empirical`, with others (`auto,empirical`)
-    /// or alone, stores the measured covariance by lag for textures; the best of the other models extrapolates it, `exponential` if there is none.
+    /// or alone, stores the measured covariance by lag for textures, whose cells must then be whole multiples of the DEM's; the best of the other
+    /// models extrapolates it, `exponential` if there is none.
     /// Default `exponential` (Vecherin et al. 2022, Eq. 9).
     #[schemars(regex(pattern = model_pattern()))]
     pub model: String,
