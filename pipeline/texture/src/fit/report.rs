@@ -5,7 +5,7 @@ use super::case::Case;
 use super::estimator::{Estimate, Estimator, difference, on_surface};
 use super::profile::LIKELIHOOD_RISE;
 use super::resampling::sill_over_range;
-use super::verdicts::{Isotropy, ScaleExplicit, Stationarity, is_range_identified};
+use super::verdicts::{Isotropy, REPLICATES_MIN, ScaleExplicit, Stationarity, is_range_identified};
 use crate::covariance::form::Role;
 use crate::covariance::{Covariance, Form, Structure};
 use sastrugi_schemas::fit::{
@@ -48,7 +48,7 @@ pub struct Findings {
     pub normality_p: Option<f64>,
     /// Largest over smallest sigma^2 / b of all windows.
     pub sill_over_range_spread: Option<f64>,
-    /// Replicates behind the p-values; 0 if they come from theory.
+    /// Parametric replicates. From [`REPLICATES_MIN`] on, p-values are those of the replicates, otherwise of theory.
     pub replicates: usize,
     /// How much of the residual a texture from the fit reproduces.
     pub carried: Option<Carried>,
@@ -402,11 +402,12 @@ fn digits2(value: f64) -> String {
     format!("{value:.*}", decimals.clamp(0.0, 12.0) as usize)
 }
 
-/// `p = 0.003`, or `p < 0.001`; at the smallest p-value that the replicates allow, this is stated.
+/// `p = 0.003`, or `p < 0.001`; at the smallest p-value that the replicates allow, this is stated. Fewer than [`REPLICATES_MIN`] limit no
+/// p-value, because it then comes from theory.
 fn p_value(p: f64, replicates: usize) -> String {
     let least = 1.0 / (replicates + 1) as f64;
     match p {
-        p if replicates > 0 && p <= least => {
+        p if replicates >= REPLICATES_MIN && p <= least => {
             format!("p <= {least:.3}, the smallest possible with {replicates} replicates")
         }
         p if p < 1e-3 => "p < 0.001".to_owned(),
@@ -526,4 +527,18 @@ fn normality_warning(findings: &Findings) -> Option<String> {
         2.0 / (findings.replicates + 1) as f64,
         findings.replicates
     ))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Below 99 replicates p comes from chi-squared, so that their number does not limit it.
+    #[test]
+    fn val_only_replicates_that_give_p_limit_it() {
+        assert_eq!([0, 50, 98].map(|replicates| p_value(1e-12, replicates)), ["p < 0.001"; 3]);
+        assert_eq!(p_value(0.0042, 50), "p = 0.004");
+        assert_eq!(p_value(0.01, 99), "p <= 0.010, the smallest possible with 99 replicates");
+        assert_eq!(p_value(0.02, 99), "p = 0.020");
+    }
 }

@@ -14,7 +14,7 @@ use sastrugi_schemas::fit::OtherWindow;
 use sastrugi_statistics::normal;
 
 /// Fewest replicates that allow a p-value of 1 %.
-const REPLICATES_MIN: usize = 99;
+pub const REPLICATES_MIN: usize = 99;
 /// Standard errors by which two windows may differ. Both use the same surface, so that their difference scatters less than
 /// this test assumes.
 const WINDOWS_Z: f64 = 2.58;
