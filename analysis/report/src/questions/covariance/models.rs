@@ -95,29 +95,39 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let curve = Stroke::new(Paint::Series(0), 2.0);
     let edge = Stroke::new(Paint::Muted, 1.4).dashed("6 4");
     let interval = Stroke::new(Paint::Series(1), 1.4).dashed("2 3");
-    let ends_of_b: Vec<f64> =
-        [fit.range_low_m, fit.range_high_m].into_iter().filter(|end| *end > 0.0 && end.is_finite()).collect();
+    let frame = (ends.0 / 1.05, ends.1 * 1.05);
+    let known = [("begins", fit.range_low_m), ("ends", fit.range_high_m)];
+    let known = known.into_iter().filter(|(_, end)| *end > 0.0 && end.is_finite());
+    let (inside, outside): (Vec<(&str, f64)>, Vec<_>) = known.partition(|(_, end)| *end >= frame.0 && *end <= frame.1);
     let mut legend =
         vec![(Mark::Line(curve), "rise of χ²".to_owned()), (Mark::Line(edge), "95 % threshold".to_owned())];
-    if !ends_of_b.is_empty() {
+    if !inside.is_empty() {
         legend.push((Mark::Line(interval), "ends of the interval".into()));
     }
-    let x = (Axis::log(ends.0 / 1.05, ends.1 * 1.05), "fixed range b, m");
+    let x = (Axis::log(frame.0, frame.1), "fixed range b, m");
     let y = (Axis::linear(0.0, 1.05 * top), "rise of χ²");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &legend);
     plot.clip(&format!("{id}-clip"));
     plot.line([(ends.0, at_edge), (ends.1, at_edge)], edge);
-    for end in ends_of_b {
+    for (_, end) in inside {
         plot.line([(end, 0.0), (end, 1.05 * top)], interval);
     }
     plot.line(points.iter().map(|p| (p.range_m, p.chi2_rise)), curve);
     let marks = plot.place(points.iter().map(|p| (p.range_m, p.chi2_rise)));
     marks.into_iter().for_each(|at| plot.svg.disc(at, 2.6, Paint::Series(0), 1.0));
     plot.svg.close();
-    let allowance = match misfit > 1.0 {
-        true => format!(" times the misfit per degree of freedom, {}", set::significant(misfit, 3)),
-        false => String::new(),
+    let threshold = match misfit > 1.0 {
+        true => format!(
+            "{}, which is {EDGE} times the misfit per degree of freedom ({})",
+            set::significant(at_edge, 3),
+            set::significant(misfit, 3)
+        ),
+        false => EDGE.to_string(),
     };
+    let beyond = |(what, end): &(&str, f64)| {
+        format!(" The interval of b {what} at {}, outside the frame.", set::with_unit(*end, 3, "m"))
+    };
+    let beyond: String = outside.iter().map(beyond).collect();
     let cut = if highest > top { format!(" The axis ends at {}.", set::significant(top, 2)) } else { String::new() };
     let query = format!("fit_id = {} and range_m > 0 and isfinite(chi2_rise)", quoted(&fit.fit_id));
     Some(Figure {
@@ -125,7 +135,7 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
         title: format!("How well {} constrains b.", fit.fit_id),
         caption: format!(
             "Rise of the generalised sum of squares when b is fixed and all other parameters are refitted. A 95 % interval ends \
-             at a rise of 3.84{allowance}. A flat curve means that b is not identified.{cut}"
+             at a rise of {threshold}.{beyond} A flat curve means that b is not identified.{cut}"
         ),
         description: format!("Profile likelihood over ranges from {}.", span(ends)),
         svg: plot.svg,
@@ -224,5 +234,36 @@ fn unit_of(name: &str) -> &'static str {
         Some("m2") => "m2",
         Some("deg") => "deg",
         _ => "1",
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::made_up;
+
+    /// The caption states the threshold that is drawn; the legend names the ends of the interval only where they are drawn.
+    #[test]
+    fn val_the_profile_states_its_threshold_and_the_ends_of_the_interval() {
+        let mut data = made_up::full(1, 24);
+        let drawn = |data: &Data| {
+            let figure = profile(data, &data.fits[0]).unwrap();
+            (figure.svg.finish("x", "t", "d"), figure.caption)
+        };
+        let (svg, caption) = drawn(&data);
+        // 3.84 times 3.1.
+        assert!(
+            caption.contains("at a rise of 11.9, which is 3.84 times the misfit per degree of freedom (3.10)."),
+            "{caption}"
+        );
+        assert!(svg.contains("ends of the interval") && !caption.contains("outside the frame"));
+        // The profile begins at 160 m.
+        data.fits[0].range_low_m = 20.0;
+        data.fits[0].range_high_m = f64::INFINITY;
+        let (svg, caption) = drawn(&data);
+        assert!(!svg.contains("ends of the interval"));
+        assert!(caption.contains("The interval of b begins at 20.0 m, outside the frame."), "{caption}");
+        data.fits[0].misfit_chi2_per_freedom = 0.9;
+        assert!(drawn(&data).1.contains("ends at a rise of 3.84."));
     }
 }
