@@ -43,7 +43,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         blocks.push(Block::Heading(format!("DEM {dem}")));
         for fit in &fits {
             let file = file(data, fit)?;
-            blocks.push(Block::Text(verdict::paragraph(fit, &models::of_fit(data, fit), file.as_ref())));
+            blocks.push(Block::Text(verdict::paragraph(data, fit, file.as_ref())));
         }
         let sentences = warnings(data, &fits)?;
         let summary = format!("{} about {}", set::counted(sentences.len(), "warning"), set::counted(fits.len(), "fit"));

@@ -178,7 +178,7 @@ fn directions(data: &Data, fit: &FitRow) -> Option<Figure> {
         plot.line(rows.iter().map(|r| (r.lag_m, r.covariance_m2)), line(i));
     }
     plot.svg.close();
-    let verdict = verdict::direction(fit).unwrap_or_default();
+    let verdict = verdict::direction(data, fit).unwrap_or_default();
     let names = ["azimuth_deg", "lag_m", "covariance_m2", "pairs", "model_m2"];
     let query = format!("fit_id = {} and azimuth_deg is not null", quoted(&fit.fit_id));
     let rows: Vec<&CovarianceRow> = all().copied().collect();

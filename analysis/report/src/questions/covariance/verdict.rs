@@ -1,7 +1,8 @@
 //! How far a fit can be trusted: its parameters with their intervals, and the tests that speak against it, in sentences.
 
-use super::of_dem;
+use super::{models, of_dem};
 use crate::content::{Numbers, TableBlock, number, slug, text};
+use crate::data::Data;
 use crate::render::number as set;
 use sastrugi_schemas::fit::{FitFile, Quoted};
 use sastrugi_schemas::tables::FitRow;
@@ -10,7 +11,7 @@ use sastrugi_schemas::tables::FitRow;
 const LEVEL: f64 = 0.01;
 /// Standard errors by which fits at other windows may differ.
 const WINDOWS_Z: f64 = 2.58;
-/// Ratio of ranges above which anisotropy is called slight, whatever its p value.
+/// Ratio of ranges, and of distances of correlation (Str), above which anisotropy is called slight, whatever its p value.
 const SLIGHT_RATIO: f64 = 0.9;
 /// Ratio of block sigmas below which their spread is called slight, whatever its p value.
 const SLIGHT_SPREAD: f64 = 1.2;
@@ -52,17 +53,17 @@ fn interval_words([low, high]: [f64; 2], unit: &str) -> Option<String> {
     }
 }
 
-/// The paragraph on one fit. `all` are the parameters of its model; `file` is its fit file where the release has it, whose
-/// verdict comes first, as `sastrugi fit` prints it.
-pub fn paragraph(fit: &FitRow, all: &[(String, &str, f64)], file: Option<&FitFile>) -> String {
+/// The paragraph on one fit. `file` is its fit file where the release has it, whose verdict comes first, as `sastrugi fit` prints it.
+pub fn paragraph(data: &Data, fit: &FitRow, file: Option<&FitFile>) -> String {
+    let estimate = estimate(fit, &models::of_fit(data, fit), file);
     let verdict = file.map(|f| f.verdict.clone()).filter(|verdict| !verdict.is_empty());
     let sentences = [
         verdict.or_else(|| no_scale(fit)),
-        Some(estimate(fit, all, file)),
+        Some(estimate),
         poorly_known(fit, file),
         model(fit),
         window(fit),
-        direction(fit),
+        direction(data, fit),
         site(fit),
         distribution(fit),
     ];
@@ -179,22 +180,28 @@ fn window(fit: &FitRow) -> Option<String> {
     })
 }
 
-/// Result of the test of isotropy.
-pub fn direction(fit: &FitRow) -> Option<String> {
+/// Result of the test of isotropy, with the ratio of ranges of the fitted model and that of the measured correlation.
+pub fn direction(data: &Data, fit: &FitRow) -> Option<String> {
     let p = Some(fit.isotropy_p).filter(|p| p.is_finite())?;
-    let longer = || {
+    if p > LEVEL {
+        return Some(format!("No anisotropy was detected ({}).", p_value(p)));
+    }
+    let measured = data.surface(&fit.fit_id).map(|s| s.aspect_ratio).filter(|ratio| *ratio > 0.0);
+    let is_slight = fit.isotropy_ratio >= SLIGHT_RATIO && measured.is_none_or(|ratio| ratio >= SLIGHT_RATIO);
+    let measured = measured.map_or_else(String::new, |ratio| {
         format!(
-            "({}): its range along {}° from north is {} times the range across",
-            p_value(p),
-            set::fixed(fit.isotropy_azimuth_deg, 0),
-            set::significant(1.0 / fit.isotropy_ratio, 3)
+            "; the measured correlation falls to 0.2 at distances that differ by a factor of {} (Str = {})",
+            set::significant(1.0 / ratio, 3),
+            set::significant(ratio, 3)
         )
-    };
-    Some(match p <= LEVEL {
-        true if fit.isotropy_ratio < SLIGHT_RATIO => format!("The texture is anisotropic {}.", longer()),
-        true => format!("The texture is slightly anisotropic {}.", longer()),
-        false => format!("No anisotropy was detected ({}).", p_value(p)),
-    })
+    });
+    Some(format!(
+        "The residual is {}anisotropic ({}): the fitted range along {}° from north is {} times the range across{measured}.",
+        if is_slight { "slightly " } else { "" },
+        p_value(p),
+        set::fixed(fit.isotropy_azimuth_deg, 0),
+        set::significant(1.0 / fit.isotropy_ratio, 3)
+    ))
 }
 
 fn site(fit: &FitRow) -> Option<String> {
@@ -223,9 +230,9 @@ fn distribution(fit: &FitRow) -> Option<String> {
     })
 }
 
-/// `p = 0.03`, or `p < 0.0001`.
+/// `p = 0.03`, or `p < 0.001` as in the warnings of a fit.
 fn p_value(p: f64) -> String {
-    if p < 1e-4 { "p < 0.0001".into() } else { format!("p = {}", set::significant(p, 2)) }
+    if p < 1e-3 { "p < 0.001".into() } else { format!("p = {}", set::significant(p, 2)) }
 }
 
 /// Estimates with both kinds of intervals; without rows where no fit has any.
@@ -270,24 +277,26 @@ mod tests {
     use super::*;
     use crate::tests::made_up;
     use sastrugi_schemas::fit::{Diagnostics, Intervals};
+    use sastrugi_schemas::tables::SurfaceRow;
 
     #[test]
     fn val_sentences_agree_with_the_row() {
-        let data = made_up::full(1, 24);
-        let corrected = paragraph(&data.fits[0], &[], None);
+        let mut data = made_up::full(1, 24);
+        let corrected = paragraph(&data, &data.fits[0], None);
         for part in [
             "σ = 21.0 m (19.2 to 24.1 m)",
             "95 % intervals from 99 surfaces",
             "does not describe the residual (p = 0.010)",
             "agree within their errors (1.2 standard errors)",
-            "anisotropic (p < 0.0001): its range along 48° from north is 1.41 times the range across",
+            "The residual is anisotropic (p < 0.001): the fitted range along 48° from north is 1.41 times the range across",
+            "the measured correlation falls to 0.2 at distances that differ by a factor of 1.39 (Str = 0.720).",
             "not stationary: σ of its blocks differs by a factor of 1.60",
             "compatible with a normal distribution (p = 0.40)",
         ] {
             assert!(corrected.contains(part), "{part} in {corrected}");
         }
         assert!(!corrected.contains("to a factor of"));
-        let paper = paragraph(&data.fits[1], &[], None);
+        let paper = paragraph(&data, &data.fits[1], None);
         assert!(paper.ends_with("σ²/b = 0.613 m, without intervals."), "{paper}");
         let lost = FitRow {
             window_disagreement_z: 9.0,
@@ -299,12 +308,12 @@ mod tests {
             sigma2_over_range_m: f64::NAN,
             ..data.fits[0].clone()
         };
-        let lost = paragraph(&lost, &[("hurst".into(), "1", 0.61)], None);
+        data.candidates.iter_mut().for_each(|c| c.parameters = r#"{"hurst":0.61}"#.into());
+        let lost = paragraph(&data, &lost, None);
         for part in [
             "There is no scale separation: the band RMS below 3034 m is 15.0 m, and increments grow as 0.500 m × \
              (lag / 1 m)^0.60",
             "hurst = 0.610; 95 % intervals from 99 surfaces",
-            "slightly anisotropic",
         ] {
             assert!(lost.contains(part), "{part} in {lost}");
         }
@@ -321,7 +330,7 @@ mod tests {
             diagnostics: Diagnostics { range_at_search_bound: true, ..Diagnostics::default() },
             ..FitFile::default()
         };
-        let bounded = paragraph(&data.fits[0], &[], Some(&file));
+        let bounded = paragraph(&data, &data.fits[0], Some(&file));
         let words =
             "): No single scale below 12 m: publish band RMS 0.2 m. σ not identified, b at least 0.600 m, σ²/b = ";
         assert!(bounded.contains(words), "{bounded}");
@@ -329,5 +338,24 @@ mod tests {
         let table = intervals("jacksboro", &fits).numbers;
         let names: Vec<&str> = table.columns.iter().map(|c| c.name.as_str()).collect();
         assert_eq!((table.rows.len(), names), (3, vec!["parameter", "estimate", "low", "high", "uncorrected"]));
+    }
+
+    /// Anisotropy is slight only if neither the fitted ranges nor the measured correlation differ much by direction.
+    #[test]
+    fn val_slight_anisotropy_is_slight_in_both() {
+        let mut data = made_up::full(1, 24);
+        let fit = FitRow { isotropy_ratio: 0.9028, isotropy_p: 0.005, ..data.fits[0].clone() };
+        let mut said = |measured: f64| {
+            let own = |s: &&mut SurfaceRow| s.surface_id == fit.fit_id;
+            data.surfaces.iter_mut().filter(own).for_each(|s| s.aspect_ratio = measured);
+            direction(&data, &fit).unwrap()
+        };
+        assert!(said(0.668).starts_with("The residual is anisotropic (p = 0.0050): "), "{}", said(0.668));
+        assert!(
+            said(0.668).contains("1.11 times the range across; the measured correlation falls to 0.2 at distances")
+        );
+        assert!(said(0.95).starts_with("The residual is slightly anisotropic"));
+        let unknown = said(f64::NAN);
+        assert!(unknown.contains("slightly") && unknown.ends_with("1.11 times the range across."), "{unknown}");
     }
 }
