@@ -48,7 +48,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         let sentences = warnings(data, &fits)?;
         let summary = format!("{} about {}", set::counted(sentences.len(), "warning"), set::counted(fits.len(), "fit"));
         blocks.push(Block::Warnings { summary, sentences });
-        blocks.push(Block::Figures(covariances(data, &fits)));
+        blocks.push(Block::Figures(covariances(data, &fits)?));
         blocks.push(Block::Table(verdict::intervals(dem, &fits)));
         blocks.push(Block::Figures(fits.iter().flat_map(|fit| models::figures(data, fit)).collect()));
         blocks.push(Block::Table(models::table(data, dem, &fits)));
@@ -68,6 +68,16 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
 /// The fit file; `None` where the release does not have it.
 fn file(data: &Data, fit: &FitRow) -> Result<Option<FitFile>, ReportError> {
     data.files.fit(&format!("fit/{}.json", fit.fit_id))
+}
+
+/// Name of the model of a fit whose textures have the measured covariance.
+const EMPIRICAL: &str = "empirical";
+
+/// The model that an empirical fit has beside the measured covariance, which extends it to longer waves: σ, b, the lines in the figures and the
+/// tests are those of this model. `None` for other fits.
+fn beside_measured<'a>(data: &'a Data, fit: &FitRow) -> Option<&'a str> {
+    let first = || data.candidates_of(&fit.fit_id).iter().find(|c| c.rank == 1);
+    (fit.model == EMPIRICAL).then(|| first().map_or("fitted", |c| c.model.as_str()))
 }
 
 /// Warnings as full sentences, each once, with the fits that it concerns.
@@ -109,7 +119,7 @@ fn rings<'a>(data: &'a Data, fit: &FitRow) -> Vec<&'a CovarianceRow> {
     data.covariance.iter().filter(isotropic).collect()
 }
 
-fn covariances(data: &Data, fits: &[&FitRow]) -> Vec<Figure> {
+fn covariances(data: &Data, fits: &[&FitRow]) -> Result<Vec<Figure>, ReportError> {
     let drawn: Vec<(&FitRow, Vec<&CovarianceRow>)> =
         fits.iter().map(|f| (*f, rings(data, f))).filter(|(_, b)| !b.is_empty()).collect();
     // Common axes, so that the fits can be compared by eye.
@@ -125,7 +135,7 @@ fn covariances(data: &Data, fits: &[&FitRow]) -> Vec<Figure> {
     let high = drawn.iter().map(|(_, bins)| surface_high(bins)).filter(fits_in).fold(measured, f64::max);
     let low = values().fold(0.0, f64::min);
     let y = Axis::linear(low - 0.04 * (high - low), high + 0.06 * (high - low));
-    drawn.iter().map(|(fit, bins)| covariance(fit, bins, x, y)).collect()
+    drawn.iter().map(|(fit, bins)| covariance(data, fit, bins, (x, y))).collect()
 }
 
 /// Largest value of the model of the surface, m².
@@ -133,7 +143,8 @@ fn surface_high(bins: &[&CovarianceRow]) -> f64 {
     bins.iter().map(|b| b.surface_model_m2).filter(|v| v.is_finite()).fold(0.0, f64::max)
 }
 
-fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure {
+fn covariance(data: &Data, fit: &FitRow, bins: &[&CovarianceRow], (x, y): (Axis, Axis)) -> Result<Figure, ReportError> {
+    let beside = beside_measured(data, fit);
     let id = slug(&format!("covariance-{}", fit.fit_id));
     let seen = Stroke::new(Paint::Series(1), 2.0);
     let surface = Stroke::new(Paint::Series(0), 2.0).dashed("7 4");
@@ -145,11 +156,13 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     if banded {
         legend.push((Mark::Line(BAND), "95 % (jackknife)".into()));
     }
-    match same {
-        true => legend.push((Mark::Line(seen), "fitted model".into())),
-        false => legend.extend([
-            (Mark::Line(seen), "model, detrended".into()),
-            (Mark::Line(surface), "model of the surface".into()),
+    let name = beside.unwrap_or("model");
+    match (same, beside) {
+        (true, None) => legend.push((Mark::Line(seen), "fitted model".into())),
+        (true, Some(name)) => legend.push((Mark::Line(seen), format!("{name} model"))),
+        (false, _) => legend.extend([
+            (Mark::Line(seen), format!("{name}, detrended")),
+            (Mark::Line(surface), format!("{name} of the surface")),
         ]),
     }
     let mut plot = Plot::new((WIDTH, HEIGHT + 20.0), (x, "lag, m"), (y, "covariance, m²"), &legend);
@@ -164,13 +177,19 @@ fn covariance(fit: &FitRow, bins: &[&CovarianceRow], x: Axis, y: Axis) -> Figure
     plot.line(bins.iter().map(|b| (b.lag_m, b.model_m2)), seen);
     draw_bins(&mut plot, bins);
     plot.svg.close();
-    plot.note(0, &format!("σ = {}", set::with_unit(fit.sigma_m, 3, "m")));
-    plot.note(1, &format!("b = {}", set::with_unit(fit.range_m, 3, "m")));
+    let file = file(data, fit)?;
+    let of = beside.map_or_else(String::new, |name| format!("{name}: "));
+    let value = |name: &str, value: f64| {
+        let limit = verdict::at_bound(file.as_ref(), name);
+        limit.unwrap_or_else(|| format!("{name} = {}", set::with_unit(value, 3, "m")))
+    };
+    plot.note(0, &format!("{of}{}", value("σ", fit.sigma_m)));
+    plot.note(1, &value("b", fit.range_m));
     let above = surface_high(bins);
     if above > plot.y.range().1 {
         plot.note(2, &format!("surface: {}, above the frame", set::with_unit(above, 3, "m²")));
     }
-    figure(id, fit, bins, plot, banded)
+    Ok(figure(id, fit, bins, plot, banded, beside))
 }
 
 /// Bars at the bins.
@@ -187,22 +206,25 @@ fn draw_bins(plot: &mut Plot, bins: &[&CovarianceRow]) {
     }
 }
 
-fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded: bool) -> Figure {
+fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded: bool, beside: Option<&str>) -> Figure {
     let pairs = bins.iter().map(|b| b.pairs);
     let (fewest, most) = (pairs.clone().min().unwrap_or(0), pairs.max().unwrap_or(0));
     let band = if banded { " Bars are 95 % intervals from a jackknife over tiles of the site." } else { "" };
+    let model = match beside {
+        None => format!("{} model", fit.model),
+        Some(name) => format!("which textures have, and the {name} model that extends it to longer waves"),
+    };
     let caption = format!(
-        "Covariance of the residual after a moving average of {} × {} m, {} model; {} to {} pairs of cells in a bin.{band}",
+        "Covariance of the residual after a moving average of {} × {} m, {model}; {} to {} pairs of cells in a bin.{band}",
         set::significant(fit.window_x_m, 3),
         set::significant(fit.window_y_m, 3),
-        fit.model,
         set::count(fewest),
         set::count(most)
     );
     let description = format!(
         "Covariance against lag in {} bins with the fitted {} model: standard deviation {}, range {}.",
         bins.len(),
-        fit.model,
+        beside.unwrap_or(&fit.model),
         set::with_unit(fit.sigma_m, 3, "m"),
         set::with_unit(fit.range_m, 3, "m")
     );
@@ -323,6 +345,7 @@ fn all(data: &Data) -> TableBlock {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::tests::made_up;
 
     #[test]
     fn val_sentences() {
@@ -330,5 +353,35 @@ mod tests {
         assert_eq!(sentence("not stationary"), "Not stationary.");
         assert_eq!(sentence("Done."), "Done.");
         assert_eq!(sentence(""), ".");
+    }
+
+    /// The line of an empirical fit, and its σ and b, are those of the model that extends the measured covariance; it is named. At the bound of
+    /// the search they are not identified.
+    #[test]
+    fn val_the_model_that_is_drawn_is_named() {
+        let (mut data, mut shelf) = made_up::parts(1, 24);
+        let drawn = |data: &Data| {
+            let figure = covariances(data, &[&data.fits[0]]).unwrap().remove(0);
+            (figure.svg.finish("x", "t", "d"), figure.caption)
+        };
+        let (svg, caption) = drawn(&data);
+        assert!(
+            svg.contains("model, detrended")
+                && svg.contains(">σ = 21.0 m<")
+                && caption.contains(" m, exponential model; ")
+        );
+        data.fits[0].model = EMPIRICAL.into();
+        let (svg, caption) = drawn(&data);
+        for part in ["exponential, detrended", "exponential of the surface", ">exponential: σ = 21.0 m<", ">b = 640 m<"]
+        {
+            assert!(svg.contains(part), "{part}");
+        }
+        assert!(caption.contains("which textures have, and the exponential model that extends it"), "{caption}");
+        let file = shelf.fits.get_mut("fit/jacksboro-corrected.json").unwrap();
+        file.diagnostics.range_at_search_bound = true;
+        file.parameters = [("sigma_m".to_owned(), 21.0), ("range_m".to_owned(), 640.0)].into();
+        data.files = Box::new(shelf);
+        let (svg, _) = drawn(&data);
+        assert!(svg.contains(">exponential: σ not identified<") && svg.contains(">b not identified<"));
     }
 }

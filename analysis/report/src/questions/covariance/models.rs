@@ -128,11 +128,12 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
         format!(" The interval of b {what} at {}, outside the frame.", set::with_unit(*end, 3, "m"))
     };
     let beyond: String = outside.iter().map(beyond).collect();
+    let of = super::beside_measured(data, fit).map_or_else(String::new, |name| format!(" of the {name} model"));
     let cut = if highest > top { format!(" The axis ends at {}.", set::significant(top, 2)) } else { String::new() };
     let query = format!("fit_id = {} and range_m > 0 and isfinite(chi2_rise)", quoted(&fit.fit_id));
     Some(Figure {
         id,
-        title: format!("How well {} constrains b.", fit.fit_id),
+        title: format!("How well {} constrains b{of}.", fit.fit_id),
         caption: format!(
             "Rise of the generalised sum of squares when b is fixed and all other parameters are refitted. A 95 % interval ends \
              at a rise of {threshold}.{beyond} A flat curve means that b is not identified.{cut}"
@@ -164,7 +165,7 @@ fn directions(data: &Data, fit: &FitRow) -> Option<Figure> {
     let model = Stroke::new(Paint::Ink, 1.4).dashed("2 3");
     let mut legend: Vec<Entry> =
         sectors.keys().enumerate().map(|(i, azimuth)| (Mark::Line(line(i)), format!("{azimuth}°"))).collect();
-    legend.push((Mark::Line(model), "model".into()));
+    legend.push((Mark::Line(model), super::beside_measured(data, fit).unwrap_or("model").into()));
     let all = || sectors.values().flatten();
     let values = || all().flat_map(|r| [r.covariance_m2, r.model_m2]).filter(|v| v.is_finite());
     let (low, high) = (values().fold(0.0, f64::min), values().fold(f64::NEG_INFINITY, f64::max));

@@ -1,6 +1,6 @@
 //! How far a fit can be trusted: its parameters with their intervals, and the tests that speak against it, in sentences.
 
-use super::{models, of_dem};
+use super::{beside_measured, models, of_dem};
 use crate::content::{Numbers, TableBlock, number, slug, text};
 use crate::data::Data;
 use crate::render::number as set;
@@ -55,13 +55,15 @@ fn interval_words([low, high]: [f64; 2], unit: &str) -> Option<String> {
 
 /// The paragraph on one fit. `file` is its fit file where the release has it, whose verdict comes first, as `sastrugi fit` prints it.
 pub fn paragraph(data: &Data, fit: &FitRow, file: Option<&FitFile>) -> String {
+    let beside = beside_measured(data, fit);
     let estimate = estimate(fit, &models::of_fit(data, fit), file);
+    let of_model = |name: &str| format!("Parameters of the {name} model beside the measured covariance: ");
     let verdict = file.map(|f| f.verdict.clone()).filter(|verdict| !verdict.is_empty());
     let sentences = [
         verdict.or_else(|| no_scale(fit)),
-        Some(estimate),
+        Some(beside.map_or_else(String::new, of_model) + &estimate),
         poorly_known(fit, file),
-        model(fit),
+        model(fit, beside),
         window(fit),
         direction(data, fit),
         site(fit),
@@ -92,9 +94,8 @@ fn no_scale(fit: &FitRow) -> Option<String> {
 }
 
 fn estimate(fit: &FitRow, all: &[(String, &str, f64)], file: Option<&FitFile>) -> String {
-    let bounded = file.filter(|f| f.range_at_bound());
     let one = |(name, unit, value, interval, _): Parameter| {
-        if let Some(limit) = bounded.and_then(|file| at_bound(file, name)) {
+        if let Some(limit) = at_bound(file, name) {
             return limit;
         }
         let value = format!("{name} = {}", set::with_unit(value, 3, unit));
@@ -124,8 +125,9 @@ fn estimate(fit: &FitRow, all: &[(String, &str, f64)], file: Option<&FitFile>) -
     }
 }
 
-/// σ and b of a fit whose search for the range ended at its bound: only a lower limit is known, if any.
-fn at_bound(file: &FitFile, name: &str) -> Option<String> {
+/// σ and b of a fit whose search for the range ended at its bound: only a lower limit is known, if any. `None` for other fits.
+pub fn at_bound(file: Option<&FitFile>, name: &str) -> Option<String> {
+    let file = file.filter(|f| f.range_at_bound())?;
     let parameter = match name {
         "σ" => "sigma_m",
         "b" => "range_m",
@@ -158,14 +160,21 @@ fn poorly_known(fit: &FitRow, file: Option<&FitFile>) -> Option<String> {
     })
 }
 
-fn model(fit: &FitRow) -> Option<String> {
+fn model(fit: &FitRow, beside: Option<&str>) -> Option<String> {
     let p = Some(fit.misfit_p).filter(|p| p.is_finite())?;
-    Some(match p <= LEVEL {
-        true => format!(
+    Some(match (p <= LEVEL, beside) {
+        (true, None) => format!(
             "The model does not describe the residual ({}): intervals that assume it are too narrow.",
             p_value(p)
         ),
-        false => format!("The misfit is no larger than expected by chance ({}).", p_value(p)),
+        (true, Some(name)) => format!(
+            "The {name} model does not describe the residual ({}); textures have the measured covariance, which it only extends to longer waves.",
+            p_value(p)
+        ),
+        (false, None) => format!("The misfit is no larger than expected by chance ({}).", p_value(p)),
+        (false, Some(name)) => {
+            format!("The misfit of the {name} model is no larger than expected by chance ({}).", p_value(p))
+        }
     })
 }
 
@@ -357,5 +366,30 @@ mod tests {
         assert!(said(0.95).starts_with("The residual is slightly anisotropic"));
         let unknown = said(f64::NAN);
         assert!(unknown.contains("slightly") && unknown.ends_with("1.11 times the range across."), "{unknown}");
+    }
+
+    /// What is fitted and tested beside a measured covariance is named.
+    #[test]
+    fn val_an_empirical_fit_names_the_model_beside_it() {
+        let mut data = made_up::full(1, 24);
+        let plain = paragraph(&data, &data.fits[0], None);
+        assert!(
+            plain.contains("The model does not describe the residual")
+                && !plain.contains("beside the measured covariance"),
+            "{plain}"
+        );
+        data.fits[0].model = "empirical".into();
+        let empirical = paragraph(&data, &data.fits[0], None);
+        for part in [
+            "(corrected mode, empirical): Parameters of the exponential model beside the measured covariance: σ = 21.0 m",
+            "The exponential model does not describe the residual (p = 0.010); textures have the measured covariance",
+        ] {
+            assert!(empirical.contains(part), "{part} in {empirical}");
+        }
+        data.fits[0].misfit_p = 0.3;
+        let fits = paragraph(&data, &data.fits[0], None);
+        assert!(fits.contains("The misfit of the exponential model is no larger than expected"), "{fits}");
+        data.candidates.clear();
+        assert!(paragraph(&data, &data.fits[0], None).contains("Parameters of the fitted model beside"));
     }
 }
