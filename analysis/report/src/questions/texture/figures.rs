@@ -36,14 +36,16 @@ pub fn residual_id(texture: &TerrainRow) -> String {
 /// Columns: measured residual, residual of the texture, texture as synthesised; without rows if the release describes none of them.
 pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
     let residual = residual_id(texture);
+    let made = super::synthesised(texture);
     let sides = [
-        ("measured".to_owned(), data.surface(fit)),
-        ("texture residual".to_owned(), data.surface(&residual)),
-        (super::synthesised(texture), data.surface(&texture.terrain_id)),
+        ("measured", "residual of the fit".to_owned(), data.surface(fit)),
+        ("texture residual", "texture after the same detrending and trimming".to_owned(), data.surface(&residual)),
+        (made.as_str(), format!("texture {made}"), data.surface(&texture.terrain_id)),
     ];
-    let present: Vec<(String, &SurfaceRow)> = sides.into_iter().filter_map(|(name, s)| Some((name, s?))).collect();
+    let present: Vec<(&str, String, &SurfaceRow)> =
+        sides.into_iter().filter_map(|(name, words, s)| Some((name, words, s?))).collect();
     let columns: Vec<(&str, &str)> =
-        [("parameter", "")].into_iter().chain(present.iter().map(|(name, _)| (name.as_str(), ""))).collect();
+        [("parameter", "")].into_iter().chain(present.iter().map(|(name, ..)| (*name, ""))).collect();
     let query = format!(
         "select * from 'tables/surfaces/*.parquet' where surface_id in ({})",
         [fit, &residual, &texture.terrain_id].map(quoted).join(", ")
@@ -52,16 +54,15 @@ pub fn table(data: &Data, texture: &TerrainRow, fit: &str) -> TableBlock {
     for (name, unit, figure) in ROWS.iter().filter(|_| !present.is_empty()) {
         let unit = set::unit(unit);
         let label = if unit.is_empty() { (*name).to_owned() } else { format!("{name}, {unit}") };
-        let values = present.iter().map(|(_, s)| rounded(figure(s), name));
+        let values = present.iter().map(|(.., s)| rounded(figure(s), name));
         numbers.row([text(label)].into_iter().chain(values));
     }
     if !present.is_empty() {
-        numbers.row([text("lags of the exponent, m")].into_iter().chain(present.iter().map(|(_, s)| lags(s))));
+        numbers.row([text("lags of the exponent, m")].into_iter().chain(present.iter().map(|(.., s)| lags(s))));
     }
-    let caption = format!(
-        "Residual of the fit; texture after the same detrending and trimming; texture as synthesised.{}",
-        super::residual_note(texture)
-    );
+    let words: Vec<&str> = present.iter().map(|(_, words, _)| words.as_str()).collect();
+    let note = if data.surface(&residual).is_some() { super::residual_note(texture) } else { "" };
+    let caption = format!("Surface parameters: {}.{note}", words.join("; "));
     let caption = caption.trim_end_matches('.').to_owned();
     TableBlock { id: slug(&format!("figures-of-{}", texture.terrain_id)), caption, numbers }
 }

@@ -1,54 +1,36 @@
-//! Whether a synthetic texture looks like the surface it was fitted to: residual and texture side by side at the same scale and
-//! colours, their spectra, height distributions and structure functions in one frame, their surface parameters in one table.
+//! What the textures are like, and whether they match the surface they were fitted to: residual and texture side by side at the same scale
+//! and colours, their spectra, height distributions and structure functions in one frame, their surface parameters in one table.
 //!
 //! A residual lacks what the moving average removed; a texture does not. The two are comparable if the texture went through the
-//! same detrending and trimming (`<texture>.residual`).
+//! same detrending and trimming (`<texture>.residual`). A texture on a base or in the holes of a DEM is not compared: it is drawn before and
+//! after.
 
 mod figures;
+mod pictures;
 mod verdict;
 
 use super::Question;
 use super::curves::{self, Curve};
-use super::relief::{Style, Words, deviations, exaggeration_words, limit_m, middle_range, relief, relief_of};
 use super::sql::quoted;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, slug};
 use crate::data::{self, Data, TEXTURES_DRAWN};
 use crate::render::chart::Plot;
+use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke};
-use crate::render::{number as set, thin};
 use crate::sample::{ROWS_MAX, sample};
-use sastrugi_imaging::hillshade::exaggeration;
-use sastrugi_numeric::Grid;
 use sastrugi_schemas::tables::TerrainRow;
 use verdict::Answer;
 
 /// Registry entry.
-pub const QUESTION: Question = Question {
-    id: "texture",
-    name: "Texture",
-    title: "Does the synthetic texture look like the measured one?",
-    answer,
-};
-
-/// Tiles along each side of the picture of a repeated texture.
-const TILES: usize = 3;
+pub const QUESTION: Question =
+    Question { id: "texture", name: "Texture", title: "What are the textures like?", answer };
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let textures = data::textures(&data.terrains);
     let mut blocks = Vec::new();
     for texture in textures.iter().take(TEXTURES_DRAWN) {
-        let rows = figures(data, texture)?;
-        if rows.iter().any(|row| !row.is_empty()) {
-            blocks.push(Block::Heading(heading(texture)));
-            let fit = alone(texture);
-            let answer = fit.as_ref().and_then(|fit| verdict::of_texture(data, texture, fit));
-            if let Some((_, sentence)) = answer {
-                blocks.extend([sentence, verdict::method()].map(Block::Text));
-            }
-            blocks.extend(rows.into_iter().map(Block::Figures));
-            blocks.extend(fit.map(|fit| Block::Table(figures::table(data, texture, &fit))));
-        }
+        blocks.extend(of_texture(data, texture)?);
     }
     if textures.len() > TEXTURES_DRAWN {
         let all = textures.len();
@@ -59,9 +41,37 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// The fit of a texture that is not placed onto a base.
+/// The answer on a texture, its figures and its table; nothing where the release has no figure of it.
+fn of_texture(data: &Data, texture: &TerrainRow) -> Result<Vec<Block>, ReportError> {
+    let rows = figures(data, texture)?;
+    if rows.iter().all(Vec::is_empty) {
+        return Ok(Vec::new());
+    }
+    let mut blocks = vec![Block::Heading(heading(texture))];
+    let fit = alone(texture);
+    if let Some((_, sentence)) = fit.as_ref().and_then(|fit| verdict::of_texture(data, texture, fit)) {
+        let question = "Does it match the measured surface?";
+        blocks.extend([format!("{question} {sentence}"), verdict::method()].map(Block::Text));
+    }
+    blocks.extend(rows.into_iter().map(Block::Figures));
+    blocks.extend(fit.map(|fit| Block::Table(figures::table(data, texture, &fit))));
+    Ok(blocks)
+}
+
+/// The surface that a texture was added to: a base, or the DEM whose holes it fills.
+fn base(texture: &TerrainRow) -> Option<String> {
+    data::parameter(texture, "onto").or_else(|| data::parameter(texture, "fill"))
+}
+
+/// The fit onto whose background a texture was laid.
+fn background(texture: &TerrainRow) -> Option<String> {
+    let params: serde_json::Value = serde_json::from_str(&texture.params).ok()?;
+    params.get("onto")?.get("background")?.as_str().map(str::to_owned)
+}
+
+/// The fit of a texture that was not added to a surface.
 fn alone(texture: &TerrainRow) -> Option<String> {
-    data::parameter(texture, "fit").filter(|_| data::parameter(texture, "onto").is_none())
+    data::parameter(texture, "fit").filter(|_| base(texture).is_none())
 }
 
 /// The factor on the heights in the file of a texture; `None` if it is 1. The residual of the texture is taken before, so that it can be
@@ -80,11 +90,12 @@ fn at_amplitude(texture: &TerrainRow) -> String {
 
 /// Name of the surface in the file of a texture.
 fn synthesised(texture: &TerrainRow) -> String {
-    let words = |factor: f64| format!("as synthesised, times {}", set::plain(factor, 4));
-    amplitude(texture).map_or_else(|| "as synthesised".to_owned(), words)
+    let name = if background(texture).is_some() { "on the background" } else { "as synthesised" };
+    let words = |factor: f64| format!("{name}, times {}", set::plain(factor, 4));
+    amplitude(texture).map_or_else(|| name.to_owned(), words)
 }
 
-/// Textures that are not placed onto a base, each with its fit.
+/// Textures that were not added to a surface, each with its fit.
 fn standing_alone(data: &Data) -> impl Iterator<Item = (&TerrainRow, String)> {
     data.of_stage("texture").filter_map(|texture| Some((texture, alone(texture)?)))
 }
@@ -120,23 +131,29 @@ pub(super) fn in_words(data: &Data) -> Option<String> {
     })
 }
 
-/// The first texture without a base, next to the residual of its fit; empty if the release has none.
+/// The first texture that was not added to a surface, next to the residual of its fit; empty if the release has none.
 pub(super) fn side_by_side(data: &Data) -> Result<Vec<Figure>, ReportError> {
-    standing_alone(data).next().map_or(Ok(Vec::new()), |(texture, fit)| patches(data, texture, &fit))
+    standing_alone(data).next().map_or(Ok(Vec::new()), |(texture, fit)| pictures::patches(data, texture, &fit))
 }
 
 fn heading(texture: &TerrainRow) -> String {
-    match data::parameter(texture, "onto") {
-        Some(base) => format!("Texture {} on {base}", texture.terrain_id),
-        None => format!("Texture {}", texture.terrain_id),
+    let id = &texture.terrain_id;
+    match (data::parameter(texture, "onto"), data::parameter(texture, "fill"), background(texture)) {
+        (Some(base), ..) => format!("Texture {id} on {base}"),
+        (_, Some(dem), _) => format!("Texture {id} in the holes of {dem}"),
+        (.., Some(fit)) => format!("Texture {id} on the background of {fit}"),
+        _ => format!("Texture {id}"),
     }
 }
 
-/// Figures by row. A texture on a base is shown as relief; one without a base next to the residual of its fit.
+/// Figures by row. A texture on a base, or in the holes of a DEM, is shown as relief; any other next to the residual of its fit.
 fn figures(data: &Data, texture: &TerrainRow) -> Result<Vec<Vec<Figure>>, ReportError> {
     let fit = data::parameter(texture, "fit").unwrap_or_default();
     if let Some(base) = data::parameter(texture, "onto") {
-        return Ok(vec![on_base(data, texture, &base, &fit)?]);
+        return Ok(vec![pictures::on_base(data, texture, &base, &fit)?]);
+    }
+    if let Some(dem) = data::parameter(texture, "fill") {
+        return Ok(vec![pictures::in_holes(data, texture, &dem)?]);
     }
     let charts = [
         spectra(data, texture, &fit),
@@ -144,92 +161,45 @@ fn figures(data: &Data, texture: &TerrainRow) -> Result<Vec<Vec<Figure>>, Report
         distributions(data, texture, &fit),
         profiles(data, texture, &fit),
     ];
-    let mut pictures = patches(data, texture, &fit)?;
-    pictures.extend(tiling(data, texture)?);
-    Ok(vec![pictures, charts.into_iter().flatten().collect()])
-}
-
-/// The base and the base with its texture, in one range of heights.
-fn on_base(data: &Data, texture: &TerrainRow, base: &str, fit: &str) -> Result<Vec<Figure>, ReportError> {
-    let base_path = data.terrain(base).map_or("", |t| t.path.as_str());
-    let Some(range_m) = middle_range(data, &[base_path, &texture.path])? else { return Ok(Vec::new()) };
-    let style = Some(Style { range_m, exaggeration: exaggeration(texture.rms_slope), pixels: 400 });
-    let words = |what: &str, title: &str, caption: String| Words {
-        id: slug(&format!("{what}-{}", texture.terrain_id)),
-        title: title.into(),
-        caption,
-    };
-    let mut figures = Vec::new();
-    figures.extend(relief(data, base_path, style, words("base", "Base.", format!("{base}, as generated.")))?);
-    let covariance = if fit.is_empty() { "of its stated covariance".into() } else { format!("of fit {fit}") };
-    let caption = format!("{}: {base} with a texture {covariance}; same colours and light.", texture.terrain_id);
-    figures.extend(relief(data, &texture.path, style, words("textured", "Base with texture.", caption))?);
-    Ok(figures)
-}
-
-/// Measured residual and synthetic texture: the centre of each, with the same size in metres and the same colour range.
-fn patches(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Vec<Figure>, ReportError> {
-    let Some(synthetic) = data.files.grid(&texture.path)? else { return Ok(Vec::new()) };
-    let residual_path = format!("fit/{fit}.residual.tif");
-    let measured = data.files.grid(&residual_path)?;
-    let size = common_size(&synthetic, measured.as_ref());
-    let (synthetic, measured) = (thin::centre(&synthetic, size), measured.map(|m| thin::centre(&m, size)));
-    let limit = measured.iter().chain([&synthetic]).map(limit_m).filter(|v| *v > 0.0).fold(0.0, f64::max);
-    let ground = format!("{} × {} m at the centre", set::significant(size[0], 3), set::significant(size[1], 3));
-    let words = |what: &str, title: &str, caption: String| Words {
-        id: slug(&format!("{what}-{}", texture.terrain_id)),
-        title: title.into(),
-        caption,
-    };
-    let mut figures = Vec::new();
-    if let Some(measured) = measured {
-        let caption = format!("Residual of fit {fit}, {ground}; grey cells did not enter the fit.");
-        figures.extend(deviations(
-            &measured,
-            &residual_path,
-            limit,
-            "not used",
-            words("measured", "Measured.", caption),
-        )?);
-    }
-    let scaled =
-        amplitude(texture).map_or_else(String::new, |factor| format!(", heights times {}", set::plain(factor, 4)));
-    let caption = format!(
-        "{}, {ground}{scaled}; same scale and colours. It is not detrended, so it still has its long waves.",
-        texture.terrain_id
-    );
-    figures.extend(deviations(&synthetic, &texture.path, limit, "no data", words("synthetic", "Synthetic.", caption))?);
-    Ok(figures)
-}
-
-/// The largest square that fits into both grids, m.
-fn common_size(a: &Grid, b: Option<&Grid>) -> [f64; 2] {
-    let sides = [Some(a), b].into_iter().flatten().flat_map(|g| g.geometry.size());
-    [sides.fold(f64::INFINITY, f64::min); 2]
+    let mut row = pictures::patches(data, texture, &fit)?;
+    row.extend(pictures::tiling(data, texture)?);
+    Ok(vec![row, charts.into_iter().flatten().collect()])
 }
 
 const MEASURED: Stroke = Stroke { paint: Paint::Ink, width: 2.4, dash: "", opacity: 0.75 };
 const RESIDUAL: Stroke = Stroke { paint: Paint::Series(1), width: 1.9, dash: "6 3", opacity: 1.0 };
 const SYNTHESISED: Stroke = Stroke { paint: Paint::Series(0), width: 1.4, dash: "2 3", opacity: 1.0 };
 
-/// Surfaces drawn in one frame: name, id, line.
-fn sides(fit: &str, texture: &TerrainRow) -> [(String, String, Stroke); 3] {
-    [
-        ("measured residual".into(), fit.to_owned(), MEASURED),
-        ("synthetic, residual".into(), figures::residual_id(texture), RESIDUAL),
-        (synthesised(texture), texture.terrain_id.clone(), SYNTHESISED),
-    ]
+/// Names of the curves of residuals.
+const RESIDUALS: [&str; 2] = ["measured residual", "synthetic, residual"];
+/// Start of the names of curves of the residual of the texture.
+const SYNTHETIC: &str = "synthetic";
+
+/// Surfaces drawn in one frame: name, id, line. The file of a texture on a background is left out: its curve would be that of the background.
+fn sides(fit: &str, texture: &TerrainRow) -> Vec<(String, String, Stroke)> {
+    let [measured, residual] = RESIDUALS.map(str::to_owned);
+    let mut sides = Vec::new();
+    if !fit.is_empty() {
+        sides.push((measured, fit.to_owned(), MEASURED));
+        sides.push((residual, figures::residual_id(texture), RESIDUAL));
+    }
+    if background(texture).is_none() {
+        sides.push((synthesised(texture), texture.terrain_id.clone(), SYNTHESISED));
+    }
+    sides
 }
 
-/// Curves of the residual (stored under the id of its fit) and of the texture.
+/// Curves of the residual (stored under the id of its fit) and of the texture; none if there is no curve of the texture.
 fn together(fit: &str, texture: &TerrainRow, points: impl Fn(&str) -> Vec<(f64, f64)>) -> Vec<Curve> {
     let curve = |(name, id, stroke): (String, String, Stroke)| Curve { name: Some(name), stroke, points: points(&id) };
-    sides(fit, texture).into_iter().map(curve).filter(|c| c.points.len() > 1).collect()
+    let curves: Vec<Curve> = sides(fit, texture).into_iter().map(curve).filter(|c| c.points.len() > 1).collect();
+    let is_texture = |c: &Curve| c.name.as_deref() != Some(RESIDUALS[0]);
+    if curves.iter().any(is_texture) { curves } else { Vec::new() }
 }
 
 /// The ids of a frame, as a list for a query.
 fn ids(fit: &str, texture: &TerrainRow) -> String {
-    sides(fit, texture).map(|(_, id, _)| quoted(&id)).join(", ")
+    sides(fit, texture).into_iter().map(|(_, id, _)| quoted(&id)).collect::<Vec<_>>().join(", ")
 }
 
 /// The chart of one kind of curve.
@@ -237,7 +207,8 @@ struct Chart<'a> {
     what: &'a str,
     title: &'a str,
     caption: &'a str,
-    measured: &'a str,
+    /// Holds where both residuals are drawn.
+    of_residuals: &'a str,
 }
 
 impl Chart<'_> {
@@ -245,11 +216,20 @@ impl Chart<'_> {
         Figure {
             id: slug(&format!("{}-{}", self.what, texture.terrain_id)),
             title: self.title.into(),
-            caption: format!("{}{}", with_measured(self.caption, self.measured, curves), residual_note(texture)),
+            caption: self.caption(texture, curves),
             description: format!("{} {}.", self.caption, names_of(curves)),
             svg: plot.svg,
             numbers,
         }
+    }
+
+    /// The caption, with what it has to say about residuals that are drawn.
+    fn caption(&self, texture: &TerrainRow, curves: &[Curve]) -> String {
+        let has = |name: &str| curves.iter().any(|c| c.name.as_deref().is_some_and(|drawn| drawn.starts_with(name)));
+        let has_both = RESIDUALS.into_iter().all(has) && !self.of_residuals.is_empty();
+        let note = if has_both { format!(" {}", self.of_residuals) } else { String::new() };
+        let scaled = if has(SYNTHETIC) { residual_note(texture) } else { "" };
+        format!("{}{note}{scaled}", self.caption)
     }
 }
 
@@ -264,8 +244,7 @@ fn spectra(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
         what: "psd",
         title: "Spectra.",
         caption: "Radially averaged two-dimensional power spectral density.",
-        measured: "The moving average has removed the lowest frequencies from both residuals, that of the DEM and that of the \
-                   texture.",
+        of_residuals: "The moving average has removed the lowest frequencies from both residuals, that of the DEM and that of the texture.",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
@@ -281,7 +260,7 @@ fn distributions(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure>
         what: "heights",
         title: "Heights.",
         caption: "Height distributions.",
-        measured: "The measured distribution ends at the trimming threshold.",
+        of_residuals: "The measured distribution ends at the trimming threshold.",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
@@ -298,15 +277,15 @@ fn structures(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
         what: "structure",
         title: "Structure functions.",
         caption: "Mean squared height difference against lag, over all directions.",
-        measured: "Those of the residuals level off at the window of the moving average.",
+        of_residuals: "Those of the residuals level off at the window of the moving average.",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows, &names)))
 }
 
-/// Profile spectra along both axes, of the two residuals.
+/// Profile spectra along both axes, of the two residuals; `None` without that of the texture.
 fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
     let residual = figures::residual_id(texture);
-    let surfaces = [("measured", fit, MEASURED.paint), ("synthetic", residual.as_str(), RESIDUAL.paint)];
+    let surfaces = [("measured", fit, MEASURED.paint), (SYNTHETIC, residual.as_str(), RESIDUAL.paint)];
     let axes = [("x", "east-west", ""), ("y", "north-south", "5 3")];
     let curve = |(name, id, paint): (&str, &str, Paint), (axis, words, dash): (&str, &str, &'static str)| Curve {
         name: Some(format!("{name}, {words}")),
@@ -320,7 +299,8 @@ fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
         .collect();
     let id = slug(&format!("profiles-{}", texture.terrain_id));
     let titles = ("spatial frequency, cycles/m", "power spectral density, m³");
-    let plot = (!curves.is_empty()).then(|| curves::log_log(&id, &curves, titles.0, titles.1))?;
+    let is_texture = |c: &Curve| c.name.as_deref().is_some_and(|name| name.starts_with(SYNTHETIC));
+    let plot = curves.iter().any(is_texture).then(|| curves::log_log(&id, &curves, titles.0, titles.1))?;
     let rows = surfaces.into_iter().flat_map(|(_, id, _)| axes.map(|(axis, _, _)| data.profile_spectrum(id, axis)));
     let names = ["surface_id", "direction", "bin", "frequency_cycles_m", "psd_m3", "modes"];
     let query =
@@ -329,39 +309,14 @@ fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
         what: "profiles",
         title: "Spectra of profiles.",
         caption: "One-dimensional power spectral density, averaged over all rows and over all columns.",
-        measured: "",
+        of_residuals: "",
     };
     Some(chart.figure(texture, &curves, plot, Numbers::select(&query, rows.flatten(), &names)))
-}
-
-/// The texture tiled three by three, if it is periodic.
-fn tiling(data: &Data, texture: &TerrainRow) -> Result<Option<Figure>, ReportError> {
-    let repeats = serde_json::from_str::<serde_json::Value>(&texture.params)
-        .is_ok_and(|p| p.get("periodic").and_then(serde_json::Value::as_bool).unwrap_or(true));
-    let Some(grid) = data.files.grid(&texture.path)?.filter(|_| repeats) else { return Ok(None) };
-    let tiled = thin::tiled(&grid, TILES, 450);
-    let limit = limit_m(&grid);
-    let style = Style { range_m: (-limit, limit), exaggeration: exaggeration(texture.rms_slope), pixels: 450 };
-    let shading = exaggeration_words(style.exaggeration);
-    let words = Words {
-        id: slug(&format!("tiles-{}", texture.terrain_id)),
-        title: "Tiled three by three.".into(),
-        caption: format!(
-            "{} repeated in both directions, as shaded relief; a seam would show as a line at a third of the side.{shading}",
-            texture.terrain_id
-        ),
-    };
-    relief_of(&tiled, &texture.path, Some(style).filter(|s| s.range_m.0 < s.range_m.1), words)
 }
 
 /// What a caption says about curves of the residual of a texture whose heights were scaled.
 fn residual_note(texture: &TerrainRow) -> &'static str {
     if amplitude(texture).is_some() { " The residual of the texture is that at amplitude 1." } else { "" }
-}
-
-/// The caption, with the note on the measured curve if there is one.
-fn with_measured(words: &str, measured: &str, curves: &[Curve]) -> String {
-    if curves.len() > 1 && !measured.is_empty() { format!("{words} {measured}") } else { words.to_owned() }
 }
 
 fn names_of(curves: &[Curve]) -> String {
@@ -388,4 +343,100 @@ fn all(data: &Data) -> TableBlock {
     let listed = sample(all, ROWS_MAX, &mut data.stream("textures", "listed"));
     let numbers = Numbers::select("stage = 'texture'", listed, &names).of_all(count);
     TableBlock { id: "textures".into(), caption: "All textures".into(), numbers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::made_up;
+
+    /// The blocks on a release whose texture has these parameters and is changed by `change`.
+    fn blocks(params: &str, change: fn(&mut Data)) -> Vec<Block> {
+        let mut data = made_up::full(1, 24);
+        data.terrains.iter_mut().filter(|t| t.stage == "texture").for_each(|t| t.params = params.into());
+        change(&mut data);
+        answer(&data).unwrap()
+    }
+
+    fn figures_of(blocks: &[Block]) -> Vec<&Figure> {
+        blocks
+            .iter()
+            .filter_map(|b| if let Block::Figures(figures) = b { Some(figures) } else { None })
+            .flatten()
+            .collect()
+    }
+
+    fn texts_of(blocks: &[Block]) -> String {
+        let text = |block: &Block| match block {
+            Block::Heading(text) | Block::Text(text) => Some(text.clone()),
+            _ => None,
+        };
+        blocks.iter().filter_map(text).collect::<Vec<_>>().join("\n")
+    }
+
+    /// Of a texture with a stated covariance there is neither a measured surface nor a residual, and no caption names one.
+    #[test]
+    fn val_a_texture_without_a_site_is_not_compared_with_one() {
+        let blocks = blocks(r#"{"fit":{"model":"exponential"},"method":"fft_ma"}"#, |_| ());
+        let figures = figures_of(&blocks);
+        let ids: Vec<&str> = figures.iter().map(|f| f.id.as_str()).collect();
+        assert_eq!(ids, ["synthetic-texture", "tiles-texture", "psd-texture", "structure-texture", "heights-texture"]);
+        for figure in figures {
+            let words = format!("{} {} {}", figure.caption, figure.description, figure.numbers.query);
+            assert!(["easured", "esidual", "''"].iter().all(|word| !words.contains(word)), "{words}");
+        }
+        assert!(!texts_of(&blocks).contains("match"), "{}", texts_of(&blocks));
+    }
+
+    /// Without the residual of the texture, nothing is said of it.
+    #[test]
+    fn val_captions_and_columns_name_only_what_there_is() {
+        let with = blocks(r#"{"fit":"jacksboro-corrected"}"#, |_| ());
+        let without = blocks(r#"{"fit":"jacksboro-corrected"}"#, |data| {
+            data.surfaces.retain(|row| row.surface_id != "texture.residual");
+            data.structure.retain(|row| row.surface_id != "texture.residual");
+            data.profile_psd.retain(|row| row.surface_id != "texture.residual");
+            data.psd.retain(|row| row.surface_id != "texture.residual");
+            data.heights.retain(|row| row.surface_id != "texture.residual");
+        });
+        let words = |blocks: &[Block]| {
+            let tables =
+                blocks.iter().filter_map(|b| if let Block::Table(t) = b { Some(t.caption.as_str()) } else { None });
+            figures_of(blocks).iter().map(|f| f.caption.as_str()).chain(tables).collect::<Vec<_>>().join(" ")
+        };
+        let said = [
+            "both residuals",
+            "over all rows",
+            "; texture after the same detrending and trimming; texture as synthesised",
+        ];
+        assert!(said.iter().all(|part| words(&with).contains(part)), "{}", words(&with));
+        assert!(said.iter().all(|part| !words(&without).contains(part)), "{}", words(&without));
+        assert!(words(&without).contains("Surface parameters: residual of the fit; texture as synthesised"));
+    }
+
+    /// A DEM whose holes were filled keeps its measured cells: it is drawn before and after, not compared with a residual.
+    #[test]
+    fn val_a_filled_dem_is_not_compared() {
+        let blocks = blocks(r#"{"fit":"jacksboro-corrected","fill":"jacksboro"}"#, |_| ());
+        let ids: Vec<&str> = figures_of(&blocks).iter().map(|f| f.id.as_str()).collect();
+        assert_eq!(ids, ["holes-texture", "filled-texture"]);
+        assert!(!blocks.iter().any(|block| matches!(block, Block::Table(_))));
+        assert!(texts_of(&blocks).starts_with("Texture texture in the holes of jacksboro"), "{}", texts_of(&blocks));
+    }
+
+    /// A texture on the background of a fit is compared; the curves are those of the residuals alone.
+    #[test]
+    fn val_a_texture_on_a_background_is_compared_without_it() {
+        let params = r#"{"fit":"jacksboro-corrected","onto":{"background":"jacksboro-corrected"}}"#;
+        let blocks = blocks(params, |_| ());
+        let texts = texts_of(&blocks);
+        assert!(
+            texts.contains("on the background of jacksboro-corrected") && texts.contains("Does it match"),
+            "{texts}"
+        );
+        let figures = figures_of(&blocks);
+        let heights = figures.iter().find(|f| f.id == "heights-texture").unwrap();
+        assert_eq!(heights.description, "Height distributions. measured residual; synthetic, residual.");
+        assert!(figures.iter().all(|f| !f.id.starts_with("tiles-")));
+    }
 }
