@@ -96,7 +96,7 @@ fn val_synthetic_releases_of_every_shape_are_releases() {
     for words in [
         "How does this compare with published results?",
         "How sensitive are the results to the parameters?",
-        "The first 4 of 9 textures are drawn",
+        "4 of 9 textures are drawn",
         "Of 9 textures compared with their measured surfaces",
     ] {
         assert!(page.contains(words), "{words}");

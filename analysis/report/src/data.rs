@@ -101,7 +101,7 @@ pub struct Data {
     /// Heightfields.
     pub terrains: Vec<TerrainRow>,
     /// Ids of surfaces whose curves are not kept: generated terrains beyond a random sample of [`CURVES_MAX`] of their group, and textures that
-    /// are not drawn, with their residuals. Of such a residual only the structure function over all directions is kept.
+    /// are not drawn, with their residuals. Of these textures and residuals only the structure function over all directions is kept.
     pub without_curves: BTreeSet<String>,
     /// Fits.
     pub fits: Vec<FitRow>,
@@ -170,27 +170,20 @@ pub struct Against {
 /// Maximum number of terrains of a group whose curves (spectra, structure functions, histograms) are kept.
 pub const CURVES_MAX: usize = 200;
 
-/// Textures drawn; all are in the table.
-pub const TEXTURES_DRAWN: usize = 4;
 /// End of the id under which a texture's stage stores its residual, after the detrending and trimming of the fit.
 pub const RESIDUAL: &str = ".residual";
 
-/// Textures in the order in which they are drawn: first those without a base.
-pub fn textures(terrains: &[TerrainRow]) -> Vec<&TerrainRow> {
-    let on_base = |t: &&TerrainRow| parameter(t, "onto").is_some();
-    let all = terrains.iter().filter(|t| t.stage == "texture");
-    let (based, mut textures): (Vec<&TerrainRow>, Vec<_>) = all.partition(on_base);
-    textures.extend(based);
-    textures
+/// True for the structure functions that are kept before it is known which textures are drawn: those over all directions of textures and their
+/// residuals, with which every texture is judged, and those of the other surfaces whose curves are kept.
+pub(crate) fn is_kept(row: &StructureRow, textures: &BTreeSet<&str>, without_curves: &BTreeSet<String>) -> bool {
+    let id = row.surface_id.as_str();
+    match textures.contains(id.strip_suffix(RESIDUAL).unwrap_or(id)) {
+        true => row.direction == "all",
+        false => !without_curves.contains(id),
+    }
 }
 
-/// True for the structure function of a residual over all directions, with which every texture is judged.
-pub(crate) fn is_judged(row: &StructureRow) -> bool {
-    row.direction == "all" && row.surface_id.ends_with(RESIDUAL)
-}
-
-/// The generated terrains beyond a random sample of [`CURVES_MAX`] of each group and variant, and the textures that are not drawn with
-/// their residuals.
+/// The generated terrains beyond a random sample of [`CURVES_MAX`] of each group and variant.
 pub(crate) fn without_curves(seed: u64, terrains: &[TerrainRow]) -> BTreeSet<String> {
     let mut groups: BTreeMap<(&str, Option<&str>), Vec<&str>> = BTreeMap::new();
     for terrain in terrains.iter().filter(|terrain| terrain.stage == "terrain") {
@@ -201,9 +194,7 @@ pub(crate) fn without_curves(seed: u64, terrains: &[TerrainRow]) -> BTreeSet<Str
         let kept: BTreeSet<&str> = sample(ids.clone(), CURVES_MAX, &mut stream).into_iter().collect();
         ids.into_iter().filter(move |id| !kept.contains(id)).map(str::to_owned).collect::<Vec<_>>()
     };
-    let undrawn = textures(terrains).into_iter().skip(TEXTURES_DRAWN);
-    let undrawn = undrawn.flat_map(|t| [t.terrain_id.clone(), format!("{}{RESIDUAL}", t.terrain_id)]);
-    groups.into_iter().flat_map(beyond).chain(undrawn).collect()
+    groups.into_iter().flat_map(beyond).collect()
 }
 
 /// Rows with one label, which are compared with other groups.
@@ -548,32 +539,30 @@ mod tests {
         assert_eq!(plain(vec![&one, &two], |_| false), [&1, &2]);
     }
 
-    /// A group with many terrains keeps the curves of 200, the same each time; smaller groups keep all. Of textures, those are kept
-    /// that are drawn: the first four in the order of the table, those without a base first.
+    /// A group with many terrains keeps the curves of 200, the same each time; smaller groups keep all.
     #[test]
     fn prop_curves_of_a_sample_of_each_large_group() {
         let one = crate::tests::made_up::full(1, 24).terrains.swap_remove(0);
-        let terrain = |group: &str, variant: Option<&str>, stage: &str, k: usize| TerrainRow {
-            terrain_id: format!("{group}-{stage}-{}-{k}", variant.unwrap_or("plain")),
+        let terrain = |group: &str, variant: Option<&str>, k: usize| TerrainRow {
+            terrain_id: format!("{group}-{}-{k}", variant.unwrap_or("plain")),
             group: Some(group.into()),
             variant: variant.map(str::to_owned),
-            stage: stage.into(),
+            stage: "terrain".into(),
             ..one.clone()
         };
-        let mut terrains: Vec<TerrainRow> = (0..450).map(|k| terrain("large", None, "terrain", k)).collect();
-        terrains.extend((0..CURVES_MAX).map(|k| terrain("large", Some("v = 1"), "terrain", k)));
-        terrains.extend((0..300).map(|k| terrain("small", None, "texture", k)));
-        terrains.iter_mut().filter(|t| t.stage == "texture").take(2).for_each(|t| t.params = r#"{"onto": "x"}"#.into());
+        let mut terrains: Vec<TerrainRow> = (0..450).map(|k| terrain("large", None, k)).collect();
+        terrains.extend((0..CURVES_MAX).map(|k| terrain("large", Some("v = 1"), k)));
+        terrains
+            .extend((0..CURVES_MAX).map(|k| TerrainRow { stage: "texture".into(), ..terrain("textures", None, k) }));
         let without = without_curves(7, &terrains);
-        let (of_terrains, of_textures): (Vec<&String>, Vec<_>) =
-            without.iter().partition(|id| id.starts_with("large-terrain-plain-"));
-        assert_eq!((of_terrains.len(), of_textures.len()), (250, 2 * (300 - TEXTURES_DRAWN)));
-        assert!(of_textures.iter().all(|id| id.starts_with("small-texture-plain-")), "{of_textures:?}");
-        let texture = |k: usize| format!("small-texture-plain-{k}");
-        assert!((2..6).all(|k| !without.contains(&texture(k))));
-        assert!([0, 1, 6, 299].into_iter().all(|k| without.contains(&texture(k))));
-        assert!(without.contains(&(texture(6) + RESIDUAL)));
+        assert_eq!(without.len(), 250);
+        assert!(without.iter().all(|id| id.starts_with("large-plain-")), "{without:?}");
         assert!(without == without_curves(7, &terrains) && without != without_curves(8, &terrains));
+    }
+
+    /// Of textures and their residuals the structure functions over all directions are kept, of other surfaces all or none.
+    #[test]
+    fn val_structure_functions_that_are_kept() {
         let row = |id: &str, direction: &str| StructureRow {
             surface_id: id.into(),
             direction: direction.into(),
@@ -582,9 +571,11 @@ mod tests {
             value_m2: 1.0,
             pairs: 1,
         };
-        let judged =
-            [("a.residual", "all"), ("a.residual", "x"), ("a", "all")].map(|(id, way)| is_judged(&row(id, way)));
-        assert_eq!(judged, [true, false, false]);
+        let textures = BTreeSet::from(["a"]);
+        let without = BTreeSet::from(["t-2".to_owned()]);
+        let kept = |id: &str| ["all", "x"].map(|direction| is_kept(&row(id, direction), &textures, &without));
+        assert_eq!(["a", "a.residual"].map(kept), [[true, false]; 2]);
+        assert_eq!((kept("t-1"), kept("t-2")), ([true; 2], [false; 2]));
     }
 
     /// Every surface is found by its id, and no other.

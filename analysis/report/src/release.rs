@@ -1,6 +1,7 @@
 //! Reading of an assembled release, sealed or not. This is the only file that reads through `sastrugi-store`.
 
-use crate::data::{Against, Data, Files, Mission, Names, Start, Stored, Study, is_judged, without_curves};
+use crate::data::{Against, Data, Files, Mission, Names, Start, Stored, Study, is_kept, without_curves};
+use crate::questions::texture;
 use crate::{Companions, ReportError};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::Record;
@@ -44,11 +45,15 @@ impl Data {
         let rovers: Vec<RoverRow> = release.rows()?;
         let terrains = release.terrains(!rovers.is_empty())?;
         let without_curves = without_curves(study.seed, &terrains);
-        let kept = |surface_id: &str| !without_curves.contains(surface_id);
+        let structure = {
+            let textures = terrains.iter().filter(|t| t.stage == "texture").map(|t| t.terrain_id.as_str());
+            let textures: BTreeSet<&str> = textures.collect();
+            release.rows_where(|row: &StructureRow| is_kept(row, &textures, &without_curves))?
+        };
         let (contents, manifest) = release.contents(&terrains)?;
         let (version, failed) =
             manifest.map_or_else(|| (env!("CARGO_PKG_VERSION").into(), Vec::new()), |m| (m.version, m.failed));
-        Ok(Self {
+        let mut data = Self {
             study_sha256: digest::of_text(&toml),
             version: format!("sastrugi {version}"),
             stored: release.stored()?,
@@ -59,10 +64,10 @@ impl Data {
             candidate_curves: release.rows()?,
             likelihood_profile: release.rows()?,
             surfaces: release.rows()?,
-            structure: release.rows_where(|row: &StructureRow| kept(&row.surface_id) || is_judged(row))?,
-            profile_psd: release.rows_where(|row: &ProfilePsdRow| kept(&row.surface_id))?,
-            psd: release.rows_where(|row: &PsdRow| kept(&row.surface_id))?,
-            heights: release.rows_where(|row: &HeightDistributionRow| kept(&row.surface_id))?,
+            structure,
+            profile_psd: Vec::new(),
+            psd: Vec::new(),
+            heights: Vec::new(),
             scoreboard: release.rows()?,
             scoreboard_covariance: release.rows()?,
             missions: release.missions()?,
@@ -79,11 +84,19 @@ impl Data {
             contents,
             against: None,
             logs: None,
-            files: Box::new(release),
+            files: Box::new(Release { folder: folder.to_owned() }),
             study,
             terrains,
             without_curves,
-        })
+        };
+        // Which textures are drawn depends on the answers on them, and so do the curves that are kept.
+        let undrawn = texture::undrawn(&data);
+        data.without_curves.extend(undrawn);
+        let kept = |surface_id: &str| !data.without_curves.contains(surface_id);
+        let profile_psd = release.rows_where(|row: &ProfilePsdRow| kept(&row.surface_id))?;
+        let psd = release.rows_where(|row: &PsdRow| kept(&row.surface_id))?;
+        let heights = release.rows_where(|row: &HeightDistributionRow| kept(&row.surface_id))?;
+        Ok(Self { profile_psd, psd, heights, ..data })
     }
 }
 

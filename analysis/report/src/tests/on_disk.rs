@@ -1,9 +1,11 @@
 //! Reports of releases that `sastrugi-store` wrote.
 
 use super::{assert_sound, made_up};
+use crate::data::Data;
 use crate::{Companions, ReportError, Summary, render, render_with};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{FailedItem, JsonText, Origin};
+use sastrugi_schemas::tables::{PsdRow, SurfaceRow, TerrainRow};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::release::{Head, PartWriter, ReleaseBuilder, TablePart, for_each_artifact};
 use std::collections::BTreeMap;
@@ -31,7 +33,10 @@ fn head() -> Head {
 
 /// A release that will be `dest`, not sealed.
 fn assembled(dest: &Path) -> ReleaseBuilder {
-    let (data, shelf) = made_up::parts(2, 40);
+    assembled_of(dest, made_up::parts(2, 40))
+}
+
+fn assembled_of(dest: &Path, (data, shelf): (Data, made_up::Shelf)) -> ReleaseBuilder {
     let mut builder = ReleaseBuilder::beside(dest, head()).unwrap();
     let folder = builder.staging().to_owned();
     for (path, grid) in &shelf.grids {
@@ -111,6 +116,31 @@ fn prop_missions_of_several_files_are_in_order() {
     let whole = cells(stored("whole", 1));
     assert_eq!(whole, cells(missions.clone()));
     assert_eq!(cells(stored("parts", 3)), whole);
+}
+
+/// Of textures, the curves of those that are drawn are read: one that does not match its site, the last of seven, is one of them.
+#[test]
+fn val_curves_of_the_textures_that_are_drawn_are_read() {
+    let folder = tempfile::tempdir().unwrap();
+    let (mut data, shelf) = made_up::parts(1, 24);
+    let texture = data.of_stage("texture").next().unwrap().clone();
+    let surface = data.surface("texture.residual").unwrap().clone();
+    let psd = data.spectrum("texture")[0].clone();
+    data.fits.iter_mut().for_each(|fit| fit.stationarity_p = 0.5);
+    for k in 1..=6 {
+        let id = format!("u-{k}");
+        let sq_m = if k == 6 { 4.0 * surface.sq_m } else { surface.sq_m };
+        data.terrains.push(TerrainRow { terrain_id: id.clone(), ..texture.clone() });
+        data.psd.push(PsdRow { surface_id: id.clone(), ..psd.clone() });
+        let surface_id = format!("{id}.residual");
+        data.surfaces.push(SurfaceRow { surface_id, cells: 2_000_000, sq_m, ..surface.clone() });
+    }
+    let builder = assembled_of(&folder.path().join("release"), (data, shelf));
+    let read = Data::open(builder.staging()).unwrap();
+    let is_read = |id: &str| read.psd.iter().any(|row| row.surface_id == id);
+    assert_eq!(["texture", "u-1", "u-2", "u-6"].map(is_read), [true; 4]);
+    assert_eq!(["u-3", "u-4", "u-5"].map(is_read), [false; 3]);
+    assert!(read.without_curves.contains("u-5.residual") && !read.without_curves.contains("u-6.residual"));
 }
 
 #[test]

@@ -6,6 +6,7 @@
 //! after.
 
 mod figures;
+mod order;
 mod pictures;
 mod verdict;
 
@@ -14,47 +15,52 @@ use super::curves::{self, Curve};
 use super::sql::quoted;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, slug};
-use crate::data::{self, Data, TEXTURES_DRAWN};
+use crate::data::{self, Data};
 use crate::render::chart::Plot;
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke};
 use crate::sample::{ROWS_MAX, sample};
+use order::{Judged, TEXTURES_DRAWN, in_order};
 use sastrugi_schemas::tables::TerrainRow;
 use verdict::Answer;
+
+pub(crate) use order::undrawn;
 
 /// Registry entry.
 pub const QUESTION: Question =
     Question { id: "texture", name: "Texture", title: "What are the textures like?", answer };
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let textures = data::textures(&data.terrains);
+    let textures = in_order(data);
     let mut blocks = Vec::new();
-    for texture in textures.iter().take(TEXTURES_DRAWN) {
-        blocks.extend(of_texture(data, texture)?);
+    let drawn = &textures[..textures.len().min(TEXTURES_DRAWN)];
+    for one in drawn {
+        blocks.extend(of_texture(data, one)?);
     }
     if textures.len() > TEXTURES_DRAWN {
-        let all = textures.len();
-        let words = format!("The first {TEXTURES_DRAWN} of {all} textures are drawn; the table lists all.");
-        blocks.push(Block::Text(words));
+        blocks.push(Block::Text(format!(
+            "{TEXTURES_DRAWN} of {} textures are drawn: one of each group before a second one, and first those that do not match the measured \
+             surface. The table lists all.",
+            set::count(textures.len())
+        )));
     }
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
 }
 
 /// The answer on a texture, its figures and its table; nothing where the release has no figure of it.
-fn of_texture(data: &Data, texture: &TerrainRow) -> Result<Vec<Block>, ReportError> {
-    let rows = figures(data, texture)?;
+fn of_texture(data: &Data, one: &Judged<'_>) -> Result<Vec<Block>, ReportError> {
+    let rows = figures(data, one.texture)?;
     if rows.iter().all(Vec::is_empty) {
         return Ok(Vec::new());
     }
-    let mut blocks = vec![Block::Heading(heading(texture))];
-    let fit = alone(texture);
-    if let Some((_, sentence)) = fit.as_ref().and_then(|fit| verdict::of_texture(data, texture, fit)) {
-        let question = "Does it match the measured surface?";
+    let mut blocks = vec![Block::Heading(heading(one.texture))];
+    let question = "Does it match the measured surface?";
+    if let Some((_, sentence)) = &one.verdict {
         blocks.extend([format!("{question} {sentence}"), verdict::method()].map(Block::Text));
     }
     blocks.extend(rows.into_iter().map(Block::Figures));
-    blocks.extend(fit.map(|fit| Block::Table(figures::table(data, texture, &fit))));
+    blocks.extend(alone(one.texture).map(|fit| Block::Table(figures::table(data, one.texture, &fit))));
     Ok(blocks)
 }
 
@@ -95,20 +101,12 @@ fn synthesised(texture: &TerrainRow) -> String {
     amplitude(texture).map_or_else(|| name.to_owned(), words)
 }
 
-/// Textures that were not added to a surface, each with its fit.
-fn standing_alone(data: &Data) -> impl Iterator<Item = (&TerrainRow, String)> {
-    data.of_stage("texture").filter_map(|texture| Some((texture, alone(texture)?)))
-}
-
-/// Whether the textures match the measured surfaces: their numbers, and the sentence on the first that does not match, or else on the first
-/// one. `None` if none can be compared.
+/// Whether the textures match the measured surfaces: their numbers, and the sentence on the first that is drawn, which does not match if any
+/// does not. `None` if none can be compared.
 pub(super) fn in_words(data: &Data) -> Option<String> {
-    let answers: Vec<(&TerrainRow, Answer, String)> = standing_alone(data)
-        .filter_map(|(texture, fit)| {
-            verdict::of_texture(data, texture, &fit).map(|(answer, sentence)| (texture, answer, sentence))
-        })
-        .collect();
-    let worst = answers.iter().find(|a| a.1 == Answer::No).or(answers.first())?;
+    let judged = in_order(data).into_iter().filter_map(|one| one.verdict.map(|v| (one.texture, v.0, v.1)));
+    let answers: Vec<(&TerrainRow, Answer, String)> = judged.collect();
+    let worst = answers.first()?;
     let quoted = format!("Does texture {} match the surface it was fitted to? {}", worst.0.terrain_id, worst.2);
     let kinds = [
         (Answer::Yes, "1 matches", "match"),
@@ -131,9 +129,12 @@ pub(super) fn in_words(data: &Data) -> Option<String> {
     })
 }
 
-/// The first texture that was not added to a surface, next to the residual of its fit; empty if the release has none.
+/// The first texture that is drawn and was not added to a surface, next to the residual of its fit if it has one; empty if the release has none.
 pub(super) fn side_by_side(data: &Data) -> Result<Vec<Figure>, ReportError> {
-    standing_alone(data).next().map_or(Ok(Vec::new()), |(texture, fit)| pictures::patches(data, texture, &fit))
+    let first = in_order(data).into_iter().map(|one| one.texture).find(|texture| base(texture).is_none());
+    let of =
+        |texture: &TerrainRow| pictures::patches(data, texture, &data::parameter(texture, "fit").unwrap_or_default());
+    first.map_or(Ok(Vec::new()), of)
 }
 
 fn heading(texture: &TerrainRow) -> String {
