@@ -22,6 +22,7 @@ use crate::render::svg::{Paint, Stroke};
 use crate::sample::{ROWS_MAX, sample};
 use order::{Judged, TEXTURES_DRAWN, in_order};
 use sastrugi_schemas::tables::TerrainRow;
+use std::collections::BTreeSet;
 use verdict::Answer;
 
 pub(crate) use order::undrawn;
@@ -44,6 +45,12 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
             set::count(textures.len())
         )));
     }
+    let methods: BTreeSet<&str> =
+        drawn.iter().filter(|one| one.verdict.is_some()).map(|one| one.texture.kind.as_str()).collect();
+    if !methods.is_empty() {
+        blocks.push(Block::Heading("How the answers are reached".into()));
+        blocks.extend(verdict::method(&methods).map(Block::Text));
+    }
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
 }
@@ -56,9 +63,7 @@ fn of_texture(data: &Data, one: &Judged<'_>) -> Result<Vec<Block>, ReportError> 
     }
     let mut blocks = vec![Block::Heading(heading(one.texture))];
     let question = "Does it match the measured surface?";
-    if let Some((_, sentence)) = &one.verdict {
-        blocks.extend([format!("{question} {sentence}"), verdict::method()].map(Block::Text));
-    }
+    blocks.extend(one.verdict.iter().map(|(_, sentence)| Block::Text(format!("{question} {sentence}"))));
     blocks.extend(rows.into_iter().map(Block::Figures));
     blocks.extend(alone(one.texture).map(|fit| Block::Table(figures::table(data, one.texture, &fit))));
     Ok(blocks)
@@ -350,6 +355,7 @@ fn all(data: &Data) -> TableBlock {
 mod tests {
     use super::*;
     use crate::tests::made_up;
+    use sastrugi_schemas::tables::SurfaceRow;
 
     /// The blocks on a release whose texture has these parameters and is changed by `change`.
     fn blocks(params: &str, change: fn(&mut Data)) -> Vec<Block> {
@@ -439,5 +445,30 @@ mod tests {
         let heights = figures.iter().find(|f| f.id == "heights-texture").unwrap();
         assert_eq!(heights.description, "Height distributions. measured residual; synthetic, residual.");
         assert!(figures.iter().all(|f| !f.id.starts_with("tiles-")));
+    }
+
+    /// Every texture has its answer, but how answers are reached is said once, at the end.
+    #[test]
+    fn val_the_method_is_stated_once() {
+        let blocks = blocks(r#"{"fit":"jacksboro-corrected"}"#, |data| {
+            let row = data.surface("texture.residual").unwrap().clone();
+            let texture = data.of_stage("texture").next().unwrap().clone();
+            for id in ["u", "v"] {
+                data.terrains.push(TerrainRow {
+                    terrain_id: id.into(),
+                    kind: "wavelet_statistics".into(),
+                    ..texture.clone()
+                });
+                let surface_id = format!("{id}.residual");
+                data.surfaces.push(SurfaceRow { surface_id, ..row.clone() });
+            }
+        });
+        let texts = texts_of(&blocks);
+        assert_eq!(texts.matches("Does it match the measured surface?").count(), 3, "{texts}");
+        assert_eq!(texts.matches("The probability of a wrong yes").count(), 1, "{texts}");
+        let order =
+            ["Texture v", "How the answers are reached", "Textures of fft_ma are", "Textures of wavelet_statistics"];
+        let places: Vec<usize> = order.iter().map(|words| texts.find(words).unwrap()).collect();
+        assert!(places.is_sorted(), "{places:?}");
     }
 }

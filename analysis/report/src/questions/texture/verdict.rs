@@ -18,7 +18,7 @@ use crate::render::number as set;
 use sastrugi_numeric::sums;
 use sastrugi_schemas::tables::{CovarianceRow, FitRow, SurfaceRow, TerrainRow};
 use sastrugi_statistics::normal;
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
 use std::f64::consts::PI;
 
 /// Margin for the logarithm of the ratio of lengths and slopes.
@@ -105,22 +105,50 @@ fn listed<'a>(all: impl Iterator<Item = &'a Compared>) -> String {
     shown.iter().map(words).collect::<Vec<_>>().join("; ")
 }
 
-/// How the verdict is reached.
-pub fn method() -> String {
+/// How the verdicts on textures of these methods are reached, and what they show.
+pub fn method(methods: &BTreeSet<&str>) -> [String; 2] {
     let ends = [-RATIO_MARGIN, RATIO_MARGIN].map(|end| set::fixed(libm::exp(end), 2)).join(" to ");
-    format!(
+    let test = format!(
         "The residual of the DEM is compared with that of the texture after the same detrending and trimming. RMS height, RMS slope and \
          increments up to {} of the window match within a ratio of {ends}, skewness within {}, kurtosis within {}. Their scatter over an area of \
          this size follows from the covariance, as for a stationary normal field (Lomnicki, 1961). The probability of a wrong yes is at most {}, \
-         and so is that of a wrong no over all quantities together. The texture was synthesised with the covariance of the fit, so RMS height and \
-         increments show whether the synthesis is correct; skewness and kurtosis show whether a normal field can represent the surface. \
-         `sastrugi compare DEM --split-half` judges a texture on ground that was not used in the fit.",
+         and so is that of a wrong no over all quantities together.",
         set::plain(LAG_MAX, 2),
         set::plain(SKEWNESS_MARGIN, 2),
         set::plain(KURTOSIS_MARGIN, 2),
         set::percent(ALPHA, 0)
-    )
+    );
+    let shown = MEANINGS.iter().filter_map(|(names, meaning)| {
+        let named: Vec<&str> = names.iter().copied().filter(|name| methods.contains(name)).collect();
+        (!named.is_empty()).then(|| format!("Textures of {} {meaning}.", named.join(" and ")))
+    });
+    let shown: Vec<String> = shown.collect();
+    let split = "`sastrugi compare DEM --split-half` judges a texture on ground that was not used in the fit.";
+    [test, shown.iter().map(String::as_str).chain([split]).collect::<Vec<_>>().join(" ")]
 }
+
+/// What the quantities compared show of textures of these methods.
+const MEANINGS: [(&[&str], &str); 4] = [
+    (
+        &["fft_ma", "cholesky", "quasi_wavelets"],
+        "are random fields with the covariance of the fit: RMS height, RMS slope and increments show whether that covariance is the surface's; \
+         skewness and kurtosis show whether such a field can represent the surface",
+    ),
+    (
+        &["gaussians"],
+        "have the variance of the fit, but a Gaussian correlation: RMS slope and increments show what that changes; skewness and kurtosis show \
+         whether such a field can represent the surface",
+    ),
+    (
+        &["modulated", "wavelet_statistics"],
+        "repeat statistics of the measured residual, among them its covariance and its heights: all quantities show whether the synthesis keeps \
+         these",
+    ),
+    (
+        &["quilting", "exemplar"],
+        "are made of cells of the measured residual: all quantities show whether the copies are a fair sample of it",
+    ),
+];
 
 /// Prefix of the names of increments.
 const INCREMENT: &str = "RMS increment";
@@ -363,6 +391,29 @@ mod tests {
         println!("of 2000 pairs: {wrong:?} wrong yes and no, {right:?} right yes and no");
         assert!(wrong.iter().all(|count| *count <= 151), "{wrong:?}");
         assert!(right[0] > 1500 && right[1] > 1800, "{right:?}");
+    }
+
+    /// Only textures with the covariance of the fit are said to have it; every method has its meaning.
+    #[test]
+    fn val_the_meaning_of_an_answer_depends_on_the_method() {
+        let meaning = |methods: &[&str]| {
+            let methods: BTreeSet<&str> = methods.iter().copied().collect();
+            method(&methods).concat()
+        };
+        let words = "the covariance of the fit: ";
+        assert!(meaning(&["fft_ma"]).contains(&format!("Textures of fft_ma are random fields with {words}")));
+        assert!(meaning(&["cholesky", "fft_ma"]).contains("Textures of fft_ma and cholesky are random fields"));
+        for (name, part) in [
+            ("wavelet_statistics", "Textures of wavelet_statistics repeat statistics of the measured residual"),
+            ("modulated", "Textures of modulated repeat statistics"),
+            ("quilting", "Textures of quilting are made of cells of the measured residual"),
+            ("exemplar", "Textures of exemplar are made of cells"),
+            ("gaussians", "Textures of gaussians have the variance of the fit, but a Gaussian correlation"),
+        ] {
+            let found = meaning(&[name]);
+            assert!(found.contains(part) && !found.contains(words) && found.contains("--split-half"), "{found}");
+        }
+        assert!(!meaning(&[]).contains("Textures of"));
     }
 
     fn figure(name: &str, difference: f64, scatter: f64) -> Compared {
