@@ -208,12 +208,15 @@ pub struct Beside {
 }
 
 impl Rows {
-    /// Draws a box plot into a row: the box and whiskers above, the median's interval just below.
+    /// Draws a box plot into a row: the box and whiskers above, the median's interval just below. A whisker that would end inside the box ends at its
+    /// edge: a quartile of few values is interpolated between the last value that counts and an outlier.
     pub fn box_plot(&mut self, row: usize, plot: &BoxPlot, beside: Beside, paint: Paint) {
         let y = self.centre(row) - 3.0;
         let half = (0.26 * self.row_height).min(11.0);
         let at = |v: f64| self.x.clamped(v);
-        let (Some(low), Some(high)) = (at(plot.whisker_low), at(plot.whisker_high)) else { return };
+        let (whisker_low, whisker_high) =
+            (plot.whisker_low.min(plot.quartile_low), plot.whisker_high.max(plot.quartile_high));
+        let (Some(low), Some(high)) = (at(whisker_low), at(whisker_high)) else { return };
         let [Some(q1), Some(median), Some(q3)] = [plot.quartile_low, plot.median, plot.quartile_high].map(at) else {
             return;
         };
@@ -355,6 +358,17 @@ mod tests {
         assert_eq!(drawn("<line x1=\"124.5\" y1=\"45\" x2=\"297.5\" y2=\"45\""), 1);
         // The published median is a diamond on a paler one at the end of the axis.
         assert_eq!(drawn("<path d=\"M384.0 "), 2);
+    }
+
+    /// Of 0, 1, 2 and 10, the last value that is not an outlier is 2 (107.2 px), but the box ends at 4 (176.4 px): nothing ends at 2.
+    #[test]
+    fn val_whiskers_do_not_end_inside_the_box() {
+        let label = RowLabel { name: "a".into(), detail: String::new() };
+        let mut rows = Rows::new(&[label], 46.0, (Axis::linear(0.0, 10.0), "x"), &[]);
+        rows.box_plot(0, &BoxPlot::of(&[0.0, 1.0, 2.0, 10.0]).unwrap(), Beside::default(), Paint::Series(0));
+        let svg = rows.svg.finish("id", "t", "d");
+        let ends_at = |x: &str| svg.contains(&format!("x1=\"{x}\" y1=\"22.5\" x2=\"{x}\" y2=\"33.5\""));
+        assert!(ends_at("176.4") && !ends_at("107.2"), "{svg}");
     }
 
     #[test]

@@ -204,9 +204,13 @@ fn numbers(compared: &Compared) -> Numbers {
     numbers.of_all(compared.samples.iter().map(|s| s.plot.count).sum())
 }
 
-/// The axis holds all boxes, whiskers and published medians; outliers widen it by no more than [`OUTLIERS_WIDEN`].
+/// The axis holds all boxes, whiskers and published medians; outliers widen it by no more than [`OUTLIERS_WIDEN`]. Of few values, a quartile may
+/// lie beyond the whisker: it is interpolated towards an outlier.
 fn axis(samples: &[Sample]) -> Axis {
-    let inner = |s: &Sample| [s.plot.whisker_low, s.plot.whisker_high, s.published.unwrap_or(s.plot.median)];
+    let inner = |s: &Sample| {
+        let BoxPlot { whisker_low, quartile_low, quartile_high, whisker_high, .. } = s.plot;
+        [whisker_low, quartile_low, quartile_high, whisker_high, s.published.unwrap_or(s.plot.median)]
+    };
     let (low, high) = ends(samples.iter().flat_map(inner));
     let (lowest, highest) = ends(samples.iter().flat_map(|s| [s.ends.0, s.ends.1]));
     let room = (OUTLIERS_WIDEN * (high - low)).max(1e-3 * high.abs());
@@ -253,4 +257,30 @@ fn describe(samples: &[Sample], axis: &str) -> String {
 pub fn capital(words: &str) -> String {
     let mut chars = words.chars();
     chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// By hand: of 0, 1, 2 and 10, the quartiles are 0.75 and 4, and 10 is an outlier, so the whisker ends at 2, within the box. The axis holds the
+    /// box.
+    #[test]
+    fn val_the_axis_holds_the_box_of_few_values() {
+        let values = [0.0, 1.0, 2.0, 10.0];
+        let plot = BoxPlot::of(&values).unwrap();
+        assert_eq!((plot.whisker_high, plot.quartile_high, &plot.outliers[..]), (2.0, 4.0, &[10.0][..]));
+        let sample = Sample {
+            group: "g".into(),
+            index: 0,
+            terrains: 1,
+            listed: Vec::new(),
+            ends: ends(values.into_iter()),
+            plot,
+            band: None,
+            published: None,
+        };
+        let (low, high) = axis(&[sample]).range();
+        assert!(low < 0.0 && high > 4.0, "{low} to {high}");
+    }
 }
