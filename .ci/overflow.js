@@ -25,6 +25,12 @@ addEventListener("load", () => {
       found.push(`${name(element)}: content of ${element.scrollWidth} px in ${element.clientWidth} px`);
     }
   }
+  // On a desk, every table that is not folded fits; the long ones of single items scroll, and so do tables on a telephone.
+  for (const box of document.body.querySelectorAll(".scroll:not(details .scroll)")) {
+    if (width > 1000 && box.scrollWidth > box.clientWidth + 1) {
+      found.push(`${name(box)}: a table of ${box.scrollWidth} px scrolls in ${box.clientWidth} px`);
+    }
+  }
   // Words of a figure end at its edge.
   for (const text of document.body.querySelectorAll("svg text")) {
     const [own, frame] = [text.getBoundingClientRect(), text.closest("svg").getBoundingClientRect()];

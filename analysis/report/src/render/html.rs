@@ -4,6 +4,7 @@ use super::number;
 use super::svg::escape;
 use crate::content::{Block, Figure, Gives, Heading, Numbers, Section, TableBlock};
 use sastrugi_schemas::Cell;
+use std::collections::BTreeMap;
 
 /// Style of the page.
 const STYLE: &str = include_str!("style.css");
@@ -101,13 +102,30 @@ fn warnings(summary: &str, sentences: &[String]) -> String {
     if let [only] = sentences {
         return paragraph("warning", only);
     }
-    let items: String = sentences.iter().map(|s| format!("<li>{}</li>\n", escape(s))).collect();
-    format!("<details class=\"warning\"><summary>{}</summary>\n<ul>\n{items}</ul></details>\n", escape(summary))
+    let items: String = sentences.iter().map(|s| format!("<li>{}</li>\n", set(s))).collect();
+    format!("<details class=\"warning\"><summary>{}</summary>\n<ul>\n{items}</ul></details>\n", set(summary))
 }
 
 fn paragraph(class: &str, text: &str) -> String {
     let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
-    format!("<p{class}>{}</p>\n", escape(text))
+    format!("<p{class}>{}</p>\n", set(text))
+}
+
+/// Words as markup: what is between two backticks is set as code. A backtick without a second one stays.
+fn set(words: &str) -> String {
+    let parts: Vec<&str> = words.split('`').collect();
+    let last = parts.len() - 1;
+    let part = |(i, part): (usize, &&str)| match i % 2 {
+        1 if i < last => format!("<code>{}</code>", escape(part)),
+        1 => format!("`{}", escape(part)),
+        _ => escape(part),
+    };
+    parts.iter().enumerate().map(part).collect()
+}
+
+/// Markup of [`set`] as an attribute: without code spans.
+fn without_tags(markup: &str) -> String {
+    markup.replace("<code>", "").replace("</code>", "")
 }
 
 fn figure_grid(figures: &[Figure]) -> String {
@@ -125,8 +143,8 @@ fn figure(figure: &Figure) -> String {
     format!(
         "<figure id=\"fig-{id}\">\n{svg}<figcaption><b>{}</b> {}<div class=\"links\"><a href=\"figures/{id}.svg\">SVG</a> \
          <a href=\"data/{id}.json\">JSON</a>{}{numbers}</div></figcaption>\n</figure>\n",
-        escape(&figure.title),
-        escape(&figure.caption),
+        set(&figure.title),
+        set(&figure.caption),
         source(&figure.numbers, &figure.id),
     )
 }
@@ -143,7 +161,7 @@ fn source(numbers: &Numbers, id: &str) -> String {
 
 /// Folded content; in print, its summary names the file that contains it.
 fn folded(summary: &str, id: &str, content: &str) -> String {
-    let (summary, id) = (escape(summary), escape(id));
+    let (summary, id) = (set(summary), escape(id));
     format!("<details><summary data-file=\"data/{id}.json\">{summary}</summary>\n{content}</details>\n")
 }
 
@@ -157,99 +175,218 @@ fn table_block(block: &TableBlock) -> String {
 }
 
 fn table(numbers: &Numbers, caption: &str) -> String {
-    let head: String = numbers.columns.iter().enumerate().map(|(i, c)| heading(c, numeric(numbers, i))).collect();
-    let decimals: Vec<Option<usize>> = (0..numbers.columns.len()).map(|i| decimals(numbers, i)).collect();
     let cards = numbers.columns.len() > CARD_COLUMNS_MIN && numbers.rows.len() <= CARD_ROWS_MAX;
-    let labels: Vec<String> = numbers.columns.iter().map(|c| if cards { label(c) } else { String::new() }).collect();
-    let format = |i: usize| Format { decimals: decimals[i], label: &labels[i] };
-    let formats: Vec<Format> = (0..labels.len()).map(format).collect();
-    let rows: String = numbers.rows.iter().take(TABLE_ROWS_MAX).map(|r| row(r, &formats)).collect();
+    let columns = columns(numbers);
+    let head: String = columns.iter().map(heading).collect();
+    let labels: Vec<String> = columns.iter().map(|c| if cards { label(&c.heading) } else { String::new() }).collect();
+    let decimals = decimals_by_measure(numbers, &columns);
+    let row = |cells: &Vec<Cell>| {
+        let decimals = decimals.get(&measure(numbers, cells)).into_iter().flatten().copied();
+        row(cells, columns.iter().zip(decimals).zip(&labels))
+    };
+    let rows: String = numbers.rows.iter().take(TABLE_ROWS_MAX).map(row).collect();
     let class = if cards { "scroll cards" } else { "scroll" };
     let caption = match numbers.rows.len().saturating_sub(TABLE_ROWS_MAX) {
-        0 => escape(caption),
+        0 => set(caption),
         _ => format!(
             "{} (first {TABLE_ROWS_MAX} of {} rows{})",
-            escape(caption),
+            set(caption),
             number::count(numbers.rows.len()),
             sampled(numbers)
         ),
     };
+    let name = without_tags(&caption);
     format!(
-        "<div class=\"{class}\" tabindex=\"0\" role=\"region\" aria-label=\"{caption}\"><table><caption>{caption}</caption>\n\
+        "<div class=\"{class}\" tabindex=\"0\" role=\"region\" aria-label=\"{name}\"><table><caption>{caption}</caption>\n\
          <thead><tr>{head}</tr></thead>\n<tbody>\n{rows}</tbody></table></div>\n"
     )
 }
 
-/// True for a column of numbers.
-fn numeric(numbers: &Numbers, column: usize) -> bool {
-    let mut cells = numbers.rows.iter().filter_map(|r| r.get(column));
-    cells.find(|c| **c != Cell::Null).is_some_and(|c| matches!(c, Cell::F64(_) | Cell::I64(_)))
+/// A column as it is printed: one of the numbers, or both ends of an interval.
+#[derive(Clone, Debug, PartialEq)]
+struct Column {
+    /// Its number, or that of the lower end.
+    at: usize,
+    /// True if the next of the numbers is the upper end.
+    is_interval: bool,
+    heading: Heading,
+    numeric: bool,
 }
 
-/// Decimals of a column: four digits for its largest number, two for its smallest. `None` if that takes more than five
-/// digits, if the numbers are very large or small, or if their units differ.
-fn decimals(numbers: &Numbers, column: usize) -> Option<usize> {
-    if numbers.mixed {
-        return None;
+impl Column {
+    /// The numbers that it prints.
+    fn sources(&self) -> impl Iterator<Item = usize> + use<> {
+        self.at..=self.at + usize::from(self.is_interval)
     }
-    let magnitude = |row: &Vec<Cell>| match row.get(column) {
-        Some(Cell::F64(v)) if *v != 0.0 => Some(v.abs()),
+}
+
+/// The columns of a table as printed: the two ends of an interval share one.
+fn columns(numbers: &Numbers) -> Vec<Column> {
+    let intervals = (0..numbers.columns.len()).filter(|&i| ends(numbers, i).is_some()).count();
+    let mut columns: Vec<Column> = Vec::new();
+    let mut at = 0;
+    while let Some(own) = numbers.columns.get(at) {
+        let (is_interval, name) = match ends(numbers, at) {
+            Some(name) if name == INTERVAL && intervals > 1 => (true, format!("{}, {INTERVAL}", before(numbers, at))),
+            Some(name) => (true, name),
+            None => (false, own.name.clone()),
+        };
+        let heading = Heading { name, unit: own.unit.clone() };
+        columns.push(Column { at, is_interval, heading, numeric: is_interval || numeric(numbers, at) });
+        at += 1 + usize::from(is_interval);
+    }
+    columns
+}
+
+/// Heading of the ends of a column's interval.
+const INTERVAL: &str = "interval";
+
+/// Name of the column before another.
+fn before(numbers: &Numbers, column: usize) -> &str {
+    column.checked_sub(1).and_then(|i| numbers.columns.get(i)).map_or("", |heading| &heading.name)
+}
+
+/// Heading of the interval whose lower end a column is; `None` for any other column.
+fn ends(numbers: &Numbers, column: usize) -> Option<String> {
+    let (low, high) = (numbers.columns.get(column)?, numbers.columns.get(column + 1)?);
+    let estimate = column.checked_sub(1).and_then(|i| numbers.columns.get(i));
+    let name = match (low.name.as_str(), high.name.as_str()) {
+        // Without an estimate of the same unit before them, they are the ends of a range.
+        ("low", "high") => estimate.filter(|e| e.unit == low.unit).map(|_| INTERVAL.to_owned()),
+        ("low, %", "high, %") => Some("interval, %".into()),
+        ("band, 5 %", "band, 95 %") => Some("band, 5 to 95 %".into()),
+        ("smallest", "largest") => Some("smallest to largest".into()),
+        (low, high) => low.strip_suffix(", low").zip(high.strip_suffix(", high")).and_then(|(name, other)| {
+            let of_one_world =
+                if name == "one world" { "band of one world".into() } else { format!("{name}, {INTERVAL}") };
+            (name == other).then_some(of_one_world)
+        }),
+    };
+    name.filter(|_| low.unit == high.unit)
+}
+
+/// True for a column of numbers, also where all of them are unknown.
+fn numeric(numbers: &Numbers, column: usize) -> bool {
+    let has_unit = numbers.columns.get(column).is_some_and(|heading| !heading.unit.is_empty());
+    let mut cells = numbers.rows.iter().filter_map(|r| r.get(column));
+    cells.find(|c| **c != Cell::Null).map_or(has_unit, |c| matches!(c, Cell::F64(_) | Cell::I64(_)))
+}
+
+/// Names of the columns whose words tell what the numbers of a row measure.
+const MEASURES: [&str; 5] = ["metric", "quantity", "ratio", "measure", "unit"];
+
+/// What the numbers of a row measure, where rows differ in it: by the columns that name it, otherwise by the first one.
+fn measure<'a>(numbers: &Numbers, row: &'a [Cell]) -> Vec<&'a str> {
+    if !numbers.mixed {
+        return Vec::new();
+    }
+    let words = |cell: &'a Cell| match cell {
+        Cell::Text(words) => Some(words.as_str()),
         _ => None,
     };
-    let magnitudes = || numbers.rows.iter().filter_map(magnitude);
-    if magnitudes().all(|v| v.fract() == 0.0) {
+    let names = numbers.columns.iter().zip(row).filter(|(heading, _)| MEASURES.contains(&heading.name.as_str()));
+    let named: Vec<&str> = names.filter_map(|(_, cell)| words(cell)).collect();
+    if named.is_empty() { row.first().and_then(words).into_iter().collect() } else { named }
+}
+
+/// Decimals of every column, for each measure: numbers of one column and measure have the same.
+fn decimals_by_measure<'a>(numbers: &'a Numbers, columns: &[Column]) -> BTreeMap<Vec<&'a str>, Vec<Option<usize>>> {
+    let mut rows: BTreeMap<Vec<&str>, Vec<&[Cell]>> = BTreeMap::new();
+    for row in &numbers.rows {
+        rows.entry(measure(numbers, row)).or_default().push(row);
+    }
+    let of_rows = |rows: &[&[Cell]]| -> Vec<Option<usize>> {
+        let of_column = |column: &Column| {
+            let cells = rows.iter().flat_map(|row| column.sources().filter_map(move |i| row.get(i)));
+            // A single number has all its digits, and no more.
+            let alone = numbers.mixed && rows.len() == 1 && !column.is_interval;
+            (!alone).then(|| decimals(cells, &column.heading.unit)).flatten()
+        };
+        columns.iter().map(of_column).collect()
+    };
+    rows.into_iter().map(|(measure, rows)| (measure, of_rows(&rows))).collect()
+}
+
+/// Decimals of the cells of a column: four digits for the largest number, two for the smallest. `None` if that takes more than five
+/// digits, or if the numbers are very large or small.
+fn decimals<'a>(cells: impl Iterator<Item = &'a Cell>, unit: &str) -> Option<usize> {
+    let magnitude = |cell: &Cell| match cell {
+        Cell::F64(v) => Some(number::without_noise(*v, unit).abs()).filter(|v| *v != 0.0),
+        _ => None,
+    };
+    let magnitudes: Vec<f64> = cells.filter_map(magnitude).collect();
+    if magnitudes.iter().all(|v| v.fract() == 0.0) {
         return Some(0);
     }
-    let (low, high) = (magnitudes().fold(f64::INFINITY, f64::min), magnitudes().fold(0.0, f64::max));
+    let (low, high) = magnitudes.iter().fold((f64::INFINITY, 0.0_f64), |(low, high), v| (low.min(*v), high.max(*v)));
     let reaches =
         |v: f64, digits: f64| (0..=6).find(|d| v * libm::pow(10.0, f64::from(*d)) >= libm::pow(10.0, digits - 1.0));
     let places: i32 = reaches(high, 4.0)?.max(reaches(low, 2.0)?);
     (high * libm::pow(10.0, f64::from(places)) < 1e5).then_some(usize::try_from(places).unwrap_or(0))
 }
 
-fn heading(heading: &Heading, numeric: bool) -> String {
-    let name = escape(&heading.name).replace('_', "_<wbr>");
-    let unit = match number::unit(&heading.unit) {
+fn heading(column: &Column) -> String {
+    let name = broken(&set(&column.heading.name));
+    let unit = match number::unit(&column.heading.unit) {
         u if u.is_empty() => u,
         u => format!("<br><small>{}</small>", escape(&u)),
     };
-    let class = if numeric { " class=\"n\"" } else { "" };
+    let class = if column.numeric { " class=\"n\"" } else { "" };
     format!("<th scope=\"col\"{class}>{name}{unit}</th>")
 }
 
-/// Name and unit of a column, as the label of a number in a card.
+/// A name that may be broken after each underscore.
+fn broken(name: &str) -> String {
+    name.replace('_', "_<wbr>")
+}
+
+/// Name and unit of a column, as the label of a number in a card. An attribute has no `<wbr>`: a space of no width is where a line may break.
 fn label(heading: &Heading) -> String {
     let unit = match number::unit(&heading.unit) {
         unit if unit.is_empty() => unit,
         unit => format!(", {unit}"),
     };
-    format!(" data-label=\"{}{}\"", escape(&heading.name), escape(&unit))
+    format!(" data-label=\"{}{}\"", escape(&heading.name).replace('_', "_\u{200b}"), escape(&unit))
 }
 
-/// How the cells of a column are set.
-struct Format<'a> {
-    decimals: Option<usize>,
-    /// Attribute that names the column; empty if rows are not cards.
-    label: &'a str,
-}
-
-fn row(cells: &[Cell], formats: &[Format]) -> String {
-    let cells: String = cells.iter().zip(formats).map(cell).collect();
+/// A row with the columns, their decimals and their labels, which are empty if rows are not cards.
+fn row<'a>(cells: &[Cell], formats: impl Iterator<Item = ((&'a Column, Option<usize>), &'a String)>) -> String {
+    let cells: String = formats.map(|((column, decimals), label)| cell(cells, column, decimals, label)).collect();
     format!("<tr>{cells}</tr>\n")
 }
 
-fn cell((cell, format): (&Cell, &Format)) -> String {
-    let (class, text) = match cell {
-        Cell::Null => ("n", number::ABSENT.to_owned()),
-        Cell::Text(v) => (class_of_text(v), escape(v)),
-        Cell::F64(v) => ("n", format.decimals.map_or_else(|| number::plain(*v, 4), |d| number::fixed(*v, d))),
+fn cell(cells: &[Cell], column: &Column, decimals: Option<usize>, label: &str) -> String {
+    let own = cells.get(column.at).unwrap_or(&Cell::Null);
+    let number = |v: f64| in_digits(number::without_noise(v, &column.heading.unit), decimals);
+    let (class, text) = match own {
+        _ if column.is_interval => ("n i", interval(own, cells.get(column.at + 1).unwrap_or(&Cell::Null), number)),
+        Cell::Null => (if column.numeric { "n" } else { "" }, number::ABSENT.to_owned()),
+        Cell::Text(v) => (class_of_text(v), set(v)),
+        Cell::F64(v) => ("n", number(*v)),
         Cell::I64(v) => ("n", v.to_string()),
         Cell::Bool(v) => ("", if *v { "yes" } else { "no" }.to_owned()),
         Cell::F32List(v) => ("", list(v.iter().map(|v| f64::from(*v)))),
         Cell::F64List(v) => ("", list(v.iter().copied())),
     };
     let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
-    format!("<td{class}{}>{text}</td>", format.label)
+    format!("<td{class}{label}>{text}</td>")
+}
+
+fn in_digits(value: f64, decimals: Option<usize>) -> String {
+    decimals.map_or_else(|| number::plain(value, 4), |d| number::fixed(value, d))
+}
+
+/// A space at which no line is broken.
+const NO_BREAK: char = '\u{a0}';
+
+/// Both ends of an interval, which may be broken between them; an end that is unbounded is left out.
+fn interval(low: &Cell, high: &Cell, set: impl Fn(f64) -> String) -> String {
+    match (low, high) {
+        (Cell::F64(low), Cell::F64(high)) => format!("{} to{NO_BREAK}{}", set(*low), set(*high)),
+        (Cell::F64(low), _) => format!("from{NO_BREAK}{}", set(*low)),
+        (_, Cell::F64(high)) => format!("up to{NO_BREAK}{}", set(*high)),
+        _ => number::ABSENT.to_owned(),
+    }
 }
 
 fn class_of_text(text: &str) -> &'static str {
@@ -301,21 +438,88 @@ mod tests {
 
     #[test]
     fn val_cells_are_set_by_their_type() {
-        let format = Format { decimals: Some(2), label: "" };
-        let of = |one: Cell| cell((&one, &format));
+        let heading = Heading { name: "n".into(), unit: "m".into() };
+        let column = Column { at: 0, is_interval: false, heading, numeric: true };
+        let of = |one: Cell| cell(&[one], &column, Some(2), "");
         assert_eq!(of(Cell::Null), "<td class=\"n\">–</td>");
         assert_eq!(of(Cell::F64(-0.25)), "<td class=\"n\">−0.25</td>");
         assert_eq!(of(Cell::I64(-3)), "<td class=\"n\">-3</td>");
         assert_eq!([of(Cell::Bool(true)), of(Cell::Bool(false))], ["<td>yes</td>", "<td>no</td>"]);
         assert_eq!(of(Cell::Text("a<b".into())), "<td>a&lt;b</td>");
         assert_eq!(of(Cell::F64List(vec![0.5, f64::NAN])), "<td>0.5, –</td>");
+        // Rounding noise is 0; an unknown word is aligned as words are.
+        assert_eq!(of(Cell::F64(-1.5e-16)), "<td class=\"n\">0.00</td>");
+        let words = Column { numeric: false, ..column.clone() };
+        assert_eq!(cell(&[Cell::Null], &words, None, ""), "<td>–</td>");
+    }
+
+    /// A column without any number is one of numbers if it has a unit, and its heading is aligned like its cells.
+    #[test]
+    fn val_unknown_numbers_are_aligned_with_their_heading() {
+        let mut numbers = Numbers::new("", &[("depth", "m"), ("note", "")]);
+        numbers.row([Cell::Null, Cell::Null]);
+        let table = table(&numbers, "c");
+        assert!(table.contains("<th scope=\"col\" class=\"n\">depth") && table.contains("<th scope=\"col\">note"));
+        assert!(table.contains("<td class=\"n\">–</td><td>–</td>"), "{table}");
+    }
+
+    /// The ends of an interval share a column with equal decimals; where there are several, each is named after its estimate. An unbounded end is left
+    /// out. The lowest and the highest value of a raster are no interval of what precedes them.
+    #[test]
+    fn val_ends_of_intervals_share_a_column() {
+        let names = |columns: &[(&str, &str)]| {
+            let columns = super::columns(&Numbers::new("", columns));
+            columns.into_iter().map(|c| c.heading.name).collect::<Vec<_>>()
+        };
+        assert_eq!(names(&[("share", "%"), ("low", "%"), ("high", "%")]), ["share", "interval"]);
+        let two = [("a", "1"), ("low", "1"), ("high", "1"), ("b", "m"), ("low", "m"), ("high", "m")];
+        assert_eq!(names(&two), ["a", "a, interval", "b", "b, interval"]);
+        assert_eq!(names(&[("shift, low", ""), ("shift, high", "")]), ["shift, interval"]);
+        assert_eq!(names(&[("band, 5 %", "m"), ("band, 95 %", "m")]), ["band, 5 to 95 %"]);
+        assert_eq!(names(&[("cell_y_m", "m"), ("low", ""), ("high", "")]), ["cell_y_m", "low", "high"]);
+        let mut numbers = Numbers::new("", &[("a", ""), ("low", ""), ("high", "")]);
+        for (low, high) in [(-0.5, 1.25), (0.25, f64::INFINITY), (f64::NAN, 2.0), (f64::NAN, f64::NAN)] {
+            numbers.row([figure(1.0), figure(low), figure(high)]);
+        }
+        let table = table(&numbers, "c");
+        for cell in ["−0.500 to\u{a0}1.250", "from\u{a0}0.250", "up to\u{a0}2.000", "–"] {
+            assert!(table.contains(&format!("<td class=\"n i\">{cell}</td>")), "{cell}: {table}");
+        }
+    }
+
+    /// Where rows measure different quantities, those of one quantity have equal decimals.
+    #[test]
+    fn val_decimals_follow_the_measure() {
+        let mut numbers = Numbers::new("", &[("metric", ""), ("median", "")]).with_mixed_units();
+        for (metric, median) in [("time", 14.7), ("time", 26.73), ("p", 0.05)] {
+            numbers.row([Cell::Text(metric.into()), figure(median)]);
+        }
+        let table = table(&numbers, "c");
+        assert!([">14.70<", ">26.73<", ">0.05<"].iter().all(|cell| table.contains(cell)), "{table}");
+    }
+
+    /// Labels of cards may be broken after underscores, as headings are.
+    #[test]
+    fn val_labels_break_after_underscores() {
+        let heading = Heading { name: "covariance_error_max".into(), unit: String::new() };
+        assert_eq!(label(&heading), " data-label=\"covariance_\u{200b}error_\u{200b}max\"");
+    }
+
+    #[test]
+    fn val_code_between_backticks() {
+        assert_eq!(set("run `a <b>` and `c`"), "run <code>a &lt;b&gt;</code> and <code>c</code>");
+        assert_eq!([set("one ` alone"), set("plain"), set("")], ["one ` alone", "plain", ""]);
+        let caption = table(&numbers(1, 1), "`size_m` gives");
+        assert!(
+            caption.contains("aria-label=\"size_m gives\"") && caption.contains("<caption><code>size_m</code> gives")
+        );
     }
 
     #[test]
     fn val_decimals_of_a_column() {
         let of = |values: &[f64]| {
-            let rows = values.iter().map(|v| vec![figure(*v)]).collect();
-            decimals(&Numbers { rows, ..Numbers::new("", &[("x", "")]) }, 0)
+            let cells: Vec<Cell> = values.iter().map(|v| figure(*v)).collect();
+            decimals(cells.iter(), "")
         };
         assert_eq!(of(&[84.75, 0.73, f64::NAN]), Some(2));
         assert_eq!(of(&[100.0, 0.6377]), Some(2));
