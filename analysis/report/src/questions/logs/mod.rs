@@ -24,6 +24,8 @@ const MIDDLE: [f64; 2] = [2.5, 97.5];
 const BELOW: &str = "below the missions";
 const ABOVE: &str = "above the missions";
 const TOO_FEW: &str = "cannot tell: at the edge, and too few terrains";
+/// Verdicts that leave open where a log falls begin with these words.
+const UNDECIDED: [&str; 3] = ["cannot tell", "not judged", "no value"];
 /// Logs drawn; all are in the table.
 const DRAWN_MAX: usize = 6;
 /// Marks that distinguish groups in a chart.
@@ -133,7 +135,9 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut blocks = vec![Block::Text(in_words(&placed)), Block::Text(introduction())];
     blocks.extend(rates(data, logs).map(Block::Warning));
     blocks.extend(too_few(&placed).map(Block::Warning));
-    blocks.push(Block::Figures(drawings(&placed)));
+    let drawings = drawings(&placed);
+    blocks.extend(left_out(logs.len(), drawings.len()).map(Block::Text));
+    blocks.push(Block::Figures(drawings));
     blocks.push(Block::Table(table(&placed)));
     blocks.push(Block::FoldedTable(all(logs)));
     Ok(blocks)
@@ -233,6 +237,12 @@ impl Placed<'_> {
             None => "cannot tell: at the edge",
         }
     }
+
+    /// True if the verdict places the log: within the middle of the missions, below or above them.
+    fn decides(&self) -> bool {
+        let verdict = self.verdict();
+        !UNDECIDED.iter().any(|words| verdict.starts_with(words))
+    }
 }
 
 fn in_words(placed: &[Placed]) -> String {
@@ -312,7 +322,20 @@ fn rates(data: &Data, logs: &[LogRow]) -> Option<String> {
 
 fn drawings(placed: &[Placed]) -> Vec<Figure> {
     let of_log = |log: usize| placed.iter().filter(|p| p.log == log && p.place.is_some()).collect::<Vec<_>>();
-    (0..DRAWN_MAX).map(of_log).filter(|p| !p.is_empty()).map(|p| drawing(&p)).collect()
+    let logs = placed.iter().map(|p| p.log + 1).max().unwrap_or(0);
+    (0..logs).map(of_log).filter(|p| !p.is_empty()).take(DRAWN_MAX).map(|p| drawing(&p)).collect()
+}
+
+/// How many of the logs are drawn; `None` if all are.
+fn left_out(logs: usize, drawn: usize) -> Option<String> {
+    (drawn < logs).then(|| {
+        format!(
+            "{} of {} {} drawn; the table has all.",
+            set::count(drawn),
+            set::counted(logs, "log"),
+            if drawn == 1 { "is" } else { "are" }
+        )
+    })
 }
 
 /// The rank of a log: a row for each metric, a mark for each group.
@@ -345,7 +368,7 @@ fn drawing(placed: &[&Placed]) -> Figure {
         let k = groups.iter().position(|g| g.0 == p.group_index).unwrap_or(0);
         let y = rows.centre(row) + step * (k as f64 - 0.5 * (groups.len() - 1) as f64);
         let Some(place) = p.place.map(|place| in_percent(place.share_below)) else { continue };
-        let paint = if p.tells && p.unfinished.is_none() { Paint::Series(p.group_index) } else { Paint::Muted };
+        let paint = if p.decides() { Paint::Series(p.group_index) } else { Paint::Muted };
         if let (Some(from), Some(to)) = (rows.x.clamped(place.low), rows.x.clamped(place.high)) {
             rows.svg.segment((from, y), (to, y), Stroke::new(paint, 1.8));
         }
@@ -363,7 +386,7 @@ fn drawing(placed: &[&Placed]) -> Figure {
         id: format!("log-{log_id}"),
         title: format!("Where {log_id} falls among the missions."),
         caption: "Marks are the share of missions below the log; lines are 95 % intervals over terrains. The middle 95 % of the missions \
-                  lie between the two vertical lines. Grey: the log cannot tell, or is not judged."
+                  lie between the two vertical lines. Grey: undecided, or not judged."
             .into(),
         description: format!("Share of missions below the log, by metric. {}.", parts.join("; ")),
         svg: rows.svg,
@@ -440,6 +463,31 @@ fn all(logs: &[LogRow]) -> TableBlock {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A drive far above the missions of six terrains: too few to tell, so its line is grey, as the caption says. Of seven logs, six are drawn.
+    #[test]
+    fn val_undecided_logs_are_grey_and_the_others_are_counted() {
+        let mut data = crate::tests::made_up::full(6, 24);
+        let log = |k: usize| LogRow {
+            log_id: format!("{k}.mcap"),
+            group: Some("2.30".into()),
+            rms_vertical_acceleration_m_s2: 1e3,
+            ..crate::tests::made_up::log()
+        };
+        data.logs = Some((0..7).map(log).collect());
+        let blocks = answer(&data).unwrap();
+        let figures = blocks.iter().find_map(|b| if let Block::Figures(figures) = b { Some(figures) } else { None });
+        let figures = figures.unwrap();
+        assert_eq!(figures.len(), DRAWN_MAX);
+        let svg = figures[0].svg.finish("id", "t", "d");
+        assert!(svg.contains("stroke-width=\"1.8\"") && figures[0].caption.contains("Grey"), "{svg}");
+        let lines = svg.split('<').filter(|shape| shape.contains("stroke-width=\"1.8\""));
+        assert!(lines.into_iter().all(|line| line.contains("l-muted")), "{svg}");
+        let says = |words: &str| blocks.iter().any(|b| matches!(b, Block::Text(text) if text == words));
+        assert!(says("6 of 7 logs are drawn; the table has all."));
+        data.logs = Some(vec![log(1)]);
+        assert!(!answer(&data).unwrap().iter().any(|b| matches!(b, Block::Text(text) if text.contains("drawn"))));
+    }
 
     #[test]
     fn val_logs_have_the_shortest_unique_names() {
