@@ -136,11 +136,14 @@ fn entries(counts: &[usize; ALL.len()]) -> Vec<Entry> {
     entries
 }
 
-/// The path driven where it was recorded, otherwise the straight line from start to goal.
+/// The path driven where it was recorded, otherwise the straight line from start to goal; of a mission that never moved, its start.
 fn track_of(samples: &[SampleRow], mission: &Mission) -> Vec<(f64, f64)> {
     let path: Vec<(f64, f64)> = of_mission(samples, mission).iter().map(|s| (s.x_m, s.y_m)).collect();
+    let start = (mission.start_x_m, mission.start_y_m);
     match path.len() {
-        0 | 1 => vec![(mission.start_x_m, mission.start_y_m), (mission.goal_x_m, mission.goal_y_m)],
+        0 if mission.time_s == 0.0 => vec![start],
+        0 => vec![start, (mission.goal_x_m, mission.goal_y_m)],
+        1 => path,
         _ => thin::every(&path, 80),
     }
 }
@@ -160,4 +163,25 @@ fn draw_mission(map: &mut Map, mission: &Mission, path: &[(f64, f64)]) {
     }
     map.svg.symbol(ALL[kind].symbol, end, 5.4, LIGHT);
     map.svg.symbol(ALL[kind].symbol, end, 4.2, stroke.paint);
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A mission that ended where it started has a single sample, or none and no time: it is marked there, not driven to its goal.
+    #[test]
+    fn val_missions_that_never_moved_stay_at_their_start() {
+        let (data, shelf) = crate::tests::made_up::parts(1, 24);
+        let all: Vec<SampleRow> = shelf.samples.values().flatten().cloned().collect();
+        let of = |m: &&Mission| all.iter().any(|s| s.mission_id == m.mission_id.as_str());
+        let driven = data.missions.iter().find(of).unwrap();
+        let (start, goal) = ((driven.start_x_m, driven.start_y_m), (driven.goal_x_m, driven.goal_y_m));
+        let first = all.iter().find(|s| s.mission_id == driven.mission_id.as_str()).unwrap().clone();
+        assert_eq!(track_of(std::slice::from_ref(&first), driven), [(first.x_m, first.y_m)]);
+        let halted = Mission { time_s: 0.0, ..driven.clone() };
+        assert_eq!(track_of(&[], &halted), [start]);
+        // Without a recording, the line of the mission stands for its path.
+        assert_eq!(track_of(&[], &Mission { time_s: 3.0, ..halted }), [start, goal]);
+    }
 }
