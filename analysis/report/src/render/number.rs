@@ -111,7 +111,16 @@ pub fn percent(share: f64, decimals: usize) -> String {
 /// `value unit`, or [`ABSENT`] alone.
 pub fn with_unit(value: f64, digits: usize, unit: &str) -> String {
     let text = significant(value, digits);
-    if text == ABSENT || unit.is_empty() { text } else { format!("{text} {unit}") }
+    if text == ABSENT { text } else { before_unit(&text, unit) }
+}
+
+/// A number as text and its unit, if it has one: degrees follow it without a space.
+pub fn before_unit(number: &str, unit: &str) -> String {
+    match unit {
+        "" => number.to_owned(),
+        _ if unit.starts_with('°') => format!("{number}{unit}"),
+        _ => format!("{number} {unit}"),
+    }
 }
 
 /// `10` with a raised exponent.
@@ -174,6 +183,7 @@ mod tests {
         assert_eq!([999, 1_000, 999_000, 1_000_000].map(bytes), ["999 B", "1.00 kB", "999 kB", "1.00 MB"]);
         assert_eq!(bytes(5_000_000_000_000_000), "5000 TB");
         assert_eq!((with_unit(2.0, 2, "m"), with_unit(2.0, 2, "")), ("2.0 m".into(), "2.0".into()));
+        assert_eq!([before_unit("2", "°"), before_unit("2", "%"), before_unit("2", "")], ["2°", "2 %", "2"]);
     }
 
     #[test]

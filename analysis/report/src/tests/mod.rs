@@ -517,6 +517,23 @@ fn val_groups_without_terrains_are_not_compared() {
     assert!(!files.contains_key("data/comparison-power.json"));
 }
 
+/// Where all missions succeed, success has no scatter, from which any study would have a power of 100 %: none is given, and the page says why.
+#[test]
+fn val_power_needs_scatter() {
+    let mut data = made_up::full(6, 24);
+    data.missions.iter_mut().for_each(|m| m.pair_id = format!("{}-{}", m.terrain_id, m.mission_id).into());
+    let metrics = |data: &Data| {
+        let files = report(data).0;
+        let rows = rows(&files, "comparison-power");
+        let has = |name: &str| rows.iter().any(|row| row[0] == name);
+        let says = files["index.html"].contains("No power is given for what does not vary here: success on a terrain.");
+        (has("success on a terrain"), has("RMS pitch rate"), says)
+    };
+    assert_eq!(metrics(&data), (true, true, false));
+    data.missions.iter_mut().for_each(|m| m.outcome = "success".into());
+    assert_eq!(metrics(&data), (false, true, true));
+}
+
 fn claim(json: serde_json::Value) -> HypothesisItem {
     let mut all = serde_json::json!({ "id": "claim", "groups": ["2.30", "2.45", "2.60"], "test": "trend" });
     json.as_object().unwrap().iter().for_each(|(key, value)| all[key] = value.clone());
@@ -567,6 +584,21 @@ fn val_declared_claims_are_adjusted_by_family() {
     assert_eq!(verdicts[4], "equivalent within the margin");
     assert_eq!(verdicts[5], "not supported");
     assert_eq!(verdicts[6], "cannot tell: a group has no missions with this metric");
+    // Claims in words, and units of their estimates.
+    let [words, measures] = [0, 5].map(|c| rows_of.iter().map(|r| r[c].as_str().unwrap()).collect::<Vec<_>>());
+    assert_eq!(words[3], "RMS pitch rate differs between 2.30 and 2.60");
+    assert_eq!(words[4], "RMS pitch rate: 2.30 and 2.45 differ by less than 99°/s");
+    assert_eq!(
+        measures[..6],
+        [
+            "rank correlation",
+            "rank correlation",
+            "rank correlation",
+            "shift, °/s",
+            "difference of means, °/s",
+            "shift, °"
+        ]
+    );
 }
 
 /// On 11 of 20 terrains success is as high as in the other group: the shift is 0, but success still falls.
@@ -616,7 +648,7 @@ fn val_the_summary_names_the_claims() {
             .unwrap()
             .replace("&quot;", "\"")
     };
-    let words = "\"success on a terrain differs from 2.30 to 2.60\" (cannot tell: too few terrains)";
+    let words = "\"success on a terrain differs between 2.30 and 2.60\" (cannot tell: too few terrains)";
     let one = format!("One hypothesis was declared; the data cannot decide it: {words}.");
     assert!(summary(&data).contains(&one), "{}", summary(&data));
     data.study.hypotheses = vec![claim(success); 6];
@@ -663,9 +695,10 @@ fn val_groups_without_common_pairs_are_not_called_empty() {
         ),
         claim(serde_json::json!({ "statistic": "time_s", "family": "c" })),
     ];
-    for row in rows(&report(&data).0, "hypotheses") {
-        assert_eq!(row[1], "cannot tell: no paired missions have this metric in all groups", "{row:?}");
-    }
+    let verdicts: Vec<serde_json::Value> =
+        rows(&report(&data).0, "hypotheses").into_iter().map(|row| row[1].clone()).collect();
+    let none = |groups: &str| format!("cannot tell: no paired missions have this metric in {groups} groups");
+    assert_eq!(verdicts, [none("both"), none("both"), none("all")]);
 }
 
 /// Six blocks reach 2 / 64 at best: enough for one claim at 5 %, too few for two in a family.

@@ -22,6 +22,8 @@ struct Tested<'a> {
     of: String,
     /// What the estimate measures.
     what: &'static str,
+    /// Its unit as set in text; empty for a correlation.
+    unit: &'static str,
     estimate: Option<Interval>,
     /// Direction of the effect, by its sign.
     way: f64,
@@ -85,6 +87,7 @@ fn test<'a>(
         words: claim_in_words(claim, &metric),
         of: String::new(),
         what: "",
+        unit: "",
         estimate: None,
         way: f64::NAN,
         p: f64::NAN,
@@ -106,6 +109,7 @@ fn test<'a>(
     let p = test.map_or(f64::NAN, |t| t.p);
     let least_p = test.map_or(f64::NAN, |t| t.least_p);
     let tested = Tested { of, p, least_p, ..untested };
+    let unit = of_difference(metric.unit);
     match (size, claim.margin) {
         (Measure::Trend(estimate), _) => {
             let way = estimate.map_or(f64::NAN, |i| i.estimate);
@@ -113,7 +117,7 @@ fn test<'a>(
         }
         (Measure::Pair(difference), None) => {
             let estimate = difference.effect.map(|e| e.shift);
-            Tested { what: "shift", estimate, way: difference.way(), ..tested }
+            Tested { what: "shift", unit, estimate, way: difference.way(), ..tested }
         }
         (Measure::Pair(Difference { means, .. }), Some(margin)) => {
             // With one terrain in a group, no data have a standard error: no p below 1 is possible.
@@ -121,7 +125,7 @@ fn test<'a>(
             let p = means.map_or(least_p, |d| d.equivalence_p(margin));
             let beyond_p = means.map_or(f64::NAN, |d| d.beyond_p(margin));
             let estimate = means.map(|d| d.interval(1.0 - 2.0 * claim.alpha));
-            Tested { what: "difference of means", estimate, p, beyond_p, least_p, ..tested }
+            Tested { what: "difference of means", unit, estimate, p, beyond_p, least_p, ..tested }
         }
     }
 }
@@ -150,14 +154,18 @@ fn claim_in_words(claim: &HypothesisItem, metric: &Metric) -> String {
     let words = match (claim.test, claim.margin) {
         (HypothesisTest::Trend, _) => format!("{} {way} over {}", metric.name, claim.groups.join(", ")),
         (_, Some(margin)) => {
-            let unit = if metric.unit == "%" { "points" } else { metric.unit };
-            let ends = claim.groups.join(" and ");
-            let words = format!("{}: {ends} differ by less than {} {unit}", metric.name, set::plain(margin, 4));
-            words.trim_end().to_owned()
+            let margin = set::before_unit(&set::plain(margin, 4), of_difference(metric.unit));
+            format!("{}: {} differ by less than {margin}", metric.name, claim.groups.join(" and "))
         }
+        _ if claim.direction.is_none() => format!("{} {way} between {}", metric.name, claim.groups.join(" and ")),
         _ => format!("{} {way} from {}", metric.name, claim.groups.join(" to ")),
     };
     claim.traverse.as_ref().map_or_else(|| words.clone(), |run| format!("{words} ({run})"))
+}
+
+/// Unit of the difference of two values in a unit.
+fn of_difference(unit: &'static str) -> &'static str {
+    if unit == "%" { "points" } else { unit }
 }
 
 /// Verdict on a claim.
@@ -171,6 +179,7 @@ enum Outcome {
     CannotTell,
     NoMissions,
     NoPairs,
+    NoPairsOfTwo,
     TooFew,
 }
 
@@ -185,6 +194,7 @@ impl Outcome {
             Self::CannotTell => "cannot tell",
             Self::NoMissions => "cannot tell: a group has no missions with this metric",
             Self::NoPairs => "cannot tell: no paired missions have this metric in all groups",
+            Self::NoPairsOfTwo => "cannot tell: no paired missions have this metric in both groups",
             Self::TooFew => "cannot tell: too few terrains",
         }
     }
@@ -194,7 +204,7 @@ impl Outcome {
     }
 
     const fn is_open(self) -> bool {
-        matches!(self, Self::CannotTell | Self::NoMissions | Self::NoPairs | Self::TooFew)
+        matches!(self, Self::CannotTell | Self::NoMissions | Self::NoPairs | Self::NoPairsOfTwo | Self::TooFew)
     }
 }
 
@@ -205,6 +215,7 @@ impl Tested<'_> {
             Some(_) if found => Outcome::Equivalent,
             _ if found => self.direction(),
             _ if self.of.is_empty() => Outcome::NoMissions,
+            _ if self.p.is_nan() && self.claim.groups.len() == 2 => Outcome::NoPairsOfTwo,
             _ if self.p.is_nan() => Outcome::NoPairs,
             _ if self.least_adjusted > self.claim.alpha => Outcome::TooFew,
             // Bonferroni's adjustment over the family.
@@ -289,7 +300,7 @@ fn table(data: &Data, tested: &[Tested]) -> TableBlock {
         let ends = t.estimate.map_or([f64::NAN; 3], |i| [i.estimate, i.low, i.high]).map(number);
         let head = [text(&t.words), text(t.outcome().words())];
         let tail = [
-            text(t.what),
+            text([t.what, t.unit].into_iter().filter(|words| !words.is_empty()).collect::<Vec<_>>().join(", ")),
             number(t.p),
             number(t.adjusted),
             number(t.claim.alpha),

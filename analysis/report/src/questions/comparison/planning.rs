@@ -25,6 +25,15 @@ pub fn blocks(data: &Data, metrics: &[Metric], pairing: &Pairing) -> Vec<Block> 
     if table.numbers.rows.is_empty() {
         return Vec::new();
     }
+    let constant: Vec<&str> = metrics
+        .iter()
+        .filter(|metric| target(metric, pairing).is_some_and(|target| !varies(&target)))
+        .map(|metric| metric.name)
+        .collect();
+    let left_out = match constant[..] {
+        [] => String::new(),
+        _ => format!(" No power is given for what does not vary here: {}.", constant.join(", ")),
+    };
     let units = if pairing.is_common() { "blocks of paired terrains" } else { "terrains in each of two groups" };
     let [of_blocks, of_both] = match pairing.is_common() {
         true => [" (of a block's differences between groups)", " (of a pair's difference)"],
@@ -35,7 +44,7 @@ pub fn blocks(data: &Data, metrics: &[Metric], pairing: &Pairing) -> Vec<Block> 
          points in success, or of a tenth of another metric's mean, at {} % without adjustment, if terrains and missions scatter \
          as they do here. Power is simulated with the test above on normally distributed terrain means and is accurate to about \
          3 points. Scatter is a standard deviation: between terrains{of_blocks}, and between missions on one terrain{of_both}. \
-         More missions on the same terrains help only in so far as the scatter is between missions.",
+         More missions on the same terrains help only in so far as the scatter is between missions.{left_out}",
         set::fixed(POINTS, 0),
         set::fixed(100.0 * ALPHA, 0)
     );
@@ -50,7 +59,7 @@ fn table(data: &Data, metrics: &[Metric], pairing: &Pairing) -> TableBlock {
         fixed.into_iter().chain([(units, "")]).chain(heads.iter().map(|h| (h.as_str(), "%"))).collect();
     let mut numbers = Numbers::computed(sql::compared(data), &columns).with_mixed_units();
     for metric in metrics {
-        let Some(target) = target(metric, pairing) else { continue };
+        let Some(target) = target(metric, pairing).filter(varies) else { continue };
         let mut stream = stream(data, "power", metric.column);
         for terrains in TERRAINS {
             let power = MISSIONS.map(|missions| {
@@ -84,6 +93,11 @@ fn target(metric: &Metric, pairing: &Pairing) -> Option<Target> {
     let scatter = if pairing.is_common() { paired_scatter(metric) } else { scatter(metric) };
     let (between, within) = scatter?;
     (difference > 0.0).then_some(Target { difference, between, within })
+}
+
+/// True if there is scatter beyond rounding. Without any, the power of every study would be 100 %.
+fn varies(target: &Target) -> bool {
+    (target.between.max(0.0) + target.within.max(0.0)).sqrt() > 1e-9 * target.difference
 }
 
 /// Variance between the terrains of a group, and between the missions of a terrain.

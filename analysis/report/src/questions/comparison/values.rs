@@ -96,7 +96,7 @@ fn pairs<'a>(groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> Vec<Rc<
 pub const fn words(statistic: Statistic) -> (&'static str, &'static str) {
     match statistic {
         Statistic::Success => ("success on a terrain", "%"),
-        Statistic::Efficiency => ("straight distance over path length", ""),
+        Statistic::Efficiency => ("efficiency", ""),
         Statistic::TimeS => ("time to the goal", "s"),
         Statistic::RmsVerticalAccelerationMS2 => ("RMS vertical acceleration", "m/s²"),
         Statistic::RmsPitchRateDegS => ("RMS pitch rate", "°/s"),

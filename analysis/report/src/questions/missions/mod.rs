@@ -106,11 +106,11 @@ fn parameters(data: &Data) -> Option<TableBlock> {
     let plain: BTreeSet<&str> =
         data.missions.iter().filter(|m| m.variant.is_none()).map(|m| m.traverse_id.as_str()).collect();
     let columns = [("run", ""), ("parameter", ""), ("value", ""), ("source", "")];
-    let query = "select traverse_id, parameter, value, coalesce(source, 'setting of the study') from 'tables/parameters/*.parquet' where \
+    let query = "select traverse_id, parameter, value, coalesce(source, 'the study, or a default') from 'tables/parameters/*.parquet' where \
                  traverse_id in (select traverse_id from 'tables/missions/*.parquet' where variant is null)";
     let mut numbers = Numbers::new(query, &columns);
     for row in data.parameters.iter().filter(|row| plain.contains(row.traverse_id.as_str())) {
-        let source = row.source.as_deref().unwrap_or("setting of the study");
+        let source = row.source.as_deref().unwrap_or("the study, or a default");
         numbers.row([text(&row.traverse_id), text(&row.parameter), text(&row.value), text(source)]);
     }
     let caption = "All parameters of vehicle, surface, steering and rules, with their sources".into();

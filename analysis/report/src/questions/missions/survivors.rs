@@ -17,6 +17,7 @@ pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
     }
     let pairs = common(groups);
     let table = table(data, groups, &pairs);
+    let all = if groups.len() == 2 { "both groups" } else { "all groups" };
     let common = match pairs.len() {
         0 => "No mission".to_owned(),
         n => set::counted(n, "mission"),
@@ -24,7 +25,7 @@ pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
     vec![
         Block::Heading("The same missions in every group".into()),
         Block::Text(format!(
-            "{common} with the same start and goal in every group succeeded in all groups. Medians over all successful missions \
+            "{common} with the same start and goal in {all} succeeded in {all}. Medians over all successful missions \
              compare different missions, because in a harder group only the easier ones are left. The table gives the medians of \
              the common missions, and the median of their changes from one group to the next ({} % interval, resampling blocks of \
              paired terrains).",

@@ -32,7 +32,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         return Ok(blocks);
     }
     blocks.splice(0..0, [Block::Text(in_words(&quantities, &other.name))]);
-    blocks.push(Block::Table(table(&quantities)));
+    blocks.push(Block::Table(table(&quantities, in_each(data, &other.data))));
     Ok(blocks)
 }
 
@@ -45,9 +45,13 @@ fn metrics(data: &Data) -> Metrics {
     metrics
 }
 
-/// Query for the rows from which the comparison is computed, in each of the releases.
-const IN_EACH: &str =
-    "select * from 'tables/terrains/*.parquet' left join 'tables/missions/*.parquet' using (terrain_id)";
+/// Query for the rows from which the comparison is computed, in each of the releases; one without missions has no table of them.
+fn in_each(data: &Data, other: &Data) -> &'static str {
+    if data.missions.is_empty() || other.missions.is_empty() {
+        return "select * from 'tables/terrains/*.parquet'";
+    }
+    "select * from 'tables/terrains/*.parquet' left join 'tables/missions/*.parquet' using (terrain_id)"
+}
 
 /// All verdicts, from same to different.
 const VERDICTS: [&str; 5] =
@@ -98,13 +102,30 @@ fn introduction(other: &Against) -> String {
     )
 }
 
-/// Name and unit of a quantity: as on the page for missions, the column for terrains.
-fn name(q: &Quantity) -> (&'static str, &'static str) {
+/// A quantity of terrains as on the rest of the page: its column, name, unit, and the factor into that unit.
+type OfTerrain = (&'static str, &'static str, &'static str, f64);
+const OF_TERRAINS: [OfTerrain; 7] = [
+    ("relief_m", "relief", "m", 1.0),
+    ("rms_height_m", "RMS height", "m", 1.0),
+    ("rms_slope", "RMS slope", "", 1.0),
+    ("share_low", "share of class low", "%", 100.0),
+    ("share_semi", "share of class semi", "%", 100.0),
+    ("share_high", "share of class high", "%", 100.0),
+    ("psd_slope", "PSD slope", "", 1.0),
+];
+
+/// Name of a quantity, its unit and the factor into that unit, as on the rest of the page.
+fn name(q: &Quantity) -> (&'static str, &'static str, f64) {
     let of_missions = Statistic::ALL.into_iter().find(|s| q.table == "missions" && s.column() == q.name);
-    of_missions.map_or((q.name, if q.unit == "1" { "" } else { q.unit }), words)
+    let of_terrains = OF_TERRAINS.into_iter().find(|of| q.table == "terrains" && of.0 == q.name);
+    match (of_missions.map(words), of_terrains) {
+        (Some((name, unit)), _) => (name, unit, 1.0),
+        (None, Some((_, name, unit, factor))) => (name, unit, factor),
+        (None, None) => (q.name, if q.unit == "1" { "" } else { q.unit }, 1.0),
+    }
 }
 
-fn table(quantities: &[Quantity]) -> TableBlock {
+fn table(quantities: &[Quantity], query: &str) -> TableBlock {
     let columns = [
         ("quantity", ""),
         ("group", ""),
@@ -121,13 +142,15 @@ fn table(quantities: &[Quantity]) -> TableBlock {
         ("p, equivalence", ""),
         ("compared", ""),
     ];
-    let mut numbers = Numbers::computed(IN_EACH, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
     let or_nan = |v: Option<f64>| v.unwrap_or(f64::NAN);
     for q in quantities {
-        let (name, unit) = name(q);
+        let (name, unit, factor) = name(q);
         let head = [text(name), text(&q.group), text(verdict(q)), text(unit)];
-        let values = [q.a, q.b].into_iter().chain(q.shift.unwrap_or([f64::NAN; 3]));
-        let tail = [q.p, q.p_adjusted, q.margin, q.p_equivalence].map(or_nan);
+        let shift = q.shift.unwrap_or([f64::NAN; 3]);
+        let values = [q.a, q.b].into_iter().chain(shift).map(move |value| factor * value);
+        let margin = q.margin.map(|margin| factor * margin);
+        let tail = [q.p, q.p_adjusted, margin, q.p_equivalence].map(or_nan);
         let of = match (q.paired, q.left_out) {
             (true, [0, 0]) => format!("{}, paired", set::counted(q.terrains[0], "terrain")),
             (true, [a, b]) => {
@@ -138,4 +161,38 @@ fn table(quantities: &[Quantity]) -> TableBlock {
         numbers.row(head.into_iter().chain(values.chain(tail).map(number)).chain([text(of)]));
     }
     TableBlock { id: "releases".into(), caption: "This release compared with the other".into(), numbers }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_schemas::Cell;
+
+    /// Releases with missions and without: the query names only tables that both have. Quantities of terrains have words, and shares are in per cent, as
+    /// the text says; no column is named as in the table.
+    #[test]
+    fn val_quantities_have_words_and_queries_can_run() {
+        let against = |with_missions: bool| {
+            let mut other = crate::tests::made_up::full(3, 24);
+            other.terrains.iter_mut().for_each(|t| t.share_low *= 0.5);
+            if !with_missions {
+                other.missions.clear();
+            }
+            let mut data = crate::tests::made_up::full(3, 24);
+            data.against = Some(Against { name: "other".into(), data: Box::new(other) });
+            let blocks = answer(&data).unwrap();
+            let table =
+                blocks.into_iter().find_map(|b| if let Block::Table(table) = b { Some(table.numbers) } else { None });
+            table.unwrap()
+        };
+        let [with, without] = [true, false].map(against);
+        assert!(with.query.contains("tables/missions") && !without.query.contains("tables/missions"));
+        let named = |numbers: &Numbers, name: &str| numbers.rows.iter().filter(|row| row[0] == text(name)).count();
+        assert_eq!([named(&with, "efficiency"), named(&without, "efficiency")].map(|n| n > 0), [true, false]);
+        assert!(with.rows.iter().all(|row| !matches!(&row[0], Cell::Text(name) if name.contains('_'))));
+        let low = with.rows.iter().find(|row| row[0] == text("share of class low")).unwrap();
+        assert_eq!((&low[3], &low[11]), (&text("%"), &number(5.0)), "{low:?}");
+        let (Cell::F64(other), Cell::F64(this)) = (&low[4], &low[5]) else { panic!("{low:?}") };
+        assert!(*this > 1.0 && (2.0 * other - this).abs() < 1e-9, "{other} {this}");
+    }
 }
