@@ -78,7 +78,18 @@ impl Axis {
 
     /// At most about `most` ticks at round values within the axis.
     pub fn ticks(&self, most: usize) -> Vec<Tick> {
-        if self.log { log_ticks(self.low, self.high, most) } else { linear_ticks(self.low, self.high, most) }
+        let linear = || linear_ticks(self.low, self.high, most);
+        // Within less than a decade, a logarithmic axis may have one round power or none.
+        if self.log {
+            Some(log_ticks(self.low, self.high, most)).filter(|t| t.len() > 1).unwrap_or_else(linear)
+        } else {
+            linear()
+        }
+    }
+
+    /// True for a logarithmic axis.
+    pub fn is_log(&self) -> bool {
+        self.log
     }
 }
 
@@ -173,6 +184,8 @@ mod tests {
     fn val_log_ticks() {
         assert_eq!(labels(Axis::log(0.02, 30.0), 6), ["0.1", "1", "10"]);
         assert_eq!(labels(Axis::log(0.9, 8.0), 6), ["1", "2", "5"]);
+        // 1 alone would not show the scale.
+        assert_eq!(labels(Axis::log(0.99, 1.44), 5), ["1.0", "1.1", "1.2", "1.3", "1.4"]);
         assert_eq!(labels(Axis::log(1e-12, 1e2), 5), ["10⁻¹²", "10⁻⁹", "10⁻⁶", "0.001", "1"]);
     }
 

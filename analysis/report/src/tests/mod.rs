@@ -534,6 +534,31 @@ fn val_power_needs_scatter() {
     assert_eq!(metrics(&data), (false, true, true));
 }
 
+/// Tables without content are left out, with a sentence: the same missions in every group where none succeeded in all, and components of the variance on
+/// single terrains. A single terrain has no intervals and bands, so the page does not speak of any.
+#[test]
+fn val_tables_without_content_are_left_out() {
+    let mut data = made_up::full(1, 24);
+    data.missions.retain(|m| m.variant.is_none());
+    data.missions.iter_mut().for_each(|m| m.outcome = "success".into());
+    let files = report(&data).0;
+    let page = &files["index.html"];
+    let missions = page.split("<section id=\"missions\">").nth(1).unwrap().split("</section>").next().unwrap();
+    assert!(files.contains_key("data/survivors.json") && !files.contains_key("data/variance-components.json"));
+    assert!(page.contains("The variance of the outcomes is not split into terrains, missions and starts"));
+    assert!(missions.contains("a single terrain gives no intervals and no bands"));
+    assert!(!missions.contains("sampling band") && !missions.contains("bootstrap samples of whole"));
+    let stuck =
+        |m: &mut Mission| m.outcome = if m.terrain_id.starts_with("d2.45") { "stuck" } else { "success" }.into();
+    data.missions.iter_mut().for_each(stuck);
+    let files = report(&data).0;
+    assert_sound(&files);
+    assert!(!files.contains_key("data/survivors.json"));
+    assert!(
+        files["index.html"].contains("No mission with the same start and goal in every group succeeded in all of them")
+    );
+}
+
 fn claim(json: serde_json::Value) -> HypothesisItem {
     let mut all = serde_json::json!({ "id": "claim", "groups": ["2.30", "2.45", "2.60"], "test": "trend" });
     json.as_object().unwrap().iter().for_each(|(key, value)| all[key] = value.clone());

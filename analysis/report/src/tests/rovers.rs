@@ -140,7 +140,16 @@ fn val_published_trials_are_compared_with_their_group() {
     assert_eq!(found[0][3].as_f64(), Some(0.0893));
     assert!(
         files["index.html"]
-            .contains("2.60: the paper has 100 rovers on its world, but 4 of our worlds have another number")
+            .contains("2.60: the paper has 100 rovers on its world, but all 4 of our worlds have other numbers")
+    );
+    // A single set and a single world are spoken of as such.
+    let mut data = driven(3);
+    data.rovers.retain(|r| r.terrain_id.starts_with("d2.30") && r.variant.is_none());
+    let page = &report(&data).0["index.html"];
+    assert!(page.contains("The rovers drove on 3 worlds, fewer than 20.") && !page.contains("Every set"));
+    assert!(
+        report(&repeated(1)).0["index.html"]
+            .contains("the paper has 100 rovers on its world, but our world has another number")
     );
     // A single world has no band and no verdict.
     let files = report(&repeated(1)).0;
@@ -166,6 +175,20 @@ fn val_effects() {
             && files["index.html"].contains("3 of 4 parameters (1 without any effect), 8 trajectories on 3 worlds")
     );
     assert!(["raises", "lowers", "sign unclear"].iter().all(|w| svg.contains(w)));
+}
+
+/// One contact on one of two worlds: an interval on the logarithm would span more than a factor of 100, so none is given, and the page says why.
+#[test]
+fn val_intervals_that_say_nothing_are_left_out() {
+    let mut data = driven(2);
+    data.rovers.iter_mut().for_each(|r| r.contacts = 5);
+    let effort = |data: &Data| rows(&report(data).0, "rover-effort").swap_remove(0);
+    assert!([8, 9, 10].iter().all(|k| near(&effort(&data)[*k], 5.0)), "{:?}", effort(&data));
+    let first = data.rovers[0].terrain_id.clone();
+    data.rovers.iter_mut().for_each(|r| r.contacts = if r.terrain_id == first { 100 } else { 1 });
+    let row = effort(&data);
+    assert!(row[8].as_f64() > Some(1.0) && row[9].is_null() && row[10].is_null(), "{row:?}");
+    assert!(report(&data).0["index.html"].contains("Too few worlds for an interval of the contacts"));
 }
 
 /// Pages are sound whatever is missing or extreme.

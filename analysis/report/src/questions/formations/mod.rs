@@ -138,7 +138,7 @@ fn table(data: &Data) -> TableBlock {
         ("worst depth error", "m"),
         ("worst width error", "m"),
         ("in range", "%"),
-        ("tolerable", "%"),
+        ("in tolerance", "%"),
         ("least separation", "m"),
         ("waits", "1"),
         ("dodges", "1"),

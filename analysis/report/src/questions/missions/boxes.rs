@@ -70,6 +70,11 @@ pub fn compared<'a>(data: &Data, groups: &[Group<'a, Mission>]) -> Vec<Compared<
     std::iter::once(success).chain(METRICS.iter().map(metric)).collect()
 }
 
+/// True if any median has a sampling band.
+pub fn have_bands(compared: &[Compared]) -> bool {
+    compared.iter().flat_map(|figure| &figure.samples).any(|s| s.band.is_some())
+}
+
 /// Medians, quartiles and sampling bands of every metric and group.
 pub fn medians(data: &Data, compared: &[Compared]) -> TableBlock {
     let columns = [

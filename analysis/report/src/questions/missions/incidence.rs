@@ -11,8 +11,10 @@ use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke};
 use sastrugi_statistics::{Ending, Incidence, Interval, bootstrap};
 
-/// Causes of failure in the order of their numbers: name, and the outcome whose colour and dashes it has.
-const CAUSES: [(&str, usize); 3] = [("stuck", 1), ("tipped", 2), ("other failure", 5)];
+/// Causes of failure in the order of their numbers: name, and the outcome whose colour it has.
+type Causes = [(&'static str, usize); 3];
+const STUCK: (&str, usize) = ("stuck", 1);
+const TIPPED: (&str, usize) = ("tipped", 2);
 /// Steps of the distance at which bands are computed.
 const STEPS: usize = 70;
 /// Largest number of steps of a curve that are drawn one by one.
@@ -24,6 +26,7 @@ const HEIGHT: f64 = 260.0;
 /// Curves of a group.
 struct Curves<'a> {
     group: &'a Group<'a, Mission>,
+    causes: Causes,
     incidence: Incidence,
     /// Interval of every cause at each of the [`STEPS`] + 1 distances; `None` where there are fewer than two clusters.
     bands: Vec<Vec<Option<Interval>>>,
@@ -34,7 +37,8 @@ pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
     let lengths = groups.iter().flat_map(|g| g.rows.iter().map(|m| length(m))).filter(|l| l.is_finite());
     let length = lengths.fold(0.0, f64::max);
     let drawn = &groups[..groups.len().min(GROUPS_MAX)];
-    let all: Vec<Curves> = drawn.iter().map(|g| curves(data, g, length)).collect();
+    let causes = causes(groups);
+    let all: Vec<Curves> = drawn.iter().map(|g| curves(data, g, causes, length)).collect();
     let top = all.iter().flat_map(tops).fold(0.0, f64::max);
     if length <= 0.0 {
         return Vec::new();
@@ -51,12 +55,17 @@ pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
     }
     let is_large = drawn.iter().any(|g| replicates(g.rows.len()) < REPLICATES);
     let fewer = if is_large { " (fewer in groups of more than 10 000 missions)" } else { "" };
+    let of_bands = match all.iter().any(|c| c.bands.iter().flatten().any(Option::is_some)) {
+        true => format!(
+            " Bands are pointwise {} % intervals from {REPLICATES} bootstrap samples of whole terrains{fewer}.",
+            set::fixed(100.0 * LEVEL, 0)
+        ),
+        false => " One terrain gives no intervals, so there are no bands.".to_owned(),
+    };
     let words = format!(
         "The curves give the share of missions that have failed up to a distance along their line, by cause: competing risks, \
          by Aalen and Johansen's estimator (1978). Missions that reach the goal are censored there. Only missions that meet no \
-         severe obstacle reach the goal, so metrics of successful missions describe the ground that lets vehicles pass. Bands are \
-         pointwise {} % intervals from {REPLICATES} bootstrap samples of whole terrains{fewer}.",
-        set::fixed(100.0 * LEVEL, 0)
+         severe obstacle reach the goal, so metrics of successful missions describe the ground that lets vehicles pass.{of_bands}",
     );
     let figures = all.iter().filter(|c| top > 0.0 && fails(&c.group)).map(|c| figure(data, c, length, top)).collect();
     let mut blocks = vec![heading, Block::Text(words), Block::Figures(figures)];
@@ -66,6 +75,18 @@ pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
     blocks
 }
 
+/// Stuck, tipped, and whatever else occurred: by its own name if it is one outcome, in the colour of the first of them.
+fn causes(groups: &[Group<Mission>]) -> Causes {
+    let counts = outcome::counts(groups.iter().flat_map(|g| g.rows.iter().copied()));
+    let others: Vec<usize> = (0..outcome::ALL.len()).filter(|&kind| kind > TIPPED.1 && counts[kind] > 0).collect();
+    let unknown = outcome::ALL.len() - 1;
+    let other = match others[..] {
+        [one] if one != unknown => (outcome::ALL[one].name, one),
+        _ => ("other failure", others.first().copied().unwrap_or(unknown)),
+    };
+    [STUCK, TIPPED, other]
+}
+
 /// Length of a mission's line, m.
 fn length(mission: &Mission) -> f64 {
     libm::hypot(mission.goal_x_m - mission.start_x_m, mission.goal_y_m - mission.start_y_m)
@@ -73,18 +94,18 @@ fn length(mission: &Mission) -> f64 {
 
 fn ending(mission: &Mission) -> Ending {
     let kind = outcome::index(mission);
-    let own = CAUSES.iter().position(|c| c.1 == kind).unwrap_or(CAUSES.len() - 1);
+    let own = [STUCK, TIPPED].iter().position(|c| c.1 == kind).unwrap_or(2);
     match kind {
         0 => Ending { at: length(mission), cause: None },
         _ => Ending { at: mission.progress_m, cause: Some(own) },
     }
 }
 
-fn curves<'a>(data: &Data, group: &'a Group<'a, Mission>, length: f64) -> Curves<'a> {
+fn curves<'a>(data: &Data, group: &'a Group<'a, Mission>, causes: Causes, length: f64) -> Curves<'a> {
     let items = group.rows.iter().map(|m| (m.terrain_id.as_str(), ending(m))).filter(|i| i.1.at.is_finite());
     let mut items: Vec<(&str, Ending)> = items.collect();
     items.sort_by(|a, b| a.1.at.total_cmp(&b.1.at));
-    let incidence = Incidence::of_counted(items.iter().map(|i| (i.1, 1)), CAUSES.len());
+    let incidence = Incidence::of_counted(items.iter().map(|i| (i.1, 1)), causes.len());
     let (clusters, items) = numbered(&items);
     let mut stream = stream(data, &group.name, "progress_m");
     let at: Vec<f64> = distances(length).collect();
@@ -92,14 +113,14 @@ fn curves<'a>(data: &Data, group: &'a Group<'a, Mission>, length: f64) -> Curves
         bootstrap::redraw(&[clusters], if clusters > 1 { replicates(items.len()) } else { 0 }, &mut stream, |drawn| {
             let times = times(&drawn[0], clusters);
             // Only the shares that are drawn: a curve has as many steps as there are failures.
-            Incidence::shares_at(items.iter().map(|(c, ending)| (*ending, times[*c])), CAUSES.len(), &at)
+            Incidence::shares_at(items.iter().map(|(c, ending)| (*ending, times[*c])), causes.len(), &at)
         });
     let band = |cause: usize, step: usize| {
         let values: Vec<f64> = redrawn.iter().map(|shares| shares[cause][step]).collect();
         Interval::percentile(incidence.share(cause, at[step]), &values, LEVEL)
     };
-    let bands = (0..CAUSES.len()).map(|k| (0..at.len()).map(|step| band(k, step)).collect()).collect();
-    Curves { group, incidence, bands }
+    let bands = (0..causes.len()).map(|k| (0..at.len()).map(|step| band(k, step)).collect()).collect();
+    Curves { group, causes, incidence, bands }
 }
 
 fn distances(length: f64) -> impl Iterator<Item = f64> {
@@ -116,13 +137,14 @@ fn tops(curves: &Curves) -> Vec<f64> {
 fn figure(data: &Data, curves: &Curves, length: f64, top: f64) -> Figure {
     let id = slug(&format!("incidence-{}", curves.group.name));
     let occurs = |k: &usize| curves.incidence.shares[*k].last().is_some_and(|s| *s > 0.0);
-    let causes: Vec<usize> = (0..CAUSES.len()).filter(occurs).collect();
-    let legend: Vec<Entry> = causes.iter().map(|&k| (Mark::Line(stroke(k)), CAUSES[k].0.to_owned())).collect();
+    let causes: Vec<usize> = (0..curves.causes.len()).filter(occurs).collect();
+    let stroke = |k: usize| stroke(k, curves.causes[k].1);
+    let legend: Vec<Entry> = causes.iter().map(|&k| (Mark::Line(stroke(k)), curves.causes[k].0.to_owned())).collect();
     let x = (Axis::linear(0.0, length), "distance along the line, m");
     let y = (Axis::linear(0.0, 105.0 * top), "failed so far, %");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, y, &legend);
     plot.clip(&format!("{id}-clip"));
-    causes.iter().for_each(|&k| draw_band(&mut plot, &curves.bands[k], length, CAUSES[k].1));
+    causes.iter().for_each(|&k| draw_band(&mut plot, &curves.bands[k], length, curves.causes[k].1));
     causes.iter().for_each(|&k| plot.line(steps(&curves.incidence, k, length), stroke(k)));
     plot.svg.close();
     let rows = curves.group.rows.len();
@@ -136,8 +158,7 @@ fn figure(data: &Data, curves: &Curves, length: f64, top: f64) -> Figure {
     }
 }
 
-fn stroke(cause: usize) -> Stroke {
-    let kind = CAUSES[cause].1;
+fn stroke(cause: usize, kind: usize) -> Stroke {
     // Long dashes where the track of a map has short ones: a step curve has little room for either.
     let dash = ["", "7 3", "2 3"][cause];
     Stroke::new(Paint::Outcome(kind), 2.0).dashed(dash)
@@ -180,7 +201,7 @@ fn draw_band(plot: &mut Plot, bands: &[Option<Interval>], length: f64, kind: usi
 fn describe(curves: &Curves, causes: &[usize], length: f64) -> String {
     let part = |&k: &usize| {
         let share = |at: f64| set::percent(curves.incidence.share(k, at), 1);
-        format!("{} {} halfway and {} at the end", CAUSES[k].0, share(0.5 * length), share(length))
+        format!("{} {} halfway and {} at the end", curves.causes[k].0, share(0.5 * length), share(length))
     };
     let parts: Vec<String> = causes.iter().map(part).collect();
     let parts = if parts.is_empty() { "none".into() } else { parts.join("; ") };
@@ -202,7 +223,7 @@ fn numbers(data: &Data, curves: &Curves, length: f64) -> Numbers {
         for (at, band) in distances(length).zip(bands) {
             numbers.row([
                 text(&curves.group.name),
-                text(CAUSES[k].0),
+                text(curves.causes[k].0),
                 number(at),
                 number(curves.incidence.share(k, at)),
                 number(band.map_or(f64::NAN, |b| b.low)),
@@ -217,6 +238,21 @@ fn numbers(data: &Data, curves: &Curves, length: f64) -> Numbers {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    /// A failure that is the only one of its kind has its name and colour; several share "other failure".
+    #[test]
+    fn val_other_failures_are_named() {
+        let mut data = crate::tests::made_up::full(1, 24);
+        data.missions.retain(|m| m.variant.is_none());
+        let named = |data: &Data| causes(&data.mission_groups())[2];
+        let fail = |data: &mut Data, k: usize, how: &str| data.missions[k].outcome = how.into();
+        data.missions.iter_mut().for_each(|m| m.outcome = "success".into());
+        assert_eq!(named(&data), ("other failure", 5));
+        fail(&mut data, 0, "out_of_bounds");
+        assert_eq!(named(&data), ("out of bounds", 3));
+        fail(&mut data, 1, "timeout");
+        assert_eq!(named(&data), ("other failure", 3));
+    }
 
     /// The share that a drawn curve has at a distance.
     fn drawn(points: &[(f64, f64)], at: f64) -> f64 {

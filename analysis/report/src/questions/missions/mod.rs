@@ -55,7 +55,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut figures = vec![outcomes::stacked(data, &groups)];
     figures.extend(compared.iter().filter_map(|c| boxes::figure(data, c)));
     let mut blocks = vec![
-        Block::Text(introduction(data, &groups, &pairing)),
+        Block::Text(introduction(data, &groups, &pairing, boxes::have_bands(&compared))),
         Block::Figures(figures),
         Block::Table(boxes::medians(data, &compared)),
     ];
@@ -80,7 +80,7 @@ fn section(blocks: &mut Vec<Block>, heading: &str, words: &str, figures: Vec<cra
     }
 }
 
-fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> String {
+fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing, has_bands: bool) -> String {
     let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
     let goals: usize = groups.iter().map(|g| g.rows.iter().filter(|m| outcome::successful(m)).count()).sum();
     let vehicles: BTreeSet<&str> = groups.iter().flat_map(|g| g.rows.iter().map(|m| m.vehicle.as_str())).collect();
@@ -88,16 +88,22 @@ fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> St
         0 => String::new(),
         n => format!(" The variants, with another {}, are compared further below.", set::counted(n, "mission")),
     };
+    let intervals = match has_bands {
+        true => format!(
+            "so intervals are percentiles of bootstrap samples of whole {} ({REPLICATES} samples, fewer beyond 10 000 values); with fewer \
+             than about ten of these in a group, intervals are too short. The sampling band of a metric holds 5 to 95 % of the bootstrap \
+             values.",
+            in_words(pairing)
+        ),
+        false => "and a single terrain gives no intervals and no bands.".to_owned(),
+    };
     format!(
-        "{} of {} reached the goal, driven by {}.{variants} Missions on one terrain are correlated, so intervals are percentiles of \
-         bootstrap samples of whole {} ({REPLICATES} samples, fewer beyond 10 000 values); with fewer than about ten of these in a \
-         group, intervals are too short. The sampling band of a metric holds 5 to 95 % of the bootstrap values. Boxes are quartiles \
+        "{} of {} reached the goal, driven by {}.{variants} Missions on one terrain are correlated, {intervals} Boxes are quartiles \
          (linear between order statistics), whiskers extend to the last value within 1.5 interquartile ranges, circles lie beyond. \
          Everything here is exploratory.",
         set::count(goals),
         set::counted(missions, "mission"),
         vehicles.into_iter().collect::<Vec<_>>().join(", "),
-        in_words(pairing),
     )
 }
 

@@ -16,14 +16,16 @@ pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
         return Vec::new();
     }
     let pairs = common(groups);
+    let heading = Block::Heading("The same missions in every group".into());
+    if pairs.is_empty() {
+        let words = "No mission with the same start and goal in every group succeeded in all of them, so no changes between groups are given.";
+        return vec![heading, Block::Text(words.into())];
+    }
     let table = table(data, groups, &pairs);
     let all = if groups.len() == 2 { "both groups" } else { "all groups" };
-    let common = match pairs.len() {
-        0 => "No mission".to_owned(),
-        n => set::counted(n, "mission"),
-    };
+    let common = set::counted(pairs.len(), "mission");
     vec![
-        Block::Heading("The same missions in every group".into()),
+        heading,
         Block::Text(format!(
             "{common} with the same start and goal in {all} succeeded in {all}. Medians over all successful missions \
              compare different missions, because in a harder group only the easier ones are left. The table gives the medians of \

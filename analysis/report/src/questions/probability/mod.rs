@@ -68,7 +68,11 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
             Block::Figures(vec![stacked(&known)]),
         ]);
     }
-    blocks.push(Block::Table(table(&groups)));
+    // Without a variance there is nothing to split; without components, the table would have none either.
+    match groups.iter().any(|g| g.components.is_some()) {
+        true => blocks.push(Block::Table(table(&groups))),
+        false => blocks.push(Block::Text(NO_COMPONENTS.into())),
+    }
     Ok(blocks)
 }
 
@@ -77,6 +81,9 @@ a mission, by the estimators of the nested analysis of variance for unbalanced d
 Components, 1992): sums of squares between terrains, between missions, and within missions are set equal to their expectations. \
 The component of the starts is the mean of p (1 − p) over missions with success probability p; no better description of terrain \
 and line could predict it. Estimates of small components can be negative; they are shown as zero and marked in the table.";
+
+const NO_COMPONENTS: &str = "The variance of the outcomes is not split into terrains, missions and starts: that takes several terrains with several \
+missions each.";
 
 fn introduction(groups: &[Split]) -> String {
     let missions: usize = groups.iter().map(|g| g.missions.len()).sum();
@@ -93,11 +100,16 @@ fn introduction(groups: &[Split]) -> String {
         ),
     };
     format!(
-        "Of {} with several starts, {mixed}. They were driven from {} starts in all, the drawn one and slightly perturbed ones. \
-         Intervals have {} % coverage, from {REPLICATES} bootstrap samples of whole terrains.",
+        "Of {} with several starts, {mixed}. They were driven from {} starts in all, the drawn one and slightly perturbed ones.{}",
         set::counted(missions, "mission"),
         set::count(starts),
-        set::fixed(100.0 * LEVEL, 0)
+        match groups.iter().filter_map(|g| g.shares).flatten().any(|share| share.1.is_some()) {
+            true => format!(
+                " Intervals have {} % coverage, from {REPLICATES} bootstrap samples of whole terrains.",
+                set::fixed(100.0 * LEVEL, 0)
+            ),
+            false => String::new(),
+        }
     )
 }
 

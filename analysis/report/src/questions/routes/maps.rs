@@ -38,10 +38,13 @@ pub fn legend_track(index: usize) -> Stroke {
 
 /// What is drawn, and how many maps there are.
 pub fn words(maps: usize) -> String {
+    let what = match maps {
+        1 => "One map".to_owned(),
+        n => format!("{}, one for each group (at most {GROUPS_MAX})", set::counted(n, "map")),
+    };
     format!(
-        "{}, one for each group (at most {GROUPS_MAX}): of the pairs that most methods connect, the one whose first route has the median \
-         smoothed cost (the lower middle of an even number, the first of equals). Lines are smoothed routes.",
-        set::counted(maps, "map")
+        "{what}: of the pairs that most methods connect, the one whose first route has the median smoothed cost (the lower middle of an even \
+         number, the first of equals). Lines are smoothed routes."
     )
 }
 
@@ -167,5 +170,16 @@ fn draw_ends(map: &mut Map, route: &RouteRow) {
             map.svg.disc(at, 6.0, LIGHT, 1.0);
             map.svg.symbol(symbol, at, 4.2, DARK);
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::words;
+
+    #[test]
+    fn val_maps_are_counted_where_there_are_several() {
+        assert!(words(1).starts_with("One map: of the pairs"));
+        assert!(words(3).starts_with("3 maps, one for each group (at most 12): of the pairs"));
     }
 }

@@ -34,7 +34,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     blocks.push(Block::Table(summary(data, &methods)));
     blocks.push(Block::Figures(lanes::figures(data, &methods, &ratios)));
     if !ratios.is_empty() {
-        blocks.push(Block::Text(ratio_words()));
+        blocks.push(Block::Text(ratio_words(ratios::have_intervals(&ratios))));
         blocks.push(Block::Table(ratios::table(&ratios)));
     }
     let maps = maps::figures(data, &methods)?;
@@ -116,13 +116,20 @@ fn missing(data: &Data) -> Option<String> {
     })
 }
 
-fn ratio_words() -> String {
+/// What the ratios are; some or none of them have intervals.
+fn ratio_words(with_intervals: bool) -> String {
+    let few = format!("fewer than {TERRAINS_MIN} terrains give too few different samples for an interval");
+    let intervals = match with_intervals {
+        true => format!(
+            "The {} % interval resamples whole terrains, because pairs on one terrain are correlated; {few}, and only the smallest and largest \
+             ratio are given.",
+            set::fixed(100.0 * LEVEL, 0)
+        ),
+        false => format!("There are no intervals: pairs on one terrain are correlated, and {few}."),
+    };
     format!(
         "A ratio compares two methods between the same start and goal, by the cost of the smoothed path in steps of a quarter cell. The reference \
-         is the grid search with the same limits and cost if there is one, otherwise the first such method. Means are geometric. The {} % \
-         interval resamples whole terrains, because pairs on one terrain are correlated; fewer than {TERRAINS_MIN} terrains give too few different \
-         samples for an interval, and only the smallest and largest ratio are given.",
-        set::fixed(100.0 * LEVEL, 0)
+         is the grid search with the same limits and cost if there is one, otherwise the first such method. Means are geometric. {intervals}"
     )
 }
 

@@ -87,7 +87,12 @@ fn pairs(routes: &[&RouteRow], method: &Method, reference: &Method) -> Vec<Pair>
     routes.iter().filter(|r| found(r) && method.holds(r)).filter_map(pair).filter(usable).collect()
 }
 
-/// Means, intervals and extremes of both ratios.
+/// True if any ratio has an interval.
+pub fn have_intervals(ratios: &[Ratio]) -> bool {
+    ratios.iter().any(|r| r.cost.is_some() || r.expansions.is_some())
+}
+
+/// Means, intervals and extremes of both ratios; without the columns of intervals if none has one.
 pub fn table(ratios: &[Ratio]) -> TableBlock {
     let columns = [
         ("group", ""),
@@ -104,12 +109,15 @@ pub fn table(ratios: &[Ratio]) -> TableBlock {
         ("low", "1"),
         ("high", "1"),
     ];
+    let is_shown = |name: &str| have_intervals(ratios) || !matches!(name, "low" | "high");
+    let shown: Vec<bool> = columns.iter().map(|c| is_shown(c.0)).collect();
+    let columns: Vec<(&str, &str)> = columns.into_iter().filter(|c| is_shown(c.0)).collect();
     let query = "select \"group\", terrain_id, pair_id, stage_id, variant, outcome, smoothed_cost_m, expansions from 'tables/routes/*.parquet'";
     let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
     for r in ratios {
         let end = |i: &Option<Interval>, of: fn(&Interval) -> f64| number(i.as_ref().map_or(f64::NAN, of));
         let costs = || r.pairs.iter().map(|p| p.cost);
-        numbers.row([
+        let cells = [
             text(&r.group),
             text(&r.names[0]),
             text(&r.names[1]),
@@ -123,7 +131,8 @@ pub fn table(ratios: &[Ratio]) -> TableBlock {
             number(geometric_mean(r.pairs.iter().map(|p| p.expansions))),
             end(&r.expansions, |i| i.low),
             end(&r.expansions, |i| i.high),
-        ]);
+        ];
+        numbers.row(cells.into_iter().zip(&shown).filter(|(_, shown)| **shown).map(|(cell, _)| cell));
     }
     TableBlock {
         id: "route-ratios".into(),

@@ -81,7 +81,8 @@ fn figure(curves: &[Curve]) -> Figure {
     let x = (axis, "distance driven, m");
     let mut plot = Plot::new((WIDTH, HEIGHT), x, (Axis::linear(0.0, 102.0), "arrived, %"), &legend);
     plot.clip(&format!("{id}-clip"));
-    curves.iter().for_each(|c| draw_band(&mut plot, c, longest));
+    let edges = curves.iter().filter(|c| has_band(c)).count() > 1;
+    curves.iter().enumerate().for_each(|(k, c)| draw_band(&mut plot, c, longest, edges.then(|| stroke(k, c.set))));
     curves.iter().enumerate().for_each(|(k, c)| {
         let line = corners(c, longest, |s| s.share);
         plot.line(std::iter::once((0.5 * straight, 0.0)).chain(line), stroke(k, c.set));
@@ -90,7 +91,12 @@ fn figure(curves: &[Curve]) -> Figure {
     Figure {
         id,
         title: format!("Arrival of {} rovers.", first.navigator()),
-        caption: format!("The straight distance is {} m.", set_number::plain(straight, 3)),
+        caption: format!(
+            "The straight distance is {} m.{}{}",
+            set_number::plain(straight, 3),
+            if axis.is_log() { " The scale of the distance is logarithmic." } else { "" },
+            if edges { " Bands end at thin lines in the style of their curve." } else { "" }
+        ),
         description: describe(curves),
         svg: plot.svg,
         numbers: numbers(curves),
@@ -119,14 +125,22 @@ fn corners(curve: &Curve, end: f64, of: impl Fn(&Step) -> f64) -> Vec<(f64, f64)
     points
 }
 
-fn draw_band(plot: &mut Plot, curve: &Curve, end: f64) {
-    if curve.arrived.steps.iter().any(|s| s.interval.is_none()) {
+fn has_band(curve: &Curve) -> bool {
+    curve.arrived.steps.iter().all(|s| s.interval.is_some())
+}
+
+/// The band of a curve. Several lie over each other: they are paler, so that no dark block hides the curves, and end at thin lines of their own.
+fn draw_band(plot: &mut Plot, curve: &Curve, end: f64, edge: Option<Stroke>) {
+    if !has_band(curve) {
         return;
     }
     let upper = corners(curve, end, |s| s.interval.map_or(f64::NAN, |i| i.high));
     let lower = corners(curve, end, |s| s.interval.map_or(f64::NAN, |i| i.low));
-    let outline = plot.place(upper.into_iter().chain(lower.into_iter().rev()));
-    plot.svg.area(&outline, Paint::Series(curve.set.index), 0.14);
+    let outline = plot.place(upper.iter().chain(lower.iter().rev()).copied());
+    plot.svg.area(&outline, Paint::Series(curve.set.index), if edge.is_some() { 0.05 } else { 0.14 });
+    for (stroke, line) in edge.into_iter().flat_map(|stroke| [(stroke, &upper), (stroke, &lower)]) {
+        plot.line(line.iter().copied(), Stroke { width: 0.8, ..stroke }.faint(0.7));
+    }
 }
 
 fn describe(curves: &[Curve]) -> String {

@@ -241,6 +241,31 @@ pub fn worlds(sets: &[Set]) -> TableBlock {
     TableBlock { id: "rover-worlds".into(), caption: "Rovers by world".into(), numbers }
 }
 
+/// Largest ratio of the ends of an interval of contacts that still says something.
+const ENDS_MAX: f64 = 100.0;
+
+/// Mean contacts of a rover with their interval: NaN without one, or where its ends are too far apart.
+fn contacts(set: &Set) -> [f64; 3] {
+    let mean = set.mean(|r| r.contacts as f64, LEVEL);
+    let [low, high] = mean.ends();
+    if high <= ENDS_MAX * low { [mean.value, low, high] } else { [mean.value, f64::NAN, f64::NAN] }
+}
+
+/// The sets with contacts, but on too few worlds for an interval of them; `None` if there are none.
+pub fn without_interval(sets: &[Set]) -> Option<String> {
+    let is_wide = |set: &&Set| {
+        let [mean, low, _] = contacts(set);
+        mean > 0.0 && low.is_nan() && set.worlds.len() > 1
+    };
+    let names: Vec<&str> = sets.iter().filter(is_wide).map(|set| set.name.as_str()).collect();
+    (!names.is_empty()).then(|| {
+        format!(
+            "Too few worlds for an interval of the contacts, whose ends would be more than a factor of {ENDS_MAX:.0} apart: {}.",
+            names.join("; ")
+        )
+    })
+}
+
 /// Mean effort of a rover.
 pub fn effort(sets: &[Set]) -> TableBlock {
     let columns = [
@@ -265,7 +290,7 @@ pub fn effort(sets: &[Set]) -> TableBlock {
     let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
     for set in sets {
         let mean = |of: fn(&RoverRow) -> f64| number(set.mean(of, LEVEL).value);
-        let contacts = set.mean(|r| r.contacts as f64, LEVEL);
+        let [contacts, low, high] = contacts(set).map(number);
         let tilt = sums::finite(&set.rovers().map(|r| r.max_tilt_deg).collect::<Vec<_>>());
         numbers.row([
             text(&set.name),
@@ -276,9 +301,9 @@ pub fn effort(sets: &[Set]) -> TableBlock {
             mean(|r| r.turned_deg),
             mean(|r| r.reversals as f64),
             mean(|r| r.hazards as f64),
-            number(contacts.value),
-            number(contacts.ends()[0]),
-            number(contacts.ends()[1]),
+            contacts,
+            low,
+            high,
             mean(|r| r.centre_contacts as f64),
             number(100.0 * share(set, |r| Some(r.centre_contacts == 0)).value),
             number(tilt.into_iter().fold(f64::NEG_INFINITY, f64::max)),

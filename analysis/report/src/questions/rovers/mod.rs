@@ -54,6 +54,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         Block::Figures(vec![outcomes::figure(&sets)]),
         Block::Table(efficiency::effort(&sets)),
     ]);
+    blocks.extend(efficiency::without_interval(&sets).map(Block::Text));
     let maps = tracks::figures(data, &sets)?;
     if !maps.is_empty() {
         blocks.extend([Block::Heading("Tracks".into()), Block::Text(tracks::WORDS.into()), Block::Figures(maps)]);
@@ -122,20 +123,37 @@ fn few_worlds(sets: &[Set]) -> Option<String> {
     let few: Vec<&Set> = sets.iter().filter(|s| s.worlds.len() < WORLDS_MIN).collect();
     let least = few.iter().map(|s| s.worlds.len()).min()?;
     let all = match few.len() {
+        1 if sets.len() == 1 => return Some(few_of_one(least)),
         n if n == sets.len() => "Every set has".to_owned(),
         1 => format!("1 of {} sets has", sets.len()),
         n => format!("{n} of {} sets have", sets.len()),
     };
-    let ends = if least < 2 {
+    Some(format!(
+        "{all} fewer than {WORLDS_MIN} worlds (the smallest number is {}). {UNITS} {}",
+        set_number::count(least),
+        intervals_over(least)
+    ))
+}
+
+/// What counts in the statistics of rovers.
+const UNITS: &str =
+    "Rovers on one world are not independent, so the sample size is the number of worlds, not of rovers.";
+
+/// The same of the only set.
+fn few_of_one(worlds: usize) -> String {
+    format!(
+        "The rovers drove on {}, fewer than {WORLDS_MIN}. {UNITS} {}",
+        set_number::counted(worlds, "world"),
+        intervals_over(worlds)
+    )
+}
+
+fn intervals_over(worlds: usize) -> &'static str {
+    if worlds < 2 {
         "A single world gives no interval."
     } else {
         "Intervals over so few worlds are wide, and only as good as their assumptions."
-    };
-    Some(format!(
-        "{all} fewer than {WORLDS_MIN} worlds (the smallest number is {}). Rovers on one world are not independent, so the sample size is the number of worlds, not of \
-         rovers. {ends}",
-        set_number::count(least)
-    ))
+    }
 }
 
 /// Rovers that ended off the known ground.

@@ -100,12 +100,16 @@ fn difference(set: &Set, trial: &PublishedTrial) -> Option<String> {
     let other = set.worlds.iter().filter(|w| w.rovers.len() != trial.rovers).count();
     (other > 0).then(|| {
         format!(
-            "{}: the paper has {} rovers on its world, but {} of our worlds {} another number. With fewer rovers, worlds scatter more and their \
+            "{}: the paper has {} rovers on its world, but {}. With fewer rovers, worlds scatter more and their \
              extremes are less extreme, so this comparison is not a test.",
             set.name,
             set_number::count(trial.rovers),
-            set_number::count(other),
-            if other == 1 { "has" } else { "have" }
+            match (other, set.worlds.len()) {
+                (1, 1) => "our world has another number".to_owned(),
+                (n, all) if n == all => format!("all {} of our worlds have other numbers", set_number::count(n)),
+                (1, _) => "1 of our worlds has another number".to_owned(),
+                (n, _) => format!("{} of our worlds have other numbers", set_number::count(n)),
+            }
         )
     })
 }

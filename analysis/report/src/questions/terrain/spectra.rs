@@ -74,8 +74,10 @@ pub fn distributions(data: &Data, groups: &[Group<TerrainRow>]) -> Vec<Figure> {
         let plot = curves::distributions(&id, curves, ranges);
         let [skewness, kurtosis] = [median(&group.rows, |t| t.skewness), median(&group.rows, |t| t.kurtosis)];
         let (drawn, of_all) = in_words(data, group, curves);
+        let is_one = group.rows.len() == 1;
+        let [of, median] = if is_one { ["Height distribution", ""] } else { ["Height distributions", "median "] };
         let description = format!(
-            "Height distributions of {drawn}; median skewness{of_all} {}, median kurtosis {} (3 for a normal distribution).",
+            "{of} of {drawn}; {median}skewness{of_all} {}, {median}kurtosis {} (3 for a normal distribution).",
             set::fixed(skewness, 2),
             set::fixed(kurtosis, 2)
         );
@@ -168,6 +170,14 @@ mod tests {
                 format!("does not cover the band in which its slope is fitted, {ends}, so the slope is not drawn.");
             assert_eq!((is_drawn, !caption.ends_with(&words)), (expected, expected), "{caption}");
         }
+    }
+
+    /// One terrain has no median.
+    #[test]
+    fn val_one_terrain_has_no_median() {
+        let data = crate::tests::made_up::full(1, 24);
+        let caption = distributions(&data, &data.terrain_groups()).swap_remove(0).caption;
+        assert!(caption.starts_with("Height distribution of 1 terrain; skewness 0.10, kurtosis "), "{caption}");
     }
 
     /// Of a group with many terrains, lines are of a sample and medians of all; both are named as what they are.

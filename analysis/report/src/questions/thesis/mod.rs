@@ -2,7 +2,7 @@
 
 use super::Question;
 use super::missions::boxes::capital;
-use super::routes::methods::{found, geometric_mean};
+use super::routes::methods::{found, geometric_mean, methods};
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, slug, text};
 use crate::data::{Data, Natural, natural};
@@ -56,6 +56,8 @@ struct Row {
     of: String,
     paper: f64,
     origin: String,
+    /// Number of the colour of a method in the section on routes; `None` for a formation.
+    colour: Option<usize>,
     /// Terrain and value.
     ours: Vec<(String, f64)>,
 }
@@ -132,6 +134,7 @@ fn by_group(data: &Data) -> BTreeMap<Natural, Vec<&RouteRow>> {
 }
 
 fn route_rows(data: &Data, thesis: &Thesis) -> Vec<Row> {
+    let methods = methods(&data.routes);
     let mut rows = Vec::new();
     for (group, routes) in by_group(data) {
         let Some(map) = thesis.map(&group.1) else { continue };
@@ -139,10 +142,11 @@ fn route_rows(data: &Data, thesis: &Thesis) -> Vec<Row> {
         for printed in &map.methods {
             let own: Vec<&RouteRow> =
                 routes.iter().copied().filter(|r| bayrak::method(r) == Some(printed.method.as_str())).collect();
+            let colour = own.first().and_then(|route| methods.iter().position(|m| m.holds(route)));
             let mut row = |quantity: Quantity, paper: f64, ours: Vec<(String, f64)>| {
                 let (group, of, origin) =
                     (group.1.clone(), method_name(&printed.method).to_owned(), map.origin.clone());
-                rows.push(Row { quantity, group, of, paper, origin, ours });
+                rows.push(Row { quantity, group, of, paper, origin, colour, ours });
             };
             let single = |of: fn(&RouteRow) -> f64| own.iter().map(|r| (r.terrain_id.clone(), of(r))).collect();
             row(GAIN, printed.smoothed_cost / printed.searched_cost, single(|r| r.smoothed_cost_m / r.path_cost_m));
@@ -199,7 +203,8 @@ fn formation_rows(data: &Data, thesis: &Thesis) -> Vec<Row> {
             let ours = runs.iter().map(|r| (r.terrain_id.clone(), 100.0 * of(r) / r.spacing_m));
             let ours = ours.filter(|v| v.1.is_finite() && v.1 > 0.0).collect();
             let origin = format!("Table 5.5, {}", printed.group);
-            rows.push(Row { quantity, group: group.1.clone(), of: formation.to_owned(), paper, origin, ours });
+            let (group, of) = (group.1.clone(), formation.to_owned());
+            rows.push(Row { quantity, group, of, paper, origin, colour: None, ours });
         }
     }
     rows
@@ -221,8 +226,11 @@ fn figure(rows: &[Row], quantity: Quantity) -> Option<Figure> {
     };
     let labels: Vec<RowLabel> = groups.iter().map(label).collect();
     let line = |i: usize| Stroke::new(Paint::Series(i), 3.0);
-    let mut entries: Vec<Entry> =
-        names.iter().enumerate().map(|(i, n)| (Mark::Line(line(i)), (*n).to_owned())).collect();
+    let colour = |name: &str| {
+        let own = rows.iter().find(|row| row.of == name).and_then(|row| row.colour);
+        own.unwrap_or_else(|| names.iter().position(|other| *other == name).unwrap_or(0))
+    };
+    let mut entries: Vec<Entry> = names.iter().map(|n| (Mark::Line(line(colour(n))), (*n).to_owned())).collect();
     entries.push((Mark::Symbol(Symbol::Diamond, Paint::Ink), "published".into()));
     let height = 15.0 * names.len() as f64 + 16.0;
     let unit = if quantity.unit == "1" { String::new() } else { format!(", {}", quantity.unit) };
@@ -231,8 +239,7 @@ fn figure(rows: &[Row], quantity: Quantity) -> Option<Figure> {
     for (g, group) in groups.iter().enumerate() {
         for (k, row) in group.iter().enumerate() {
             let y = drawn.centre(g) + 15.0 * (k as f64 - 0.5 * (group.len() as f64 - 1.0));
-            let colour = names.iter().position(|n| *n == row.of).unwrap_or(0);
-            draw(&mut drawn, y, row, line(colour));
+            draw(&mut drawn, y, row, line(colour(&row.of)));
         }
     }
     if quantity == SMOOTHED {
