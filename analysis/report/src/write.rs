@@ -212,6 +212,7 @@ fn key_numbers(data: &Data) -> Vec<(String, String)> {
         (data.routes.len(), "route"),
         (data.formations.len(), "team run"),
         (data.missions.len(), "mission"),
+        (data.rovers.len(), "rover"),
         (data.stored.recordings, "MCAP recording"),
         (data.stored.files, "data file"),
     ];
@@ -257,9 +258,13 @@ mod tests {
         let full = crate::tests::made_up::full(1, 24);
         data.missions = full.missions[..2].to_vec();
         data.fits = full.fits[..1].to_vec();
+        data.rovers = full.rovers[..3].to_vec();
         data.stored.add("mcap/a/b.mcap", 1_000_000);
         data.stored.add("fit/a.json", 234_000);
         let counts: Vec<String> = key_numbers(&data).into_iter().map(|(n, what)| format!("{n} {what}")).collect();
-        assert_eq!(counts, ["1 covariance fit", "2 missions", "1 MCAP recording", "2 data files", "1.23 MB of data"]);
+        assert_eq!(
+            counts,
+            ["1 covariance fit", "2 missions", "3 rovers", "1 MCAP recording", "2 data files", "1.23 MB of data"]
+        );
     }
 }

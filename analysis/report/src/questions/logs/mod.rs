@@ -245,7 +245,16 @@ impl Placed<'_> {
     }
 }
 
-fn in_words(placed: &[Placed]) -> String {
+/// Where the logs fall among the missions; `None` without logs, or without missions to compare them with.
+pub(super) fn result(data: &Data) -> Option<String> {
+    let groups = data.mission_groups();
+    let logs = named(data.logs.as_deref()?);
+    let placed = placed(&logs, &groups);
+    (!placed.is_empty()).then(|| verdicts(&placed))
+}
+
+/// How many comparisons have each verdict.
+fn verdicts(placed: &[Placed]) -> String {
     let words = [
         ("within the middle 95 %", "within the middle 95 % of the missions"),
         (BELOW, BELOW),
@@ -260,22 +269,25 @@ fn in_words(placed: &[Placed]) -> String {
     };
     let logs = placed.iter().map(|p| p.log).max().map_or(0, |last| last + 1);
     let parts: Vec<String> = words.iter().filter_map(part).collect();
-    let told = |p: &&Placed| p.tells && p.unfinished.is_none() && p.place.is_some_and(|place| place.least_p() <= ALPHA);
-    let judged = placed.iter().filter(told).count();
     format!(
-        "{} of {} with groups of missions, metric by metric: {}.{}",
+        "{} of {} with groups of missions, metric by metric: {}.",
         set::counted(placed.len(), "comparison"),
         set::counted(logs, "log"),
-        parts.join(", "),
-        match judged {
-            0 => String::new(),
-            n => format!(
-                " If the drives were like the missions, about {} of the {} that can be decided would be below or above them by chance.",
-                set::plain(ALPHA * n as f64, 2),
-                set::counted(n, "comparison")
-            ),
-        }
+        parts.join(", ")
     )
+}
+
+fn in_words(placed: &[Placed]) -> String {
+    let told = |p: &&Placed| p.tells && p.unfinished.is_none() && p.place.is_some_and(|place| place.least_p() <= ALPHA);
+    let by_chance = match placed.iter().filter(told).count() {
+        0 => String::new(),
+        n => format!(
+            " If the drives were like the missions, about {} of the {} that can be decided would be below or above them by chance.",
+            set::plain(ALPHA * n as f64, 2),
+            set::counted(n, "comparison")
+        ),
+    };
+    format!("{}{by_chance}", verdicts(placed))
 }
 
 fn introduction() -> String {

@@ -85,9 +85,15 @@ and line could predict it. Estimates of small components can be negative; they a
 const NO_COMPONENTS: &str = "The variance of the outcomes is not split into terrains, missions and starts: that takes several terrains with several \
 missions each.";
 
-fn introduction(groups: &[Split]) -> String {
+/// How many missions with several starts had more than one result; `None` without any.
+pub(super) fn in_words(data: &Data) -> Option<String> {
+    let groups = groups(data);
+    (!groups.is_empty()).then(|| format!("{}.", mixed(&groups)))
+}
+
+/// Missions with several starts, and how many of them had more than one result.
+fn mixed(groups: &[Split]) -> String {
     let missions: usize = groups.iter().map(|g| g.missions.len()).sum();
-    let starts: usize = groups.iter().flat_map(|g| g.missions.iter().map(|m| m.outcomes.len())).sum();
     let even = |m: &&Started| m.probability() > 0.0 && m.probability() < 1.0;
     let undecided = groups.iter().flat_map(|g| g.missions.iter().filter(even)).count();
     let mixed = match undecided {
@@ -99,17 +105,22 @@ fn introduction(groups: &[Split]) -> String {
             set::count(n)
         ),
     };
+    format!("Of {} with several starts, {mixed}", set::counted(missions, "mission"))
+}
+
+fn introduction(groups: &[Split]) -> String {
+    let starts: usize = groups.iter().flat_map(|g| g.missions.iter().map(|m| m.outcomes.len())).sum();
+    let intervals = match groups.iter().filter_map(|g| g.shares).flatten().any(|share| share.1.is_some()) {
+        true => format!(
+            " Intervals have {} % coverage, from {REPLICATES} bootstrap samples of whole terrains.",
+            set::fixed(100.0 * LEVEL, 0)
+        ),
+        false => String::new(),
+    };
     format!(
-        "Of {} with several starts, {mixed}. They were driven from {} starts in all, the drawn one and slightly perturbed ones.{}",
-        set::counted(missions, "mission"),
-        set::count(starts),
-        match groups.iter().filter_map(|g| g.shares).flatten().any(|share| share.1.is_some()) {
-            true => format!(
-                " Intervals have {} % coverage, from {REPLICATES} bootstrap samples of whole terrains.",
-                set::fixed(100.0 * LEVEL, 0)
-            ),
-            false => String::new(),
-        }
+        "{}. They were driven from {} starts in all, the drawn one and slightly perturbed ones.{intervals}",
+        mixed(groups),
+        set::count(starts)
     )
 }
 

@@ -50,6 +50,13 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
+/// How many of the published values lie in our band, with the authors; `None` without a paper or a band.
+pub(super) fn result(data: &Data) -> Option<String> {
+    let paper = papers::applicable(data)?;
+    let words = verdict(&rows(data, &paper, &Pairing::of(data)))?;
+    Some(format!("{} ({}).", words.trim_end_matches('.'), paper.authors))
+}
+
 /// How the numbers of terrains and missions differ from the paper's, in a sentence; `None` if they do not.
 fn difference(data: &Data, paper: &Paper) -> Option<String> {
     let groups = shared(data.terrain_groups(), paper);

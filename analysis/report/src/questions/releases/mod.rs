@@ -18,10 +18,7 @@ pub const QUESTION: Question =
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let Some(other) = &data.against else { return Ok(Vec::new()) };
-    // The same streams as in the verb `compare`, so that both give the same answer.
-    let streams = Streams::for_seed(0, releases::STREAMS);
-    let settings = Settings { margin: MARGIN, alpha: ALPHA };
-    let (quantities, alone) = releases::compare(&metrics(&other.data), &metrics(data), settings, &streams);
+    let (quantities, alone) = compare(data, other);
     let mut blocks = vec![Block::Text(introduction(other))];
     let only: Vec<String> = alone.concat();
     if !only.is_empty() {
@@ -34,6 +31,21 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     blocks.splice(0..0, [Block::Text(in_words(&quantities, &other.name))]);
     blocks.push(Block::Table(table(&quantities, in_each(data, &other.data))));
     Ok(blocks)
+}
+
+/// Every quantity that both releases have, and the groups that only one has.
+fn compare(data: &Data, other: &Against) -> (Vec<Quantity>, [Vec<String>; 2]) {
+    // The same streams as in the verb `compare`, so that both give the same answer.
+    let streams = Streams::for_seed(0, releases::STREAMS);
+    let settings = Settings { margin: MARGIN, alpha: ALPHA };
+    releases::compare(&metrics(&other.data), &metrics(data), settings, &streams)
+}
+
+/// How many quantities differ from those of the other release; `None` without one, or if they have no group in common.
+pub(super) fn result(data: &Data) -> Option<String> {
+    let other = data.against.as_ref()?;
+    let (quantities, _) = compare(data, other);
+    (!quantities.is_empty()).then(|| in_words(&quantities, &other.name))
 }
 
 fn metrics(data: &Data) -> Metrics {

@@ -12,6 +12,7 @@ mod tracks;
 mod worlds;
 
 use super::Question;
+use super::clusters::LEVEL;
 use crate::ReportError;
 use crate::content::{Block, Figure};
 use crate::data::Data;
@@ -76,10 +77,11 @@ Searle's interval, exact for normal values). The design effect is the factor by 
 const EFFORT: &str = "Contacts are rocks higher than the clearance that passed under the rover; centre contacts are those under its centre line. Means are over all rovers, including \
 those that were stopped.";
 
-/// How far the rovers got; `None` without rovers.
+/// How far the rovers got, and how that compares with published trials; `None` without rovers.
 pub(super) fn in_words(data: &Data) -> Option<String> {
     let sets = sets::plain(data);
-    (!sets.is_empty()).then(|| verdict(&sets))
+    let compared = published::in_words(data, &sets).map_or_else(String::new, |words| format!(" {words}"));
+    (!sets.is_empty()).then(|| format!("{}{compared}", verdict(&sets)))
 }
 
 /// The first map of tracks; empty if the release has none.
@@ -91,20 +93,23 @@ pub(super) fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
 fn verdict(sets: &[Set]) -> String {
     let sentence = |set: &Set| {
         let (arrived, efficiency, of_arrivals) = (ARRIVED.pooled(set), EFFICIENCY.pooled(set), OF_ARRIVALS.pooled(set));
-        let [low, high] = arrived.ends();
+        let [low, high] = arrived.ends().map(|end| set_number::fixed(100.0 * end, 0));
+        let level = set_number::fixed(100.0 * LEVEL, 0);
         let interval = match arrived.interval {
-            Some(_) => format!(" ({} to {} %)", set_number::fixed(100.0 * low, 0), set_number::fixed(100.0 * high, 0)),
+            Some(_) => format!(" ({level} % interval {low} to {high} %)"),
             None => String::new(),
         };
-        let arrivals = match of_arrivals.value.is_finite() {
-            true => format!(" and {} over those that arrive", set_number::significant(of_arrivals.value, 2)),
+        let [all, arrivals] = [efficiency, of_arrivals].map(|mean| set_number::significant(mean.value, 2));
+        let arrivals = match of_arrivals.value.is_finite() && arrivals != all {
+            true => format!(", {arrivals} for those that arrive"),
             false => String::new(),
         };
         format!(
-            "{}: {}{interval} of the rovers reach their goal. The mean efficiency is {} over all rovers{arrivals}.",
+            "{}: {}{interval} of {} on {} reach their goal; the mean efficiency is {all}{arrivals}.",
             set.name,
             set_number::percent(arrived.value, 0),
-            set_number::significant(efficiency.value, 2)
+            set_number::counted(set.count(), "rover"),
+            set_number::counted(set.worlds.len(), "world")
         )
     };
     let mut ranked: Vec<&Set> = sets.iter().collect();

@@ -50,6 +50,13 @@ pub fn trial(data: &Data, set: &Set) -> Option<PublishedTrial> {
     found.cloned()
 }
 
+/// How many of the published values lie in their band; `None` where no set repeats a trial of the paper, or without a band.
+pub fn in_words(data: &Data, sets: &[Set]) -> Option<String> {
+    let known: Vec<(&Set, PublishedTrial)> = sets.iter().filter_map(|s| Some((s, trial(data, s)?))).collect();
+    let rows: Vec<Row> = known.iter().flat_map(|(set, trial)| rows(set, trial)).collect();
+    verdict(&rows)
+}
+
 /// Text, warnings and a table; empty where no set repeats a trial of the paper.
 pub fn blocks(data: &Data, sets: &[Set]) -> Vec<Block> {
     let known: Vec<(&Set, PublishedTrial)> = sets.iter().filter_map(|s| Some((s, trial(data, s)?))).collect();

@@ -4,7 +4,8 @@ mod made;
 
 use super::missions::outcomes;
 use super::{
-    Question, comparison, failures, formations, images, outcome, photoclinometry, routes, rovers, terrain, texture,
+    Question, comparison, failures, formations, images, logs, outcome, photoclinometry, probability, published,
+    releases, routes, rovers, terrain, texture, thesis,
 };
 use crate::ReportError;
 use crate::content::{Block, Figure};
@@ -17,9 +18,11 @@ pub const QUESTION: Question = Question { id: "summary", name: "Summary", title:
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let made = [made::in_words(data), photoclinometry::in_words(data), routes::in_words(data)];
-    let driven = [missions(data), formations::in_words(data), rovers::in_words(data)];
+    let driven = [missions(data), probability::in_words(data), formations::in_words(data), rovers::in_words(data)];
+    let compared = [releases::result(data), logs::result(data), published::result(data), thesis::in_words(data)];
     let judged = [comparison::claims(data), texture::in_words(data), failures::in_words(data)];
-    let mut blocks: Vec<Block> = made.into_iter().chain(driven).chain(judged).flatten().map(Block::Text).collect();
+    let all = made.into_iter().chain(driven).chain(compared).chain(judged);
+    let mut blocks: Vec<Block> = all.flatten().map(Block::Text).collect();
     if !blocks.is_empty() {
         blocks.push(Block::Figures(picture(data)?));
     }

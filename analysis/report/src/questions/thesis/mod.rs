@@ -78,11 +78,23 @@ impl Row {
     }
 }
 
+/// How many of the published ratios lie between ours; `None` without any to compare.
+pub(super) fn in_words(data: &Data) -> Option<String> {
+    let words = verdict(&all_rows(data, &bayrak::applicable(data)?))?;
+    Some(format!("{} (Bayrak, 2008).", words.trim_end_matches('.')))
+}
+
+/// Routes, then formations, as far as we have values.
+fn all_rows(data: &Data, thesis: &Thesis) -> Vec<Row> {
+    let mut rows = route_rows(data, thesis);
+    rows.extend(formation_rows(data, thesis));
+    rows.retain(|r| !r.ours.is_empty());
+    rows
+}
+
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let Some(thesis) = bayrak::applicable(data) else { return Ok(Vec::new()) };
-    let mut rows = route_rows(data, &thesis);
-    rows.extend(formation_rows(data, &thesis));
-    rows.retain(|r| !r.ours.is_empty());
+    let rows = all_rows(data, &thesis);
     if rows.is_empty() {
         return Ok(Vec::new());
     }
