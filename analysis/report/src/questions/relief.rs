@@ -47,22 +47,36 @@ pub fn exaggeration_words(exaggeration: f64) -> String {
 
 /// Smallest share of the relief between the 1st and 99th percentile for which the colours end at these percentiles.
 const MIDDLE_SHARE: f64 = 0.25;
+/// How far below level ground the colours begin, as a share of the relief: the darkest would hide its shading.
+const BELOW_GROUND: f64 = 0.5;
 
 /// The ends of the colours of a surface: the 1st and 99th percentile of its heights, or its lowest and highest height where the percentiles
-/// span less than a quarter of the relief. On level ground, the few cells that stand out are all there is to see. `None` without data.
+/// span less than a quarter of the relief. On level ground, the few cells that stand out are all there is to see; where they stand on it, the
+/// colours begin below the ground. `None` without data.
 fn colour_range(grid: &Grid) -> Option<(f64, f64)> {
     let (lowest, highest) = grid.range()?;
-    let (low, high) = percentiles(grid)?;
-    Some(if high - low < MIDDLE_SHARE * (highest - lowest) { (lowest, highest) } else { (low, high) })
+    let [low, middle, high] = quantiles(grid, [0.01, 0.5, 0.99])?;
+    let relief = highest - lowest;
+    Some(match high - low < MIDDLE_SHARE * relief {
+        true if middle - lowest < MIDDLE_SHARE * relief => (lowest - BELOW_GROUND * relief, highest),
+        true => (lowest, highest),
+        false => (low, high),
+    })
 }
 
 /// 1st and 99th percentile of a grid thinned for display; `None` without data.
 pub fn percentiles(grid: &Grid) -> Option<(f64, f64)> {
+    let [low, high] = quantiles(grid, [0.01, 0.99])?;
+    Some((low, high))
+}
+
+/// Quantiles of a grid thinned for display; `None` without data.
+fn quantiles<const N: usize>(grid: &Grid, shares: [f64; N]) -> Option<[f64; N]> {
     let thin = thin::block_mean(grid, thin::step(grid.rows(), grid.cols(), 256));
     let mut values = sums::finite(&thin.values);
     values.sort_by(f64::total_cmp);
-    let (low, high) = (sums::quantile_sorted(&values, 0.01), sums::quantile_sorted(&values, 0.99));
-    (low.is_finite() && high.is_finite()).then_some((low, high))
+    let quantiles = shares.map(|share| sums::quantile_sorted(&values, share));
+    quantiles.iter().all(|v| v.is_finite()).then_some(quantiles)
 }
 
 /// A class map and the disk with which it was closed, in words.
@@ -211,4 +225,24 @@ fn numbers_of(path: &str, grid: &Grid, (low, high): (f64, f64), unit: &str) -> N
         number(high),
     ]);
     numbers
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use sastrugi_numeric::Geometry;
+
+    /// A rock of 1 m on level ground: the colours begin half its height below the ground, which would otherwise have the darkest. Above a hole, level
+    /// ground is light, and hills have their percentiles.
+    #[test]
+    fn val_level_ground_is_not_black() {
+        let geometry = Geometry::square(20, 20, 1.0);
+        let of = |height: &dyn Fn(usize) -> f64| {
+            colour_range(&Grid::new(geometry, (0..geometry.len()).map(height).collect())).unwrap()
+        };
+        assert_eq!(of(&|k| if k == 210 { 1.0 } else { 0.0 }), (-0.5, 1.0));
+        assert_eq!(of(&|k| if k == 210 { -1.0 } else { 0.0 }), (-1.0, 0.0));
+        let (low, high) = of(&|k| k as f64);
+        assert!(low > 0.0 && high < 399.0, "{low} {high}");
+    }
 }

@@ -398,6 +398,23 @@ fn val_surfaces_too_small_for_shares_are_named() {
     assert!(!page.contains("surface too small") && page.contains("leave out a border of 5 m"));
 }
 
+/// The numbers of class shares have a column of the paper only where one applies, and of bands only where there are any.
+#[test]
+fn val_columns_of_shares_are_those_that_apply() {
+    let columns = |data: &Data| {
+        let json: serde_json::Value = serde_json::from_str(&report(data).0["data/class-shares.json"]).unwrap();
+        let columns = json["columns"].as_array().unwrap().iter().map(|c| c["name"].as_str().unwrap().to_owned());
+        columns.skip(4).collect::<Vec<_>>()
+    };
+    let mut data = made_up::full(3, 24);
+    assert_eq!(columns(&data), ["band, 5 %", "band, 95 %", "paper"]);
+    data.missions.clear();
+    data.terrains.iter_mut().for_each(|t| t.group = Some(format!("{} m", t.group.as_deref().unwrap_or_default())));
+    assert_eq!(columns(&data), ["band, 5 %", "band, 95 %"]);
+    data.terrains.retain(|t| t.terrain_id.ends_with("-0000"));
+    assert_eq!(columns(&data), [""; 0]);
+}
+
 /// Captions of class maps state the radius of the closing.
 #[test]
 fn val_class_maps_name_the_radius() {
@@ -467,6 +484,17 @@ fn val_maps_and_sparse_holes_are_drawn() {
     let ground = &files["figures/map-class-d2.30-0000.svg"];
     assert!(ground.contains(">sand ") && ground.contains(">rock ") && !ground.contains("no data"));
     assert!(files["figures/relief-d2.30-0000.svg"].contains(">−3.00<"));
+}
+
+/// A release of DEMs alone shows those that no fit draws.
+#[test]
+fn val_measured_surfaces_are_drawn() {
+    let mut data = made_up::full(1, 24);
+    data.terrains.retain(|t| t.stage == "dem");
+    let drawn = |data: &Data| report(data).1.figures.iter().any(|figure| figure == "relief-jacksboro");
+    assert!(!drawn(&data));
+    data.fits.clear();
+    assert!(drawn(&data));
 }
 
 /// A texture whose covariance the study states has no fit.

@@ -51,7 +51,25 @@ fn val_every_planetary_terrain_is_rendered() {
         page.contains("2 terrains from above with uniform albedo")
             && page.contains("sun from 315 degrees (north-west), 25 degrees above the horizon")
     );
-    assert!(!page.contains("are not rendered here"));
+    assert!(!page.contains("are not rendered here") && !page.contains("would look blank"));
+    assert!(page.contains("Rendered view, group planetary."));
+}
+
+/// Terrains that would look blank are not drawn; the page counts them by group.
+#[test]
+fn val_blank_terrains_are_counted() {
+    let (mut data, mut shelf) = (planets(2, 2), Shelf::default());
+    for terrain in &mut data.terrains {
+        let grid = data.files.grid(&terrain.path).unwrap().unwrap();
+        let flat = terrain.kind == "elaborate";
+        shelf.grids.insert(terrain.path.clone(), if flat { grid.map(|_| 0.0) } else { grid });
+    }
+    data.files = Box::new(shelf);
+    let (files, summary) = report(&data);
+    assert_sound(&files);
+    assert!(summary.figures.iter().all(|f| !f.starts_with("rendered-elaborate")), "{:?}", summary.figures);
+    let words = "2 terrains would look blank, because their brightness varies by less than 10 % in pixels of this size: elaborate (2).";
+    assert!(files["index.html"].contains(words));
 }
 
 /// A page has at most 96 thumbnails and states how many terrains it leaves out.

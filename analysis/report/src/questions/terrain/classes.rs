@@ -182,27 +182,22 @@ fn shares_figure(data: &Data, rows: Rows, groups: &[&Group<TerrainRow>], bars: &
     }
 }
 
+/// Numbers of the bars; without the columns of bands and of a paper if no bar has any.
 fn share_numbers(groups: &[&Group<TerrainRow>], bars: &[Bar]) -> Numbers {
-    let columns = [
-        ("group", ""),
-        ("class", ""),
-        ("terrains", "1"),
-        ("median", "%"),
-        ("band, 5 %", "%"),
-        ("band, 95 %", "%"),
-        ("paper", "%"),
-    ];
+    let (bands, paper) = (bars.iter().any(|b| b.band.is_some()), bars.iter().any(|b| b.published.is_some()));
+    let of_bands = [("band, 5 %", "%"), ("band, 95 %", "%")];
+    let columns: Vec<(&str, &str)> = [("group", ""), ("class", ""), ("terrains", "1"), ("median", "%")]
+        .into_iter()
+        .chain(of_bands.into_iter().filter(|_| bands))
+        .chain([("paper", "%")].into_iter().filter(|_| paper))
+        .collect();
     let mut numbers = Numbers::computed(super::TERRAINS, &columns);
     for bar in bars {
-        numbers.row([
-            text(&groups[bar.row].name),
-            text(bar.class.name()),
-            count(bar.count),
-            number(bar.median),
-            number(bar.band.map_or(f64::NAN, |b| b.low)),
-            number(bar.band.map_or(f64::NAN, |b| b.high)),
-            number(bar.published.unwrap_or(f64::NAN)),
-        ]);
+        let head = [text(&groups[bar.row].name), text(bar.class.name()), count(bar.count), number(bar.median)];
+        let ends = bar.band.map_or([f64::NAN; 2], |b| [b.low, b.high]).map(number);
+        let published = number(bar.published.unwrap_or(f64::NAN));
+        let tail = ends.into_iter().filter(|_| bands).chain([published].into_iter().filter(|_| paper));
+        numbers.row(head.into_iter().chain(tail));
     }
     numbers
 }

@@ -32,7 +32,8 @@ const GROUPS_MAX: usize = 12;
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let groups = data.terrain_groups();
     if groups.is_empty() {
-        return Ok(vec![Block::FoldedTable(surfaces(data))]);
+        let figures = Block::Figures(reliefs::of_dems(data)?);
+        return Ok(vec![figures, Block::FoldedTable(surfaces(data))]);
     }
     let drawn = &groups[..groups.len().min(GROUPS_MAX)];
     let mut blocks = vec![Block::Text(introduction(&groups)), Block::Table(medians(&groups))];
@@ -159,7 +160,8 @@ fn introduction(groups: &[Group<TerrainRow>]) -> String {
     format!(
         "The release has {} in {}: {}{more}. The roughness class of a cell follows from its largest gradient to its eight neighbours; \
          shares leave out {border} and are computed before the class map is closed. Reliefs are lit from the north-west; their colours \
-         end at the 1st and 99th percentile of the heights, or at the lowest and highest height where these lie far beyond.",
+         end at the 1st and 99th percentile of the heights, or at the lowest and highest height where these lie far beyond; below level \
+         ground with a few cells that stand on it, they begin lower, so that the ground is not the darkest.",
         set::counted(n, "terrain"),
         set::counted(groups.len(), "group"),
         names.join(", ")

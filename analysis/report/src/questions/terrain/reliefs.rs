@@ -1,7 +1,7 @@
 //! Shaded relief of the smoothest, the median and the roughest terrain of each group, with the same light and colour range for
 //! rasters of the same size with similar heights.
 
-use super::{GROUPS_WITH_THREE, by_slope, median, shape, shapes};
+use super::{GROUPS_MAX, GROUPS_WITH_THREE, by_slope, median, shape, shapes};
 use crate::ReportError;
 use crate::content::{Figure, slug};
 use crate::data::{Data, Group};
@@ -23,6 +23,19 @@ pub fn figures(data: &Data, families: &[Vec<Group<TerrainRow>>]) -> Result<Vec<F
             let alike: Vec<&Choice> = choices.iter().filter(|c| shape(c.0) == shape_of).collect();
             figures.extend(in_one_style(data, &alike)?);
         }
+    }
+    Ok(figures)
+}
+
+/// The measured DEMs that no fit draws, each in its own light and colours.
+pub fn of_dems(data: &Data) -> Result<Vec<Figure>, ReportError> {
+    let fitted = |t: &&TerrainRow| data.fits.iter().any(|fit| fit.dem_id == t.terrain_id);
+    let mut figures = Vec::new();
+    for dem in data.of_stage("dem").filter(|t| !fitted(t)).take(GROUPS_MAX) {
+        let choice = (dem, dem.terrain_id.clone(), "measured");
+        let Some(style) = style(data, &[&choice])? else { continue };
+        let words = Words { title: format!("Measured DEM {}.", dem.terrain_id), ..words(&choice, style) };
+        figures.extend(relief(data, &dem.path, Some(style), words)?);
     }
     Ok(figures)
 }

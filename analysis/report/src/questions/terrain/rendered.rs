@@ -6,7 +6,7 @@
 use super::representative;
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, count, number, slug, text};
-use crate::data::{Data, Group, label};
+use crate::data::{Data, Group, Natural, label, natural};
 use crate::questions::relief::{MAP_WIDTH, extent};
 use crate::questions::sql::quoted;
 use crate::render::chart::WIDTH;
@@ -17,6 +17,7 @@ use crate::render::{number as set, thin};
 use sastrugi_imaging::{RenderParameters, Rendering, Scene, Sun, display, render};
 use sastrugi_numeric::{Grid, Streams, sums};
 use sastrugi_schemas::tables::TerrainRow;
+use std::collections::BTreeMap;
 
 /// Kinds of terrain with an albedo of their own.
 const KINDS: [&str; 2] = ["planetary", "elaborate"];
@@ -42,9 +43,13 @@ const LABEL_SIZE: f64 = 11.0;
 /// A large picture for each group, thumbnails of the other terrains, and the number left out.
 pub fn blocks(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Block>, ReportError> {
     let large: Vec<&TerrainRow> = groups.iter().filter_map(representative).filter(|t| is_planet(t)).collect();
-    let mut figures = Vec::new();
+    let (mut figures, mut blank) = (Vec::new(), Vec::new());
     for terrain in &large {
-        figures.extend(figure(data, terrain)?);
+        match view(data, terrain, PIXELS)? {
+            Seen::View(view) => figures.push(figure(terrain, &view)),
+            Seen::Blank => blank.push(*terrain),
+            Seen::Absent => {}
+        }
     }
     let others: Vec<&TerrainRow> = data
         .of_stage("terrain")
@@ -52,11 +57,12 @@ pub fn blocks(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Block>, R
         .collect();
     let (drawn, left_out) = others.split_at(others.len().min(THUMBNAILS_MAX));
     for group in drawn.chunk_by(|a, b| label(a) == label(b)) {
-        figures.extend(sheet(data, group)?);
+        figures.extend(sheet(data, group, &mut blank)?);
     }
     let mut blocks = Vec::new();
-    if !figures.is_empty() {
+    if !figures.is_empty() || !blank.is_empty() {
         blocks.extend([Block::Heading("Rendered views".into()), Block::Figures(figures)]);
+        blocks.extend(left_blank(&blank).map(Block::Text));
     }
     if !left_out.is_empty() {
         blocks.push(Block::Text(format!(
@@ -68,6 +74,22 @@ pub fn blocks(data: &Data, groups: &[Group<TerrainRow>]) -> Result<Vec<Block>, R
         )));
     }
     Ok(blocks)
+}
+
+/// How many terrains of which groups would look blank; `None` if none would.
+fn left_blank(terrains: &[&TerrainRow]) -> Option<String> {
+    let mut groups: BTreeMap<Natural, usize> = BTreeMap::new();
+    terrains.iter().for_each(|t| *groups.entry(natural(label(t))).or_default() += 1);
+    let groups: Vec<String> = groups.into_iter().map(|(group, n)| format!("{} ({})", group.1, set::count(n))).collect();
+    (!terrains.is_empty()).then(|| {
+        format!(
+            "{} would look blank, because {} brightness varies by less than {} in pixels of this size: {}.",
+            set::counted(terrains.len(), "terrain"),
+            if terrains.len() == 1 { "its" } else { "their" },
+            set::percent(CONTRAST_MIN, 0),
+            groups.join(", ")
+        )
+    })
 }
 
 fn is_planet(terrain: &TerrainRow) -> bool {
@@ -89,9 +111,18 @@ struct View {
     with_albedo: bool,
 }
 
-/// Renders a terrain with at most `most` pixels along a side; `None` without its heights, or if the picture would look blank.
-fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, ReportError> {
-    let Some(heights) = data.files.grid(&terrain.path)? else { return Ok(None) };
+/// What there is to see of a terrain.
+enum Seen {
+    View(Box<View>),
+    /// The picture would look blank.
+    Blank,
+    /// The release does not have its heights, or they cannot be rendered.
+    Absent,
+}
+
+/// Renders a terrain with at most `most` pixels along a side.
+fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Seen, ReportError> {
+    let Some(heights) = data.files.grid(&terrain.path)? else { return Ok(Seen::Absent) };
     let map = terrain.path.strip_suffix(".tif").map(|path| format!("{path}.albedo.tif"));
     let albedo = map.map_or(Ok(None), |path| data.files.grid(&path))?;
     let step = thin::step(heights.rows(), heights.cols(), most);
@@ -100,13 +131,13 @@ fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, 
     let parameters = RenderParameters { sun: SUN, samples: 1, ..RenderParameters::default() };
     let scene = Scene { heights: &thinned, albedo: albedo.as_ref() };
     // Without noise, no random numbers are drawn.
-    let Ok(rendering) = render(&scene, &parameters, &Streams::for_seed(0, KINDS[0])) else { return Ok(None) };
+    let Ok(rendering) = render(&scene, &parameters, &Streams::for_seed(0, KINDS[0])) else { return Ok(Seen::Absent) };
     let image = rendering.image();
     if contrast(&image) < CONTRAST_MIN {
-        return Ok(None);
+        return Ok(Seen::Blank);
     }
     let picture = picture::brightness(&image, display::white(&image), most)?;
-    Ok(Some(View {
+    Ok(Seen::View(Box::new(View {
         rendering,
         picture,
         extent: extent(&heights),
@@ -114,7 +145,7 @@ fn view(data: &Data, terrain: &TerrainRow, most: usize) -> Result<Option<View>, 
         step,
         pixel_m: thinned.geometry.mean_cell(),
         with_albedo: albedo.is_some(),
-    }))
+    })))
 }
 
 /// Standard deviation of an image over its mean.
@@ -145,15 +176,14 @@ fn sun_words() -> String {
     )
 }
 
-fn figure(data: &Data, terrain: &TerrainRow) -> Result<Option<Figure>, ReportError> {
-    let Some(view) = view(data, terrain, PIXELS)? else { return Ok(None) };
+fn figure(terrain: &TerrainRow, view: &View) -> Figure {
     let albedo_words = if view.with_albedo { "its albedo" } else { "uniform albedo" };
     let mut numbers = Numbers::of_file(terrain.path.as_str(), &COLUMN_NAMES);
-    row(&mut numbers, terrain, &view);
+    row(&mut numbers, terrain, view);
     let step = view.step;
-    Ok(Some(Figure {
+    Figure {
         id: slug(&format!("rendered-{}", terrain.terrain_id)),
-        title: "Rendered view.".into(),
+        title: format!("Rendered view, group {}.", label(terrain)),
         caption: format!(
             "{} from above with {albedo_words} and cast shadows, pixels of {}{}; {}.",
             terrain.terrain_id,
@@ -164,14 +194,22 @@ fn figure(data: &Data, terrain: &TerrainRow) -> Result<Option<Figure>, ReportErr
         description: format!("Rendered image of {}, {}.", terrain.path, view.extent),
         svg: Map::new(&view.picture, MAP_WIDTH, &Key::Entries(&[])).svg,
         numbers,
-    }))
+    }
 }
 
-/// Thumbnails of terrains with one label, each with its id below.
-fn sheet(data: &Data, terrains: &[&TerrainRow]) -> Result<Option<Figure>, ReportError> {
+/// Thumbnails of terrains with one label, each with its id below; those that would look blank are added to `blank`.
+fn sheet<'a>(
+    data: &Data,
+    terrains: &[&'a TerrainRow],
+    blank: &mut Vec<&'a TerrainRow>,
+) -> Result<Option<Figure>, ReportError> {
     let mut views = Vec::new();
-    for terrain in terrains {
-        views.extend(view(data, terrain, THUMBNAIL_PIXELS)?.map(|view| (*terrain, view)));
+    for &terrain in terrains {
+        match view(data, terrain, THUMBNAIL_PIXELS)? {
+            Seen::View(view) => views.push((terrain, *view)),
+            Seen::Blank => blank.push(terrain),
+            Seen::Absent => {}
+        }
     }
     let Some((first, _)) = views.first() else { return Ok(None) };
     let name = label(first);
