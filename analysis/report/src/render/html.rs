@@ -356,17 +356,16 @@ fn row<'a>(cells: &[Cell], formats: impl Iterator<Item = ((&'a Column, Option<us
 }
 
 fn cell(cells: &[Cell], column: &Column, decimals: Option<usize>, label: &str) -> String {
-    let own = cells.get(column.at).unwrap_or(&Cell::Null);
-    let number = |v: f64| in_digits(number::without_noise(v, &column.heading.unit), decimals);
-    let (class, text) = match own {
-        _ if column.is_interval => ("n i", interval(own, cells.get(column.at + 1).unwrap_or(&Cell::Null), number)),
-        Cell::Null => (if column.numeric { "n" } else { "" }, number::ABSENT.to_owned()),
-        Cell::Text(v) => (class_of_text(v), set(v)),
-        Cell::F64(v) => ("n", number(*v)),
-        Cell::I64(v) => ("n", v.to_string()),
-        Cell::Bool(v) => ("", if *v { "yes" } else { "no" }.to_owned()),
-        Cell::F32List(v) => ("", list(v.iter().map(|v| f64::from(*v)))),
-        Cell::F64List(v) => ("", list(v.iter().copied())),
+    let in_column = |v: f64| in_digits(number::without_noise(v, &column.heading.unit), decimals);
+    let (class, text) = match cells.get(column.at) {
+        low if column.is_interval => ("n i", interval(low, cells.get(column.at + 1), in_column)),
+        None | Some(Cell::Null) => (if column.numeric { "n" } else { "" }, number::ABSENT.to_owned()),
+        Some(Cell::Text(v)) => (class_of_text(v), set(v)),
+        Some(Cell::F64(v)) => ("n", in_column(*v)),
+        Some(Cell::I64(v)) => ("n", v.to_string()),
+        Some(Cell::Bool(v)) => ("", if *v { "yes" } else { "no" }.to_owned()),
+        Some(Cell::F32List(v)) => ("", list(v.iter().map(|v| f64::from(*v)))),
+        Some(Cell::F64List(v)) => ("", list(v.iter().copied())),
     };
     let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
     format!("<td{class}{label}>{text}</td>")
@@ -380,11 +379,13 @@ fn in_digits(value: f64, decimals: Option<usize>) -> String {
 const NO_BREAK: char = '\u{a0}';
 
 /// Both ends of an interval, which may be broken between them; an end that is unbounded is left out.
-fn interval(low: &Cell, high: &Cell, set: impl Fn(f64) -> String) -> String {
+fn interval(low: Option<&Cell>, high: Option<&Cell>, in_column: impl Fn(f64) -> String) -> String {
     match (low, high) {
-        (Cell::F64(low), Cell::F64(high)) => format!("{} to{NO_BREAK}{}", set(*low), set(*high)),
-        (Cell::F64(low), _) => format!("from{NO_BREAK}{}", set(*low)),
-        (_, Cell::F64(high)) => format!("up to{NO_BREAK}{}", set(*high)),
+        (Some(Cell::F64(low)), Some(Cell::F64(high))) => {
+            format!("{} to{NO_BREAK}{}", in_column(*low), in_column(*high))
+        }
+        (Some(Cell::F64(low)), _) => format!("from{NO_BREAK}{}", in_column(*low)),
+        (_, Some(Cell::F64(high))) => format!("up to{NO_BREAK}{}", in_column(*high)),
         _ => number::ABSENT.to_owned(),
     }
 }

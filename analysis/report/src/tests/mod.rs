@@ -145,6 +145,19 @@ fn prop_conditions_name_columns_of_their_table() {
     assert!(checked > 20, "{checked} columns");
 }
 
+/// A release without missions has no table of them, so no query names it.
+#[test]
+fn prop_queries_name_tables_that_there_are() {
+    let mut data = made_up::full(3, 24);
+    data.missions.clear();
+    data.replicates.clear();
+    let (files, _) = report(&data);
+    assert!(files.contains_key("data/published.json"));
+    for (name, text) in files.iter().filter(|(name, _)| name.starts_with("data/")) {
+        assert!(!text.contains("tables/missions/"), "{name}");
+    }
+}
+
 /// A query without its subqueries.
 fn without_inner(query: &str) -> String {
     let Some(start) = query.find("(select") else { return query.to_owned() };

@@ -493,8 +493,8 @@ mod tests {
         assert_eq!(figures.len(), DRAWN_MAX);
         let svg = figures[0].svg.finish("id", "t", "d");
         assert!(svg.contains("stroke-width=\"1.8\"") && figures[0].caption.contains("Grey"), "{svg}");
-        let lines = svg.split('<').filter(|shape| shape.contains("stroke-width=\"1.8\""));
-        assert!(lines.into_iter().all(|line| line.contains("l-muted")), "{svg}");
+        let mut lines = svg.split('<').filter(|shape| shape.contains("stroke-width=\"1.8\""));
+        assert!(lines.all(|line| line.contains("l-muted")), "{svg}");
         let says = |words: &str| blocks.iter().any(|b| matches!(b, Block::Text(text) if text == words));
         assert!(says("6 of 7 logs are drawn; the table has all."));
         data.logs = Some(vec![log(1)]);

@@ -46,7 +46,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut blocks: Vec<Block> = verdict(&rows).map(Block::Text).into_iter().collect();
     blocks.extend(difference(data, &paper).map(Block::Warning));
     blocks.push(Block::Text(introduction));
-    blocks.push(Block::Table(table(&paper, &rows)));
+    blocks.push(Block::Table(table(data, &paper, &rows)));
     Ok(blocks)
 }
 
@@ -273,7 +273,7 @@ fn verdict(rows: &[Row]) -> Option<String> {
     })
 }
 
-fn table(paper: &Paper, rows: &[Row]) -> TableBlock {
+fn table(data: &Data, paper: &Paper, rows: &[Row]) -> TableBlock {
     let columns = [
         ("quantity", ""),
         ("unit", ""),
@@ -285,7 +285,10 @@ fn table(paper: &Paper, rows: &[Row]) -> TableBlock {
         ("paper is", ""),
         ("printed in", ""),
     ];
-    let query = "select * from 'tables/missions/*.parquet' join 'tables/terrains/*.parquet' using (terrain_id)";
+    let query = match data.missions.is_empty() {
+        true => "select * from 'tables/terrains/*.parquet'",
+        false => "select * from 'tables/missions/*.parquet' join 'tables/terrains/*.parquet' using (terrain_id)",
+    };
     let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
     for row in rows {
         let verdict = row.inside().map_or(set::ABSENT, |inside| if inside { "inside" } else { "outside" });

@@ -86,9 +86,9 @@ fn verdict(methods: &[Method], ratios: &[ratios::Ratio]) -> Option<String> {
         format!(
             "Smoothed routes of {} cost {} times those of {}, and the search expands {} times as many vertices ({}).",
             methods[method].name,
-            set::plain(cost, 3),
+            set::significant(cost, 3),
             methods[reference].name,
-            set::plain(expansions, 2),
+            set::significant(expansions, 2),
             set::counted(pairs, "common pair")
         )
     };

@@ -126,7 +126,7 @@ fn corners(curve: &Curve, end: f64, of: impl Fn(&Step) -> f64) -> Vec<(f64, f64)
 }
 
 fn has_band(curve: &Curve) -> bool {
-    curve.arrived.steps.iter().all(|s| s.interval.is_some())
+    !curve.arrived.steps.is_empty() && curve.arrived.steps.iter().all(|s| s.interval.is_some())
 }
 
 /// The band of a curve. Several lie over each other: they are paler, so that no dark block hides the curves, and end at thin lines of their own.
