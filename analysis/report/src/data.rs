@@ -552,8 +552,9 @@ mod tests {
         };
         let mut terrains: Vec<TerrainRow> = (0..450).map(|k| terrain("large", None, k)).collect();
         terrains.extend((0..CURVES_MAX).map(|k| terrain("large", Some("v = 1"), k)));
+        // More textures than the curves of a group: they are not sampled.
         terrains
-            .extend((0..CURVES_MAX).map(|k| TerrainRow { stage: "texture".into(), ..terrain("textures", None, k) }));
+            .extend((0..=CURVES_MAX).map(|k| TerrainRow { stage: "texture".into(), ..terrain("textures", None, k) }));
         let without = without_curves(7, &terrains);
         assert_eq!(without.len(), 250);
         assert!(without.iter().all(|id| id.starts_with("large-plain-")), "{without:?}");

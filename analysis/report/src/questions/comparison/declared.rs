@@ -179,7 +179,6 @@ enum Outcome {
     CannotTell,
     NoMissions,
     NoPairs,
-    NoPairsOfTwo,
     TooFew,
 }
 
@@ -193,8 +192,7 @@ impl Outcome {
             Self::Apart => "not supported: the groups differ by more than the margin",
             Self::CannotTell => "cannot tell",
             Self::NoMissions => "cannot tell: a group has no missions with this metric",
-            Self::NoPairs => "cannot tell: no paired missions have this metric in all groups",
-            Self::NoPairsOfTwo => "cannot tell: no paired missions have this metric in both groups",
+            Self::NoPairs => "cannot tell: no paired missions have this metric in every group",
             Self::TooFew => "cannot tell: too few terrains",
         }
     }
@@ -204,7 +202,7 @@ impl Outcome {
     }
 
     const fn is_open(self) -> bool {
-        matches!(self, Self::CannotTell | Self::NoMissions | Self::NoPairs | Self::NoPairsOfTwo | Self::TooFew)
+        matches!(self, Self::CannotTell | Self::NoMissions | Self::NoPairs | Self::TooFew)
     }
 }
 
@@ -215,7 +213,6 @@ impl Tested<'_> {
             Some(_) if found => Outcome::Equivalent,
             _ if found => self.direction(),
             _ if self.of.is_empty() => Outcome::NoMissions,
-            _ if self.p.is_nan() && self.claim.groups.len() == 2 => Outcome::NoPairsOfTwo,
             _ if self.p.is_nan() => Outcome::NoPairs,
             _ if self.least_adjusted > self.claim.alpha => Outcome::TooFew,
             // Bonferroni's adjustment over the family.
