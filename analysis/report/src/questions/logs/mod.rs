@@ -21,11 +21,6 @@ pub const QUESTION: Question = Question { id: "logs", name: "Logs", title: "Do t
 
 /// Percentiles that bound the middle of the missions.
 const MIDDLE: [f64; 2] = [2.5, 97.5];
-const BELOW: &str = "below the missions";
-const ABOVE: &str = "above the missions";
-const TOO_FEW: &str = "cannot tell: at the edge, and too few terrains";
-/// Verdicts that leave open where a log falls begin with these words.
-const UNDECIDED: [&str; 3] = ["cannot tell", "not judged", "no value"];
 /// Logs drawn; all are in the table.
 const DRAWN_MAX: usize = 6;
 /// Marks that distinguish groups in a chart.
@@ -101,6 +96,48 @@ const SHARED: [Shared; 8] = [
         of_log: |l| (l.max_roll_deg, f64::NAN, true),
     },
 ];
+
+/// Where a metric of a log falls among the missions, or what is open about it.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Verdict {
+    Within,
+    Below,
+    Above,
+    CannotTell,
+    NotJudged,
+    NoValue,
+}
+
+impl Verdict {
+    const ALL: [Self; 6] = [Self::Within, Self::Below, Self::Above, Self::CannotTell, Self::NotJudged, Self::NoValue];
+
+    /// True if it places the log among the missions.
+    const fn decides(self) -> bool {
+        matches!(self, Self::Within | Self::Below | Self::Above)
+    }
+
+    /// As in the table.
+    const fn words(self) -> &'static str {
+        match self {
+            Self::Within => "within the middle 95 %",
+            Self::Below => "below the missions",
+            Self::Above => "above the missions",
+            Self::CannotTell => "cannot tell",
+            Self::NotJudged => "not judged",
+            Self::NoValue => "no value",
+        }
+    }
+
+    /// After the number of comparisons that have it.
+    const fn counted(self) -> &'static str {
+        match self {
+            Self::Within => "within the middle 95 % of the missions",
+            Self::CannotTell => "undecided",
+            Self::NoValue => "without a value",
+            Self::Below | Self::Above | Self::NotJudged => self.words(),
+        }
+    }
+}
 
 /// A metric of a log compared with the missions of a group.
 struct Placed<'a> {
@@ -217,31 +254,33 @@ fn unfinished(log: &LogRow) -> Option<String> {
     let words =
         |outcome: &str| outcome::ALL.iter().find(|o| o.word == outcome).map_or(outcome.to_owned(), |o| o.name.into());
     match (&log.broken, failed) {
-        (Some(_), _) => Some("not judged: the log is incomplete".into()),
-        (None, Some(outcome)) => Some(format!("not judged: outcome {}", words(outcome))),
+        (Some(_), _) => Some("the log is incomplete".into()),
+        (None, Some(outcome)) => Some(format!("outcome {}", words(outcome))),
         (None, None) => None,
     }
 }
 
 impl Placed<'_> {
-    fn verdict(&self) -> &str {
-        let Some(place) = &self.place else { return "no value" };
+    /// The verdict, and the reason for it if it needs one.
+    fn verdict(&self) -> (Verdict, &str) {
+        let Some(place) = &self.place else { return (Verdict::NoValue, "") };
         let inside = (MIDDLE[0]..=MIDDLE[1]).contains(&(100.0 * place.share_below.estimate));
         match &self.unfinished {
-            Some(why) => why,
-            None if !self.tells => "cannot tell: below three times the noise floor",
-            None if place.p() <= ALPHA && place.p_above < place.p_below => ABOVE,
-            None if place.p() <= ALPHA => BELOW,
-            None if inside => "within the middle 95 %",
-            None if place.least_p() > ALPHA => TOO_FEW,
-            None => "cannot tell: at the edge",
+            Some(why) => (Verdict::NotJudged, why),
+            None if !self.tells => (Verdict::CannotTell, "below three times the noise floor"),
+            None if place.p() <= ALPHA && place.p_above < place.p_below => (Verdict::Above, ""),
+            None if place.p() <= ALPHA => (Verdict::Below, ""),
+            None if inside => (Verdict::Within, ""),
+            None if place.least_p() > ALPHA => (Verdict::CannotTell, "at the edge, and too few terrains"),
+            None => (Verdict::CannotTell, "at the edge"),
         }
     }
 
-    /// True if the verdict places the log: within the middle of the missions, below or above them.
-    fn decides(&self) -> bool {
-        let verdict = self.verdict();
-        !UNDECIDED.iter().any(|words| verdict.starts_with(words))
+    fn verdict_in_words(&self) -> String {
+        match self.verdict() {
+            (verdict, "") => verdict.words().to_owned(),
+            (verdict, why) => format!("{}: {why}", verdict.words()),
+        }
     }
 }
 
@@ -255,20 +294,12 @@ pub(super) fn result(data: &Data) -> Option<String> {
 
 /// How many comparisons have each verdict.
 fn verdicts(placed: &[Placed]) -> String {
-    let words = [
-        ("within the middle 95 %", "within the middle 95 % of the missions"),
-        (BELOW, BELOW),
-        (ABOVE, ABOVE),
-        ("cannot tell", "undecided"),
-        ("not judged", "not judged"),
-        ("no value", "without a value"),
-    ];
-    let part = |(verdict, word): &(&str, &str)| {
-        let n = placed.iter().filter(|p| p.verdict().starts_with(verdict)).count();
-        (n > 0).then(|| format!("{} {word}", set::count(n)))
+    let part = |verdict: Verdict| {
+        let n = placed.iter().filter(|p| p.verdict().0 == verdict).count();
+        (n > 0).then(|| format!("{} {}", set::count(n), verdict.counted()))
     };
     let logs = placed.iter().map(|p| p.log).max().map_or(0, |last| last + 1);
-    let parts: Vec<String> = words.iter().filter_map(part).collect();
+    let parts: Vec<String> = Verdict::ALL.into_iter().filter_map(part).collect();
     format!(
         "{} of {} with groups of missions, metric by metric: {}.",
         set::counted(placed.len(), "comparison"),
@@ -380,7 +411,7 @@ fn drawing(placed: &[&Placed]) -> Figure {
         let k = groups.iter().position(|g| g.0 == p.group_index).unwrap_or(0);
         let y = rows.centre(row) + step * (k as f64 - 0.5 * (groups.len() - 1) as f64);
         let Some(place) = p.place.map(|place| in_percent(place.share_below)) else { continue };
-        let paint = if p.decides() { Paint::Series(p.group_index) } else { Paint::Muted };
+        let paint = if p.verdict().0.decides() { Paint::Series(p.group_index) } else { Paint::Muted };
         if let (Some(from), Some(to)) = (rows.x.clamped(place.low), rows.x.clamped(place.high)) {
             rows.svg.segment((from, y), (to, y), Stroke::new(paint, 1.8));
         }
@@ -433,7 +464,8 @@ fn numbers<'a>(placed: impl Iterator<Item = &'a Placed<'a>>) -> Numbers {
     let query = "LOGS.parquet of --logs, with tables/missions";
     let mut numbers = Numbers::of_file(query, &columns).with_mixed_units();
     for p in placed {
-        let head = [text(p.log_id), text(p.shared.name), text(p.group), text(p.verdict()), text(p.shared.unit)];
+        let head =
+            [text(p.log_id), text(p.shared.name), text(p.group), text(p.verdict_in_words()), text(p.shared.unit)];
         let place = p.place.map_or([f64::NAN; 4], |place| {
             let share = in_percent(place.share_below);
             [share.estimate, share.low, share.high, place.p()]
