@@ -88,9 +88,7 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let id = slug(&format!("profile-{}", fit.fit_id));
     let ends = points.iter().fold((f64::INFINITY, 0.0f64), |(l, h), p| (l.min(p.range_m), h.max(p.range_m)));
     let highest = points.iter().map(|p| p.chi2_rise).fold(0.0, f64::max);
-    // If the model does not fit, its sum of squares overstates how well the parameters are known.
-    let misfit = if fit.misfit_chi2_per_freedom > 1.0 { fit.misfit_chi2_per_freedom } else { 1.0 };
-    let at_edge = EDGE * misfit;
+    let (at_edge, threshold) = threshold(fit);
     let top = highest.clamp(2.0 * at_edge, RISE_MAX * at_edge);
     let curve = Stroke::new(Paint::Series(0), 2.0);
     let edge = Stroke::new(Paint::Muted, 1.4).dashed("6 4");
@@ -116,14 +114,6 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
     let marks = plot.place(points.iter().map(|p| (p.range_m, p.chi2_rise)));
     marks.into_iter().for_each(|at| plot.svg.disc(at, 2.6, Paint::Series(0), 1.0));
     plot.svg.close();
-    let threshold = match misfit > 1.0 {
-        true => format!(
-            "{}, which is {EDGE} times the misfit per degree of freedom ({})",
-            set::significant(at_edge, 3),
-            set::significant(misfit, 3)
-        ),
-        false => EDGE.to_string(),
-    };
     let beyond = |(what, end): &(&str, f64)| {
         format!(" The interval of b {what} at {}, outside the frame.", set::with_unit(*end, 3, "m"))
     };
@@ -142,6 +132,18 @@ fn profile(data: &Data, fit: &FitRow) -> Option<Figure> {
         svg: plot.svg,
         numbers: Numbers::select(&query, points, &["point", "range_m", "chi2_rise"]),
     })
+}
+
+/// The rise of the sum of squares at the ends of a 95 % interval, and how it follows from the misfit, in words.
+fn threshold(fit: &FitRow) -> (f64, String) {
+    // If the model does not fit, its sum of squares overstates how well the parameters are known.
+    let misfit = fit.misfit_chi2_per_freedom;
+    if misfit > 1.0 {
+        let at_edge = EDGE * misfit;
+        let [rise, times] = [at_edge, misfit].map(|value| set::significant(value, 3));
+        return (at_edge, format!("{rise}, which is {EDGE} times the misfit per degree of freedom ({times})"));
+    }
+    (EDGE, EDGE.to_string())
 }
 
 fn span((low, high): (f64, f64)) -> String {
