@@ -37,7 +37,7 @@ impl<'a> Judged<'a> {
 pub fn in_order(data: &Data) -> Vec<Judged<'_>> {
     let compared = of_scoreboards(data);
     let mut all: Vec<Judged<'_>> = data.of_stage("texture").map(|texture| Judged::new(data, texture)).collect();
-    all.sort_by_key(|one| {
+    all.sort_by_cached_key(|one| {
         let texture = one.texture;
         (one.rank(), compared.contains(&texture.terrain_id), data::parameter(texture, "onto").is_some())
     });

@@ -63,7 +63,7 @@ pub fn of_texture(data: &Data, texture: &TerrainRow, fit: &str) -> Option<(Answe
 
 /// The same for the texture at amplitude 1, whose residual is stored.
 fn of_residual(data: &Data, texture: &TerrainRow, fit: &str) -> Option<(Answer, String)> {
-    let fit = data.fits.iter().find(|f| f.fit_id == fit)?;
+    let fit = of_key(&data.fits, |f| &f.fit_id, fit).first()?;
     let compared = compared(data, texture, fit)?;
     if fit.stationarity_p < ALPHA {
         let sentence = format!(
