@@ -101,7 +101,7 @@ pub struct Data {
     /// Heightfields.
     pub terrains: Vec<TerrainRow>,
     /// Ids of surfaces whose curves are not kept: generated terrains beyond a random sample of [`CURVES_MAX`] of their group, and textures that
-    /// are not drawn, with their residuals. Of these textures and residuals only the structure function over all directions is kept.
+    /// are not drawn, with their residuals. Of such a residual only the structure function over all directions is kept.
     pub without_curves: BTreeSet<String>,
     /// Fits.
     pub fits: Vec<FitRow>,
@@ -173,14 +173,12 @@ pub const CURVES_MAX: usize = 200;
 /// End of the id under which a texture's stage stores its residual, after the detrending and trimming of the fit.
 pub const RESIDUAL: &str = ".residual";
 
-/// True for the structure functions that are kept before it is known which textures are drawn: those over all directions of textures and their
-/// residuals, with which every texture is judged, and those of the other surfaces whose curves are kept.
-pub(crate) fn is_kept(row: &StructureRow, textures: &BTreeSet<&str>, without_curves: &BTreeSet<String>) -> bool {
-    let id = row.surface_id.as_str();
-    match textures.contains(id.strip_suffix(RESIDUAL).unwrap_or(id)) {
-        true => row.direction == "all",
-        false => !without_curves.contains(id),
-    }
+/// Names the surfaces whose curves no figure shows, from the tables that are read before the curves: the page knows what it draws, not the reader.
+pub type Undrawn = fn(&Data) -> Vec<String>;
+
+/// True for the structure function of a residual over all directions, with which every texture is judged.
+pub(crate) fn is_judged(row: &StructureRow) -> bool {
+    row.direction == "all" && row.surface_id.ends_with(RESIDUAL)
 }
 
 /// The generated terrains beyond a random sample of [`CURVES_MAX`] of each group and variant.
@@ -561,9 +559,9 @@ mod tests {
         assert!(without == without_curves(7, &terrains) && without != without_curves(8, &terrains));
     }
 
-    /// Of textures and their residuals the structure functions over all directions are kept, of other surfaces all or none.
+    /// Textures are judged by the structure functions of their residuals over all directions.
     #[test]
-    fn val_structure_functions_that_are_kept() {
+    fn val_structure_functions_by_which_textures_are_judged() {
         let row = |id: &str, direction: &str| StructureRow {
             surface_id: id.into(),
             direction: direction.into(),
@@ -572,11 +570,9 @@ mod tests {
             value_m2: 1.0,
             pairs: 1,
         };
-        let textures = BTreeSet::from(["a"]);
-        let without = BTreeSet::from(["t-2".to_owned()]);
-        let kept = |id: &str| ["all", "x"].map(|direction| is_kept(&row(id, direction), &textures, &without));
-        assert_eq!(["a", "a.residual"].map(kept), [[true, false]; 2]);
-        assert_eq!((kept("t-1"), kept("t-2")), ([true; 2], [false; 2]));
+        let judged =
+            [("a.residual", "all"), ("a.residual", "x"), ("a", "all")].map(|(id, way)| is_judged(&row(id, way)));
+        assert_eq!(judged, [true, false, false]);
     }
 
     /// Every surface is found by its id, and no other.

@@ -1,7 +1,6 @@
 //! Reading of an assembled release, sealed or not. This is the only file that reads through `sastrugi-store`.
 
-use crate::data::{Against, Data, Files, Mission, Names, Start, Stored, Study, is_kept, without_curves};
-use crate::questions::texture;
+use crate::data::{Against, Data, Files, Mission, Names, Start, Stored, Study, Undrawn, is_judged, without_curves};
 use crate::{Companions, ReportError};
 use sastrugi_numeric::Grid;
 use sastrugi_schemas::Record;
@@ -27,76 +26,16 @@ const DATA_FOLDERS: [&str; 10] =
 const RECORDINGS: &str = "mcap";
 
 impl Data {
-    /// Reads the tables of a release.
+    /// Reads the tables of a release; `undrawn` names the surfaces whose curves are left out.
     ///
     /// # Errors
     /// [`ReportError::NotARelease`] for a folder that is not a release, [`ReportError::Shard`] for a shard of one; a file that exists but
     /// cannot be read; a file that the manifest lists and the report reads, but which is missing or not a regular file.
-    pub fn open(folder: &Path) -> Result<Self, ReportError> {
-        let release = Release { folder: folder.to_owned() };
-        if folder.join(SHARD).is_file() {
-            return Err(ReportError::Shard { path: folder.to_owned() });
-        }
-        if !folder.join(STUDY).is_file() && !folder.join(TABLES).is_dir() {
-            return Err(ReportError::NotARelease { path: folder.to_owned() });
-        }
-        let toml = release.text(STUDY)?.unwrap_or_default();
-        let study = study(&toml).map_err(|e| read_error(STUDY, e))?;
-        let rovers: Vec<RoverRow> = release.rows()?;
-        let terrains = release.terrains(!rovers.is_empty())?;
-        let without_curves = without_curves(study.seed, &terrains);
-        let structure = {
-            let textures = terrains.iter().filter(|t| t.stage == "texture").map(|t| t.terrain_id.as_str());
-            let textures: BTreeSet<&str> = textures.collect();
-            release.rows_where(|row: &StructureRow| is_kept(row, &textures, &without_curves))?
-        };
-        let (contents, manifest) = release.contents(&terrains)?;
-        let (version, failed) =
-            manifest.map_or_else(|| (env!("CARGO_PKG_VERSION").into(), Vec::new()), |m| (m.version, m.failed));
-        let mut data = Self {
-            study_sha256: digest::of_text(&toml),
-            version: format!("sastrugi {version}"),
-            stored: release.stored()?,
-            failed,
-            fits: release.rows()?,
-            covariance: release.rows()?,
-            candidates: release.rows()?,
-            candidate_curves: release.rows()?,
-            likelihood_profile: release.rows()?,
-            surfaces: release.rows()?,
-            structure,
-            profile_psd: Vec::new(),
-            psd: Vec::new(),
-            heights: Vec::new(),
-            scoreboard: release.rows()?,
-            scoreboard_covariance: release.rows()?,
-            missions: release.missions()?,
-            replicates: release.starts()?,
-            routes: release.rows()?,
-            images: release.rows()?,
-            photoclinometry: release.rows()?,
-            photoclinometry_bands: release.rows()?,
-            formations: release.rows()?,
-            formation_events: release.rows()?,
-            rovers,
-            rover_effects: release.rows()?,
-            parameters: release.rows()?,
-            contents,
-            against: None,
-            logs: None,
-            files: Box::new(Release { folder: folder.to_owned() }),
-            study,
-            terrains,
-            without_curves,
-        };
-        // Which textures are drawn depends on the answers on them, and so do the curves that are kept.
-        let undrawn = texture::undrawn(&data);
-        data.without_curves.extend(undrawn);
-        let kept = |surface_id: &str| !data.without_curves.contains(surface_id);
-        let profile_psd = release.rows_where(|row: &ProfilePsdRow| kept(&row.surface_id))?;
-        let psd = release.rows_where(|row: &PsdRow| kept(&row.surface_id))?;
-        let heights = release.rows_where(|row: &HeightDistributionRow| kept(&row.surface_id))?;
-        Ok(Self { profile_psd, psd, heights, ..data })
+    pub fn open(folder: &Path, undrawn: Undrawn) -> Result<Self, ReportError> {
+        let release = Release::at(folder)?;
+        let mut data = release.tables()?;
+        release.read_curves(&mut data, undrawn)?;
+        Ok(data)
     }
 }
 
@@ -105,16 +44,16 @@ impl Data {
     ///
     /// # Errors
     /// As [`Self::open`], for either release; a file that is not a table of logs.
-    pub fn open_with(folder: &Path, companions: &Companions) -> Result<Self, ReportError> {
+    pub fn open_with(folder: &Path, companions: &Companions, undrawn: Undrawn) -> Result<Self, ReportError> {
         let name = |path: &Path| path.file_name().unwrap_or(path.as_os_str()).to_string_lossy().into_owned();
         let other = |path: &PathBuf| -> Result<Against, ReportError> {
-            let data = Self::open(path).map_err(|e| e.of_other(path))?;
+            let data = Self::open(path, undrawn).map_err(|e| e.of_other(path))?;
             Ok(Against { name: name(path), data: Box::new(data) })
         };
         let logs = |path: &PathBuf| {
             parquet::read_table::<LogRow>(path).map_err(|e| ReportError::Logs { reason: e.to_string() })
         };
-        let mut data = Self::open(folder)?;
+        let mut data = Self::open(folder, undrawn)?;
         data.against = companions.against.as_ref().map(other).transpose()?;
         if !companions.logs.is_empty() {
             data.logs = Some(companions.logs.iter().map(logs).collect::<Result<Vec<_>, _>>()?.concat());
@@ -172,6 +111,82 @@ impl Files for Release {
 }
 
 impl Release {
+    /// The release in a folder, refused if it is none or a shard of one.
+    fn at(folder: &Path) -> Result<Self, ReportError> {
+        if folder.join(SHARD).is_file() {
+            return Err(ReportError::Shard { path: folder.to_owned() });
+        }
+        if !folder.join(STUDY).is_file() && !folder.join(TABLES).is_dir() {
+            return Err(ReportError::NotARelease { path: folder.to_owned() });
+        }
+        Ok(Self { folder: folder.to_owned() })
+    }
+
+    /// All that the report keeps in memory but the curves.
+    fn tables(&self) -> Result<Data, ReportError> {
+        let toml = self.text(STUDY)?.unwrap_or_default();
+        let study = study(&toml).map_err(|e| read_error(STUDY, e))?;
+        let rovers: Vec<RoverRow> = self.rows()?;
+        let terrains = self.terrains(!rovers.is_empty())?;
+        let (contents, manifest) = self.contents(&terrains)?;
+        let (version, failed) =
+            manifest.map_or_else(|| (env!("CARGO_PKG_VERSION").into(), Vec::new()), |m| (m.version, m.failed));
+        Ok(Data {
+            study_sha256: digest::of_text(&toml),
+            version: format!("sastrugi {version}"),
+            stored: self.stored()?,
+            failed,
+            fits: self.rows()?,
+            covariance: self.rows()?,
+            candidates: self.rows()?,
+            candidate_curves: self.rows()?,
+            likelihood_profile: self.rows()?,
+            surfaces: self.rows()?,
+            structure: Vec::new(),
+            profile_psd: Vec::new(),
+            psd: Vec::new(),
+            heights: Vec::new(),
+            scoreboard: self.rows()?,
+            scoreboard_covariance: self.rows()?,
+            missions: self.missions()?,
+            replicates: self.starts()?,
+            routes: self.rows()?,
+            images: self.rows()?,
+            photoclinometry: self.rows()?,
+            photoclinometry_bands: self.rows()?,
+            formations: self.rows()?,
+            formation_events: self.rows()?,
+            rovers,
+            rover_effects: self.rows()?,
+            parameters: self.rows()?,
+            contents,
+            against: None,
+            logs: None,
+            files: Box::new(Self { folder: self.folder.clone() }),
+            without_curves: without_curves(study.seed, &terrains),
+            study,
+            terrains,
+        })
+    }
+
+    /// Reads the curves that are drawn. Which textures these are depends on the answers on them, so the structure functions behind the answers are
+    /// read first, and again with the others: they are few, and so no curve is held for a texture that turns out not to be drawn.
+    fn read_curves(&self, data: &mut Data, undrawn: Undrawn) -> Result<(), ReportError> {
+        let sites: BTreeSet<&str> = data.fits.iter().map(|fit| fit.fit_id.as_str()).collect();
+        let is_compared =
+            |row: &StructureRow| is_judged(row) || (row.direction == "all" && sites.contains(row.surface_id.as_str()));
+        data.structure = self.rows_where(is_compared)?;
+        let undrawn = undrawn(data);
+        data.without_curves.extend(undrawn);
+        let is_kept = |surface_id: &str| !data.without_curves.contains(surface_id);
+        data.structure = Vec::new();
+        data.structure = self.rows_where(|row: &StructureRow| is_compared(row) || is_kept(&row.surface_id))?;
+        data.profile_psd = self.rows_where(|row: &ProfilePsdRow| is_kept(&row.surface_id))?;
+        data.psd = self.rows_where(|row: &PsdRow| is_kept(&row.surface_id))?;
+        data.heights = self.rows_where(|row: &HeightDistributionRow| is_kept(&row.surface_id))?;
+        Ok(())
+    }
+
     /// Content hashes of the heightfields by path, and the manifest, checked, without its list of files; nothing before a release is
     /// sealed. The files that a manifest lists and the report reads must be there: without one, the page would leave something out in
     /// silence.

@@ -2,7 +2,7 @@
 
 use crate::content::{Block, Figure, Numbers, Section, TableBlock, slug};
 use crate::data::Data;
-use crate::questions;
+use crate::questions::{self, texture};
 use crate::render::html::{self, Head};
 use crate::render::number as set;
 use crate::{Companions, ReportError};
@@ -63,7 +63,7 @@ pub fn render_with(
     progress: &dyn Fn(&str),
 ) -> Result<Summary, ReportError> {
     progress("reading the tables");
-    write(&Data::open_with(release, companions)?, out, progress)
+    write(&Data::open_with(release, companions, texture::undrawn)?, out, progress)
 }
 
 /// Writes the report of data that are already read.

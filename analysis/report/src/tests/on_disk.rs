@@ -5,7 +5,7 @@ use crate::data::Data;
 use crate::{Companions, ReportError, Summary, render, render_with};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::manifest::{FailedItem, JsonText, Origin};
-use sastrugi_schemas::tables::{PsdRow, SurfaceRow, TerrainRow};
+use sastrugi_schemas::tables::{PsdRow, StructureRow, SurfaceRow, TerrainRow};
 use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::release::{Head, PartWriter, ReleaseBuilder, TablePart, for_each_artifact};
 use std::collections::BTreeMap;
@@ -29,6 +29,11 @@ fn head() -> Head {
         version: "0.1.0".into(),
         license: "CC-BY-4.0".into(),
     }
+}
+
+/// Reads a release, with the curves that are drawn.
+fn open(release: &Path) -> Result<Data, ReportError> {
+    Data::open(release, crate::questions::texture::undrawn)
 }
 
 /// A release that will be `dest`, not sealed.
@@ -110,7 +115,7 @@ fn prop_missions_of_several_files_are_in_order() {
             let rows = missions.iter().enumerate().filter(|(k, _)| k % files == file).map(|(_, m)| m.clone()).collect();
             write_table(&mut builder, &format!("{file:04}"), rows);
         }
-        crate::data::Data::open(builder.staging()).unwrap().missions
+        open(builder.staging()).unwrap().missions
     };
     let cells = |missions: Vec<crate::data::Mission>| missions.iter().map(Record::cells).collect::<Vec<_>>();
     let whole = cells(stored("whole", 1));
@@ -118,7 +123,8 @@ fn prop_missions_of_several_files_are_in_order() {
     assert_eq!(cells(stored("parts", 3)), whole);
 }
 
-/// Of textures, the curves of those that are drawn are read: one that does not match its site, the last of seven, is one of them.
+/// Of textures, the curves of those that are drawn are read: one that does not match its site, the last of seven, is one of them. Of the others only
+/// the structure function of the residual over all directions is held, with which they are judged.
 #[test]
 fn val_curves_of_the_textures_that_are_drawn_are_read() {
     let folder = tempfile::tempdir().unwrap();
@@ -134,12 +140,23 @@ fn val_curves_of_the_textures_that_are_drawn_are_read() {
         data.psd.push(PsdRow { surface_id: id.clone(), ..psd.clone() });
         let surface_id = format!("{id}.residual");
         data.surfaces.push(SurfaceRow { surface_id, cells: 2_000_000, sq_m, ..surface.clone() });
+        // At a lag that the site lacks, so that it does not enter the answer.
+        let lag = StructureRow { lag_m: 1e6, ..data.structure_of("texture", "all")[0].clone() };
+        let directions = [("", "all"), (".residual", "all"), (".residual", "x")];
+        data.structure.extend(directions.map(|(end, direction)| StructureRow {
+            surface_id: format!("{id}{end}"),
+            direction: direction.into(),
+            ..lag.clone()
+        }));
     }
+    data.structure.sort_by(|a, b| a.surface_id.cmp(&b.surface_id));
     let builder = assembled_of(&folder.path().join("release"), (data, shelf));
-    let read = Data::open(builder.staging()).unwrap();
+    let read = open(builder.staging()).unwrap();
     let is_read = |id: &str| read.psd.iter().any(|row| row.surface_id == id);
     assert_eq!(["texture", "u-1", "u-2", "u-6"].map(is_read), [true; 4]);
     assert_eq!(["u-3", "u-4", "u-5"].map(is_read), [false; 3]);
+    let structures = |id: &str| read.structure.iter().filter(|row| row.surface_id == id).count();
+    assert_eq!(["u-6", "u-6.residual", "u-5", "u-5.residual"].map(structures), [1, 2, 0, 1]);
     assert!(read.without_curves.contains("u-5.residual") && !read.without_curves.contains("u-6.residual"));
 }
 
@@ -179,7 +196,7 @@ fn val_roughness_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let builder = assembled(&folder.path().join("release"));
     let staging = builder.staging().to_owned();
-    let radius_m = || crate::data::Data::open(&staging).unwrap().study.roughness.closing_radius_m;
+    let radius_m = || open(&staging).unwrap().study.roughness.closing_radius_m;
     assert_eq!(radius_m(), 0.57);
     fs::write(staging.join("study.toml"), format!("{STUDY}[roughness]\nclosing_radius_m = 1\n")).unwrap();
     assert_eq!(radius_m(), 1.0);
@@ -261,7 +278,7 @@ fn val_paths_lead_to_files_of_the_release() {
     let inside = "dem/jacksboro.metric.tif";
     let outside = staging.parent().unwrap().join("outside.tif");
     fs::copy(staging.join(inside), &outside).unwrap();
-    let files = crate::data::Data::open(&staging).unwrap().files;
+    let files = open(&staging).unwrap().files;
     assert!(files.grid(inside).unwrap().is_some());
     let absolute = outside.display().to_string();
     for path in ["../outside.tif", "dem/../../outside.tif", absolute.as_str(), "dem/missing.tif", "dem"] {
@@ -275,7 +292,7 @@ fn val_the_study_is_read() {
     let folder = tempfile::tempdir().unwrap();
     let study = |more: &str| {
         fs::write(folder.path().join("study.toml"), format!("{STUDY}license = \"CC0-1.0\"\n{more}")).unwrap();
-        crate::data::Data::open(folder.path()).unwrap().study
+        open(folder.path()).unwrap().study
     };
     let plain = study("description = \"Two hills.\"\n");
     assert_eq!((plain.name.as_str(), plain.title.as_str(), plain.seed), ("made-up", "A <title>", 7));
@@ -289,7 +306,7 @@ fn val_the_study_is_read() {
     assert!(!report(folder.path()).0["index.html"].contains("<dt>version</dt>"));
     let creators = |toml: &str| {
         fs::write(folder.path().join("study.toml"), format!("[study]\n{toml}")).unwrap();
-        crate::data::Data::open(folder.path()).unwrap().study.creators
+        open(folder.path()).unwrap().study.creators
     };
     assert_eq!(creators("creators = [{ name = \"A\", orcid = \"0\" }, \"B\"]\n"), ["A", "B"]);
     assert_eq!(creators("[[study.creators]]\nname = \"C\"\n[[study.creators]]\nname = \"D\"\n"), ["C", "D"]);
@@ -297,7 +314,7 @@ fn val_the_study_is_read() {
 
 /// Why a release cannot be read; `None` if it can.
 fn refusal(release: &Path) -> Option<String> {
-    let error = crate::data::Data::open(release).err()?;
+    let error = open(release).err()?;
     assert!(error.unusable_input(), "{error}");
     Some(error.to_string())
 }
