@@ -18,6 +18,14 @@ pub struct Section {
     pub blocks: Vec<Block>,
 }
 
+impl Section {
+    /// The blocks that have content under a heading; `None` without any.
+    pub fn of(id: &'static str, name: &'static str, title: &'static str, mut blocks: Vec<Block>) -> Option<Self> {
+        blocks.retain(|block| !block.is_empty());
+        (!blocks.is_empty()).then_some(Self { id, name, title, blocks })
+    }
+}
+
 /// A part of a section.
 #[derive(Clone, Debug)]
 pub enum Block {
@@ -25,6 +33,8 @@ pub enum Block {
     Heading(String),
     /// A paragraph.
     Text(String),
+    /// A paragraph with a result, which the summary repeats, with the warnings that directly follow it.
+    Result(String),
     /// A sentence that the reader must not miss.
     Warning(String),
     /// Several such sentences, folded under a summary.
@@ -46,7 +56,7 @@ impl Block {
     /// True when it would leave an empty box on the page.
     pub fn is_empty(&self) -> bool {
         match self {
-            Self::Heading(_) | Self::Text(_) | Self::Warning(_) => false,
+            Self::Heading(_) | Self::Text(_) | Self::Result(_) | Self::Warning(_) => false,
             Self::Warnings { sentences, .. } => sentences.is_empty(),
             Self::Figures(figures) => figures.is_empty(),
             Self::Table(table) | Self::FoldedTable(table) => table.numbers.rows.is_empty(),

@@ -70,11 +70,7 @@ pub fn render_with(
 pub(crate) fn write(data: &Data, out: &Path, progress: &dyn Fn(&str)) -> Result<Summary, ReportError> {
     let out = &std::path::absolute(out).map_err(|source| ReportError::Write { path: out.to_owned(), source })?;
     check_place(out)?;
-    let mut sections = Vec::new();
-    for question in &questions::ALL {
-        progress(question.title);
-        sections.extend(question.section(data)?);
-    }
+    let mut sections = questions::sections(data, progress)?;
     name_once(&mut sections);
     progress("writing");
     let staging = Staging::beside(out)?;
@@ -134,7 +130,9 @@ impl Folder<'_> {
         match block {
             Block::Figures(figures) => figures.iter().try_for_each(|f| self.put_figure(f)),
             Block::Table(t) | Block::FoldedTable(t) => self.put_numbers(&t.id, &t.caption, &t.numbers),
-            Block::Heading(_) | Block::Text(_) | Block::Warning(_) | Block::Warnings { .. } => Ok(()),
+            Block::Heading(_) | Block::Text(_) | Block::Result(_) | Block::Warning(_) | Block::Warnings { .. } => {
+                Ok(())
+            }
         }
     }
 
@@ -173,7 +171,7 @@ fn name_once(sections: &mut [Section]) {
         match block {
             Block::Figures(figures) => figures.iter_mut().for_each(|f| rename(&mut f.id)),
             Block::Table(TableBlock { id, .. }) | Block::FoldedTable(TableBlock { id, .. }) => rename(id),
-            Block::Heading(_) | Block::Text(_) | Block::Warning(_) | Block::Warnings { .. } => {}
+            Block::Heading(_) | Block::Text(_) | Block::Result(_) | Block::Warning(_) | Block::Warnings { .. } => {}
         }
     }
 }

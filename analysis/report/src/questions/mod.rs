@@ -44,9 +44,8 @@ pub struct Question {
     pub answer: fn(&Data) -> Result<Vec<Block>, ReportError>,
 }
 
-/// All questions, in the order of the page.
-pub const ALL: [Question; 20] = [
-    summary::QUESTION,
+/// All questions but that of the summary, which comes before them, in the order of the page.
+pub const ALL: [Question; 19] = [
     failures::QUESTION,
     terrain::QUESTION,
     images::QUESTION,
@@ -68,18 +67,24 @@ pub const ALL: [Question; 20] = [
     sensitivity::QUESTION,
 ];
 
-impl Question {
-    /// The section of the page; `None` if there is no answer.
-    pub fn section(&self, data: &Data) -> Result<Option<Section>, ReportError> {
-        let mut blocks = (self.answer)(data)?;
-        blocks.retain(|block| !block.is_empty());
-        Ok((!blocks.is_empty()).then_some(Section { id: self.id, name: self.name, title: self.title, blocks }))
+/// The sections of the page; those without an answer are left out. The summary is made last, of what the others say, so that nothing is
+/// computed twice. `progress` is called with each question.
+pub fn sections(data: &Data, progress: &dyn Fn(&str)) -> Result<Vec<Section>, ReportError> {
+    let mut sections = Vec::new();
+    for question in &ALL {
+        progress(question.title);
+        let blocks = (question.answer)(data)?;
+        sections.extend(Section::of(question.id, question.name, question.title, blocks));
     }
+    progress(summary::TITLE);
+    let blocks = summary::answer(data, &sections)?;
+    sections.splice(0..0, Section::of(summary::ID, summary::NAME, summary::TITLE, blocks));
+    Ok(sections)
 }
 
 #[cfg(test)]
 mod tests {
-    use super::ALL;
+    use super::{ALL, summary};
 
     /// The manual lists the sections by the names and questions that the page has.
     #[test]
@@ -87,8 +92,9 @@ mod tests {
         let manual = std::path::Path::new(env!("CARGO_MANIFEST_DIR")).join("../../docs/report.md");
         let manual = std::fs::read_to_string(manual).unwrap();
         let sections = manual.split("\n## ").find(|part| part.starts_with("The sections\n")).unwrap();
-        for question in ALL {
-            assert!(sections.contains(question.name) && sections.contains(question.title), "{}", question.title);
+        let all = ALL.map(|question| (question.name, question.title));
+        for (name, title) in all.into_iter().chain([(summary::NAME, summary::TITLE)]) {
+            assert!(sections.contains(name) && sections.contains(title), "{title}");
         }
     }
 }

@@ -79,7 +79,7 @@ fn section(section: &Section) -> String {
 fn block(block: &Block) -> String {
     match block {
         Block::Heading(text) => format!("<h3>{}</h3>\n", escape(text)),
-        Block::Text(text) => paragraph("", text),
+        Block::Text(text) | Block::Result(text) => paragraph("", text),
         Block::Warning(text) => paragraph("warning", text),
         Block::Warnings { summary, sentences } => warnings(summary, sentences),
         Block::Figures(figures) => figure_grid(figures),

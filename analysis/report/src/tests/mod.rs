@@ -238,7 +238,7 @@ fn val_every_release_has_a_summary() {
     summary(&alone, &[has, ", relief "], "summary-relief-d2.30-");
 }
 
-/// The summary has the results of every section: starts of missions, the other release, the logs, papers.
+/// The summary has the results of every section: starts of missions, the other release, the logs, papers, with what qualifies them.
 #[test]
 fn val_the_summary_has_every_result() {
     let mut data = made_up::full(6, 24);
@@ -251,6 +251,7 @@ fn val_the_summary_has_every_result() {
         " comparisons with other, ",
         " comparisons of 1 log with groups of missions, metric by metric: ",
         " published values lie",
+        "Settings differ from those of ",
     ] {
         assert!(summary.contains(words), "{words}: {summary}");
     }
@@ -659,7 +660,7 @@ fn val_declared_claims_are_adjusted_by_family() {
     let page = &files["index.html"];
     let (first, rest) = (page.find("confirmatory").unwrap(), page.find("Everything else is exploratory").unwrap());
     assert!(first < rest && page.contains(&data.study_sha256));
-    assert!(!page.contains("no hypothesis was declared"));
+    assert!(!page.contains("declared no hypothesis"));
     let rows_of = rows(&files, "hypotheses");
     let p = |k: usize| [6, 7].map(|c| rows_of[k][c].as_f64().unwrap());
     let trends = rows(&files, "comparison-trend");

@@ -48,21 +48,20 @@ pub fn blocks<'a>(data: &'a Data, groups: &'a [Group<'a, Mission>], pairing: &Pa
     let tested = tested(data, groups, pairing);
     vec![
         Block::Heading("Declared before the run: confirmatory".into()),
-        Block::Text(in_words(&tested)),
+        Block::Result(sentence(&tested)),
         Block::Table(table(data, &tested)),
         Block::Text(introduction(data)),
     ]
 }
 
 /// The number of supported, unsupported and undecided claims, and each claim with its verdict, in a sentence.
-pub fn sentence<'a>(data: &'a Data, groups: &'a [Group<'a, Mission>], pairing: &Pairing<'a>) -> String {
-    let tested = tested(data, groups, pairing);
+fn sentence(tested: &[Tested]) -> String {
     let mut claims: Vec<String> =
         tested.iter().take(NAMED_MAX).map(|t| format!("\"{}\" ({})", t.words, t.verdict())).collect();
     if tested.len() > NAMED_MAX {
         claims.push(format!("and {} more", set::count(tested.len() - NAMED_MAX)));
     }
-    format!("{}: {}.", in_words(&tested).trim_end_matches('.'), claims.join("; "))
+    format!("{}: {}.", in_words(tested).trim_end_matches('.'), claims.join("; "))
 }
 
 /// Every hypothesis with its test, adjusted over its family.

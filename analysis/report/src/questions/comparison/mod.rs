@@ -36,20 +36,14 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// Verdict on the declared hypotheses; `None` where there is nothing to compare.
-pub(super) fn claims(data: &Data) -> Option<String> {
-    let groups = data.mission_groups();
-    let none = "The study declared no hypothesis, so every comparison of groups is exploratory.";
-    match (data.study.hypotheses.is_empty(), groups.len() > 1) {
-        (false, _) => Some(declared::sentence(data, &groups, &Pairing::among(&groups))),
-        (true, more) => more.then(|| none.to_owned()),
-    }
-}
+const UNDECLARED: &str = "The study declared no hypothesis, so every comparison of groups is exploratory.";
 
 /// All comparisons that no hypothesis of the study declares.
 fn exploratory(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> Vec<Block> {
-    let heading = |_| Block::Heading("Everything else is exploratory".into());
-    let mut blocks: Vec<Block> = data.study.hypotheses.first().map(heading).into_iter().collect();
+    let mut blocks = vec![match data.study.hypotheses.is_empty() {
+        true => Block::Result(UNDECLARED.into()),
+        false => Block::Heading("Everything else is exploratory".into()),
+    }];
     let metrics = values::metrics(groups, pairing);
     let verdicts = verdicts::verdicts(data, &metrics);
     if verdicts.iter().all(|v| v.test.is_none()) {
@@ -75,7 +69,7 @@ fn exploratory(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> Vec
 
 fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> String {
     let registered = match data.study.hypotheses.len() {
-        0 => "Exploratory: no hypothesis was declared before the run.",
+        0 => "Without a declared hypothesis, p values are only indicative.",
         _ => "Exploratory: nothing below was declared before the run, so its p values are only indicative.",
     };
     let tests = if pairing.is_common() {

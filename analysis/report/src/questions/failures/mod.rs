@@ -22,14 +22,12 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     let table =
         TableBlock { id: "failed".into(), caption: "Failed items".into(), numbers: numbers.of_all(data.failed.len()) };
-    Ok(in_words(data).map(Block::Warning).into_iter().chain([Block::Table(table)]).collect())
+    Ok(vec![Block::Warning(in_words(data.failed.len())), Block::Table(table)])
 }
 
-/// How many items failed; `None` where none did.
-pub(super) fn in_words(data: &Data) -> Option<String> {
-    match data.failed.len() {
-        0 => None,
-        1 => Some("1 item of the study failed and is missing from this report.".to_owned()),
-        n => Some(format!("{} items of the study failed and are missing from this report.", set::count(n))),
+fn in_words(failed: usize) -> String {
+    match failed {
+        1 => "1 item of the study failed and is missing from this report.".to_owned(),
+        n => format!("{} items of the study failed and are missing from this report.", set::count(n)),
     }
 }

@@ -22,7 +22,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         return Ok(Vec::new());
     }
     let mut blocks = Vec::new();
-    blocks.extend(verdict(data).map(Block::Text));
+    blocks.extend(verdict(data).map(Block::Result));
     blocks.extend(unfinished(data).map(Block::Warning));
     blocks.push(Block::Text(format!(
         "The error of a follower is its offset from its slot, along (depth) and across (width) its predecessor's direction of travel. \
@@ -94,12 +94,6 @@ fn verdict(data: &Data) -> Option<String> {
             set::counted(known.len(), "run")
         )
     })
-}
-
-/// How the teams fared; `None` without teams.
-pub(super) fn in_words(data: &Data) -> Option<String> {
-    let sentences: Vec<String> = [verdict(data), unfinished(data)].into_iter().flatten().collect();
-    (!sentences.is_empty()).then(|| sentences.join(" "))
 }
 
 /// Runs of one stage and variant in one formation.

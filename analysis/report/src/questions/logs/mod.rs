@@ -169,7 +169,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     let logs = &named(logs);
     let placed = placed(logs, &groups);
-    let mut blocks = vec![Block::Text(in_words(&placed)), Block::Text(introduction())];
+    let mut blocks = vec![Block::Result(in_words(&placed)), Block::Text(introduction())];
     blocks.extend(rates(data, logs).map(Block::Warning));
     blocks.extend(too_few(&placed).map(Block::Warning));
     let drawings = drawings(&placed);
@@ -282,14 +282,6 @@ impl Placed<'_> {
             (verdict, why) => format!("{}: {why}", verdict.words()),
         }
     }
-}
-
-/// Where the logs fall among the missions; `None` without logs, or without missions to compare them with.
-pub(super) fn result(data: &Data) -> Option<String> {
-    let groups = data.mission_groups();
-    let logs = named(data.logs.as_deref()?);
-    let placed = placed(&logs, &groups);
-    (!placed.is_empty()).then(|| verdicts(&placed))
 }
 
 /// How many comparisons have each verdict.
@@ -531,6 +523,15 @@ mod tests {
         assert!(says("6 of 7 logs are drawn; the table has all."));
         data.logs = Some(vec![log(1)]);
         assert!(!answer(&data).unwrap().iter().any(|b| matches!(b, Block::Text(text) if text.contains("drawn"))));
+    }
+
+    /// The result, which the summary repeats, states how many verdicts chance alone would give.
+    #[test]
+    fn val_the_result_states_what_chance_gives() {
+        let mut data = crate::tests::made_up::full(40, 2);
+        data.logs = Some(vec![LogRow { rms_vertical_acceleration_m_s2: 1e3, ..crate::tests::made_up::log() }]);
+        let blocks = answer(&data).unwrap();
+        assert!(matches!(&blocks[0], Block::Result(words) if words.ends_with(" by chance.")), "{:?}", blocks[0]);
     }
 
     #[test]

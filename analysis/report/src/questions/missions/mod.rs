@@ -3,14 +3,14 @@
 pub mod boxes;
 mod incidence;
 mod maps;
-pub(super) mod outcomes;
+mod outcomes;
 mod strip;
 mod survivors;
 
 use super::clusters::{Pairing, REPLICATES, in_words};
 use super::{Question, outcome};
 use crate::ReportError;
-use crate::content::{Block, Numbers, TableBlock, text};
+use crate::content::{Block, Figure, Numbers, Section, TableBlock, text};
 use crate::data::{Data, Group, Mission};
 use crate::render::number as set;
 use crate::sample::{ROWS_MAX, sample};
@@ -55,6 +55,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut figures = vec![outcomes::stacked(data, &groups)];
     figures.extend(compared.iter().filter_map(|c| boxes::figure(data, c)));
     let mut blocks = vec![
+        Block::Result(verdict(&groups)),
         Block::Text(introduction(data, &groups, &pairing, boxes::have_bands(&compared))),
         Block::Figures(figures),
         Block::Table(boxes::medians(data, &compared)),
@@ -74,15 +75,36 @@ number, the first of equals). Paths are as recorded; without a recording, the st
 const STRIPS: &str = "One mission for each of success, tipped and stuck: the one with the median vertical acceleration among those on the \
 terrains above (on all terrains if these have none). Acceleration is the second difference of the recorded height.";
 
-fn section(blocks: &mut Vec<Block>, heading: &str, words: &str, figures: Vec<crate::content::Figure>) {
+fn section(blocks: &mut Vec<Block>, heading: &str, words: &str, figures: Vec<Figure>) {
     if !figures.is_empty() {
         blocks.extend([Block::Heading(heading.into()), Block::Text(words.into()), Block::Figures(figures)]);
     }
 }
 
+/// The outcomes, as this section draws them.
+pub(super) fn picture(section: &Section) -> Vec<Figure> {
+    let figures = |block: &Block| if let Block::Figures(figures) = block { figures.first().cloned() } else { None };
+    section.blocks.iter().find_map(figures).into_iter().collect()
+}
+
+/// How the missions ended.
+fn verdict(groups: &[Group<Mission>]) -> String {
+    let all = || groups.iter().flat_map(|g| g.rows.iter().copied());
+    let terrains = all().map(|m| m.terrain_id.as_str()).collect::<BTreeSet<_>>().len();
+    let ends = outcome::counts(all());
+    let others = outcome::ALL.iter().zip(ends).skip(1).filter(|(_, n)| *n > 0);
+    let others: Vec<String> = others.map(|(o, n)| format!("{}: {}", o.name, set::count(n))).collect();
+    format!(
+        "{} of {} on {} reached the goal; {}.",
+        set::count(ends[0]),
+        set::counted(all().count(), "mission"),
+        set::counted(terrains, "terrain"),
+        if others.is_empty() { "none failed".to_owned() } else { others.join(", ") }
+    )
+}
+
 fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing, has_bands: bool) -> String {
     let missions: usize = groups.iter().map(|g| g.rows.len()).sum();
-    let goals: usize = groups.iter().map(|g| g.rows.iter().filter(|m| outcome::successful(m)).count()).sum();
     let vehicles: BTreeSet<&str> = groups.iter().flat_map(|g| g.rows.iter().map(|m| m.vehicle.as_str())).collect();
     let variants = match data.missions.len() - missions {
         0 => String::new(),
@@ -98,11 +120,9 @@ fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing, has_b
         false => "and a single terrain gives no intervals and no bands.".to_owned(),
     };
     format!(
-        "{} of {} reached the goal, driven by {}.{variants} Missions on one terrain are correlated, {intervals} Boxes are quartiles \
-         (linear between order statistics), whiskers extend to the last value within 1.5 interquartile ranges, circles lie beyond. \
+        "The missions were driven by {}.{variants} Missions on one terrain are correlated, {intervals} Boxes are quartiles (linear \
+         between order statistics), whiskers extend to the last value within 1.5 interquartile ranges, circles lie beyond. \
          Everything here is exploratory.",
-        set::count(goals),
-        set::counted(missions, "mission"),
         vehicles.into_iter().collect::<Vec<_>>().join(", "),
     )
 }

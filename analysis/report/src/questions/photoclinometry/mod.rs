@@ -14,6 +14,7 @@ use crate::ReportError;
 use crate::content::{Block, Figure};
 use crate::data::Data;
 use crate::render::number as set;
+use covariances::Pair;
 use surfaces::{Surface, all, chosen};
 
 /// Registry entry.
@@ -42,7 +43,11 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let chosen = chosen(&surfaces);
     let drawn = &chosen[..chosen.len().min(CHOSEN_MAX)];
     let pairs = covariances::pairs(data, &surfaces);
-    let mut blocks: Vec<Block> = verdict::paragraphs(drawn, &pairs).into_iter().map(Block::Text).collect();
+    let quoted = best(&surfaces).filter(|best| surfaces.len() == 1 || best.compared());
+    let others: Vec<&Surface> =
+        drawn.iter().copied().filter(|s| quoted.is_none_or(|quoted| quoted.id() != s.id())).collect();
+    let mut blocks = vec![Block::Result(in_words(surfaces.len(), quoted, &pairs))];
+    blocks.extend(verdict::paragraphs(&others, &pairs).into_iter().map(Block::Text));
     blocks.extend(left_out(&surfaces, drawn).map(Block::Text));
     blocks.extend(verdict::warnings(&surfaces).into_iter().map(Block::Warning));
     blocks.extend([Block::Text(CEILINGS.into()), Block::Table(tables::errors(&surfaces))]);
@@ -73,20 +78,20 @@ fn best<'a, 'b>(surfaces: &'b [Surface<'a>]) -> Option<&'b Surface<'a>> {
     compared.min_by(|a, b| a.row.slope_error_rms.total_cmp(&b.row.slope_error_rms)).or(surfaces.first())
 }
 
-/// How many surfaces were recovered, and how well the best; `None` without any.
-pub(super) fn in_words(data: &Data) -> Option<String> {
-    let surfaces = all(data);
-    let best = best(&surfaces)?;
-    let sentence = verdict::paragraphs(&[best], &covariances::pairs(data, &surfaces)).join(" ");
-    let recovered = format!("{} surfaces were recovered from images", set::count(surfaces.len()));
-    Some(match (surfaces.len(), best.compared()) {
-        (1, _) => format!("1 surface was recovered from images. {sentence}"),
-        (_, true) => format!("{recovered}. The one with the smallest slope error is {sentence}"),
-        (_, false) => format!("{recovered}, without a true surface to compare with."),
-    })
+/// How many surfaces were recovered, and how well the best; without it, none is compared with a true one.
+fn in_words(surfaces: usize, best: Option<&Surface>, pairs: &[Pair]) -> String {
+    let recovered = set::counted(surfaces, "surface");
+    let sentence = best.map(|best| verdict::paragraphs(&[best], pairs).join(" "));
+    match (surfaces, sentence) {
+        (1, Some(sentence)) => format!("{recovered} was recovered from images. {sentence}"),
+        (_, Some(sentence)) => {
+            format!("{recovered} were recovered from images. The one with the smallest slope error is {sentence}")
+        }
+        (_, None) => format!("{recovered} were recovered from images, without a true surface to compare with."),
+    }
 }
 
-/// That surface beside the true one; empty if the release has neither.
+/// The best surface beside the true one; empty if the release has neither.
 pub(super) fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
     best(&all(data)).map_or(Ok(Vec::new()), |surface| maps::both(data, surface))
 }

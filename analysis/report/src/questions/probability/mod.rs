@@ -59,7 +59,11 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         return Ok(Vec::new());
     }
     let drawn = &groups[..groups.len().min(GROUPS_MAX)];
-    let mut blocks = vec![Block::Text(introduction(&groups)), Block::Figures(drawn.iter().map(histogram).collect())];
+    let mut blocks = vec![
+        Block::Result(mixed(&groups)),
+        Block::Text(introduction(&groups)),
+        Block::Figures(drawn.iter().map(histogram).collect()),
+    ];
     let known: Vec<&Split> = drawn.iter().filter(|g| g.shares.is_some()).collect();
     if !known.is_empty() {
         blocks.extend([
@@ -85,12 +89,6 @@ and line could predict it. Estimates of small components can be negative; they a
 const NO_COMPONENTS: &str = "The variance of the outcomes is not split into terrains, missions and starts: that takes several terrains with several \
 missions each.";
 
-/// How many missions with several starts had more than one result; `None` without any.
-pub(super) fn in_words(data: &Data) -> Option<String> {
-    let groups = groups(data);
-    (!groups.is_empty()).then(|| format!("{}.", mixed(&groups)))
-}
-
 /// Missions with several starts, and how many of them had more than one result.
 fn mixed(groups: &[Split]) -> String {
     let missions: usize = groups.iter().map(|g| g.missions.len()).sum();
@@ -105,7 +103,7 @@ fn mixed(groups: &[Split]) -> String {
             set::count(n)
         ),
     };
-    format!("Of {} with several starts, {mixed}", set::counted(missions, "mission"))
+    format!("Of {} with several starts, {mixed}.", set::counted(missions, "mission"))
 }
 
 fn introduction(groups: &[Split]) -> String {
@@ -118,8 +116,7 @@ fn introduction(groups: &[Split]) -> String {
         false => String::new(),
     };
     format!(
-        "{}. They were driven from {} starts in all, the drawn one and slightly perturbed ones.{intervals}",
-        mixed(groups),
+        "The missions were driven from {} starts in all, the drawn one and slightly perturbed ones.{intervals}",
         set::count(starts)
     )
 }

@@ -43,18 +43,11 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         paper.title,
         in_words(&pairing)
     );
-    let mut blocks: Vec<Block> = verdict(&rows).map(Block::Text).into_iter().collect();
+    let mut blocks: Vec<Block> = verdict(&rows, &paper.authors).map(Block::Result).into_iter().collect();
     blocks.extend(difference(data, &paper).map(Block::Warning));
     blocks.push(Block::Text(introduction));
     blocks.push(Block::Table(table(data, &paper, &rows)));
     Ok(blocks)
-}
-
-/// How many of the published values lie in our band, with the authors; `None` without a paper or a band.
-pub(super) fn result(data: &Data) -> Option<String> {
-    let paper = papers::applicable(data)?;
-    let words = verdict(&rows(data, &paper, &Pairing::of(data)))?;
-    Some(format!("{} ({}).", words.trim_end_matches('.'), paper.authors))
 }
 
 /// How the numbers of terrains and missions differ from the paper's, in a sentence; `None` if they do not.
@@ -67,8 +60,9 @@ fn difference(data: &Data, paper: &Paper) -> Option<String> {
         && per_terrain.iter().all(|n| *n == paper.missions_per_terrain);
     (!same).then(|| {
         format!(
-            "Settings differ: this release has {} per group and {} per terrain, the paper {} and {}. \
-             The differences below are therefore not a verdict on the paper.",
+            "Settings differ from those of {}: this release has {} per group and {} per terrain, the paper {} and {}. \
+             The differences are therefore not a verdict on the paper.",
+            paper.authors,
             counted(span(&terrains), "terrain"),
             counted(span(&per_terrain), "mission"),
             paper.terrains_per_group,
@@ -262,14 +256,14 @@ fn share(terrain: &TerrainRow, column: &str) -> f64 {
 }
 
 /// How many of the published values are inside, in a sentence; `None` without a band.
-fn verdict(rows: &[Row]) -> Option<String> {
+fn verdict(rows: &[Row], authors: &str) -> Option<String> {
     let known: Vec<bool> = rows.iter().filter_map(Row::inside).collect();
     let inside = known.iter().filter(|i| **i).count();
     let all = set::count(known.len());
     (!known.is_empty()).then(|| match inside {
-        0 => format!("None of {all} published values lies inside our sampling band."),
-        1 => format!("1 of {all} published values lies inside our sampling band."),
-        n => format!("{} of {all} published values lie inside our sampling band.", set::count(n)),
+        0 => format!("None of {all} published values lies inside our sampling band ({authors})."),
+        1 => format!("1 of {all} published values lies inside our sampling band ({authors})."),
+        n => format!("{} of {all} published values lie inside our sampling band ({authors}).", set::count(n)),
     })
 }
 

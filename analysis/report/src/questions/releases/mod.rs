@@ -28,7 +28,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         blocks.push(Block::Warning("The releases have no group in common.".into()));
         return Ok(blocks);
     }
-    blocks.splice(0..0, [Block::Text(in_words(&quantities, &other.name))]);
+    blocks.splice(0..0, [Block::Result(in_words(&quantities, &other.name))]);
     blocks.push(Block::Table(table(&quantities, in_each(data, &other.data))));
     Ok(blocks)
 }
@@ -39,13 +39,6 @@ fn compare(data: &Data, other: &Against) -> (Vec<Quantity>, [Vec<String>; 2]) {
     let streams = Streams::for_seed(0, releases::STREAMS);
     let settings = Settings { margin: MARGIN, alpha: ALPHA };
     releases::compare(&metrics(&other.data), &metrics(data), settings, &streams)
-}
-
-/// How many quantities differ from those of the other release; `None` without one, or if they have no group in common.
-pub(super) fn result(data: &Data) -> Option<String> {
-    let other = data.against.as_ref()?;
-    let (quantities, _) = compare(data, other);
-    (!quantities.is_empty()).then(|| in_words(&quantities, &other.name))
 }
 
 fn metrics(data: &Data) -> Metrics {

@@ -29,7 +29,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     if data.routes.is_empty() {
         return Ok(blocks);
     }
-    blocks.extend(verdict(&methods, &ratios).map(Block::Text));
+    blocks.push(Block::Result(in_words(data, &methods, &ratios)));
     blocks.extend(missing(data).map(Block::Warning));
     blocks.push(Block::Table(summary(data, &methods)));
     blocks.push(Block::Figures(lanes::figures(data, &methods, &ratios)));
@@ -49,9 +49,8 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     Ok(blocks)
 }
 
-/// How many searches found a route, how long the routes are, and how the methods compare; `None` without routes.
-pub(super) fn in_words(data: &Data) -> Option<String> {
-    let methods = methods(&data.routes);
+/// How many searches found a route, how long the routes are, and how the methods compare.
+fn in_words(data: &Data, methods: &[Method], ratios: &[ratios::Ratio]) -> String {
     let reached: Vec<&RouteRow> = data.routes.iter().filter(|r| found(r)).collect();
     let searches =
         if data.routes.len() == 1 { "1 search".into() } else { format!("{} searches", set::count(data.routes.len())) };
@@ -62,8 +61,10 @@ pub(super) fn in_words(data: &Data) -> Option<String> {
         false => String::new(),
     };
     let counts = format!("{} of {searches}{by} found a route{length}.", set::count(reached.len()));
-    let compared = verdict(&methods, &ratios::ratios(data, &methods));
-    (!data.routes.is_empty()).then(|| [Some(counts), compared].into_iter().flatten().collect::<Vec<_>>().join(" "))
+    match verdict(methods, ratios) {
+        Some(compared) => format!("{counts} {compared}"),
+        None => counts,
+    }
 }
 
 /// The first map of routes; empty if the release has none.

@@ -33,7 +33,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     if sets.is_empty() {
         return Ok(effects::blocks(data));
     }
-    let mut blocks = vec![Block::Text(verdict(&sets))];
+    let mut blocks = vec![Block::Result(verdict(&sets))];
     blocks.extend(few_worlds(&sets).map(Block::Warning));
     blocks.extend(no_way(&sets).map(Block::Warning));
     blocks.extend(off_ground(&sets).map(Block::Warning));
@@ -76,13 +76,6 @@ const ALIKE: &str = "Rovers on one world share its rocks and often a goal. The i
 Searle's interval, exact for normal values). The design effect is the factor by which it increases the variance of a mean (Kish, 1965).";
 const EFFORT: &str = "Contacts are rocks higher than the clearance that passed under the rover; centre contacts are those under its centre line. Means are over all rovers, including \
 those that were stopped.";
-
-/// How far the rovers got, and how that compares with published trials; `None` without rovers.
-pub(super) fn in_words(data: &Data) -> Option<String> {
-    let sets = sets::plain(data);
-    let compared = published::in_words(data, &sets).map_or_else(String::new, |words| format!(" {words}"));
-    (!sets.is_empty()).then(|| format!("{}{compared}", verdict(&sets)))
-}
 
 /// The first map of tracks; empty if the release has none.
 pub(super) fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {

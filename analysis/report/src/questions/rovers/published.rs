@@ -50,13 +50,6 @@ pub fn trial(data: &Data, set: &Set) -> Option<PublishedTrial> {
     found.cloned()
 }
 
-/// How many of the published values lie in their band; `None` where no set repeats a trial of the paper, or without a band.
-pub fn in_words(data: &Data, sets: &[Set]) -> Option<String> {
-    let known: Vec<(&Set, PublishedTrial)> = sets.iter().filter_map(|s| Some((s, trial(data, s)?))).collect();
-    let rows: Vec<Row> = known.iter().flat_map(|(set, trial)| rows(set, trial)).collect();
-    verdict(&rows)
-}
-
 /// Text, warnings and a table; empty where no set repeats a trial of the paper.
 pub fn blocks(data: &Data, sets: &[Set]) -> Vec<Block> {
     let known: Vec<(&Set, PublishedTrial)> = sets.iter().filter_map(|s| Some((s, trial(data, s)?))).collect();
@@ -66,8 +59,8 @@ pub fn blocks(data: &Data, sets: &[Set]) -> Vec<Block> {
     }
     let title = jpl::trials().map_or_else(String::new, |t| t.title);
     let mut blocks = vec![Block::Heading("Published trials".into())];
-    blocks.extend(verdict(&rows).map(Block::Text));
-    blocks.extend(known.iter().filter_map(|(set, trial)| difference(set, trial)).map(Block::Warning));
+    blocks.extend(verdict(&rows).map(Block::Result));
+    blocks.extend(differences(&known).map(Block::Warning));
     blocks.push(Block::Text(format!(
         "The paper ({title}) drove its rovers on one world. Worlds differ, so its values are compared with those of one simulated world: the band holds the value of one \
          more world with {} % probability (Student's prediction interval of the worlds' logarithms). The interval of our own value is that of the mean over worlds, \
@@ -102,13 +95,23 @@ fn verdict(rows: &[Row]) -> Option<String> {
     })
 }
 
-/// A warning where our worlds have another number of rovers than the paper's, and hence another scatter.
+/// A warning where our worlds have other numbers of rovers than the paper's, and hence another scatter; `None` where none has.
+fn differences(known: &[(&Set, PublishedTrial)]) -> Option<String> {
+    let all: Vec<String> = known.iter().filter_map(|(set, trial)| difference(set, trial)).collect();
+    (!all.is_empty()).then(|| {
+        format!(
+            "{} With fewer rovers, worlds scatter more and their extremes are less extreme, so this comparison is not a test.",
+            all.join(" ")
+        )
+    })
+}
+
+/// How the numbers of rovers on the worlds of a set differ from the paper's; `None` if they do not.
 fn difference(set: &Set, trial: &PublishedTrial) -> Option<String> {
     let other = set.worlds.iter().filter(|w| w.rovers.len() != trial.rovers).count();
     (other > 0).then(|| {
         format!(
-            "{}: the paper has {} rovers on its world, but {}. With fewer rovers, worlds scatter more and their \
-             extremes are less extreme, so this comparison is not a test.",
+            "{}: the paper has {} rovers on its world, but {}.",
             set.name,
             set_number::count(trial.rovers),
             match (other, set.worlds.len()) {

@@ -1,86 +1,89 @@
-//! The results in a few sentences and a picture; the rest of the page is the evidence.
+//! The results in a few sentences and a picture; the rest of the page is the evidence. It is made after the other sections, whose results it
+//! repeats.
 
 mod made;
 
-use super::missions::outcomes;
-use super::{
-    Question, comparison, failures, formations, images, logs, outcome, photoclinometry, probability, published,
-    releases, routes, rovers, terrain, texture, thesis,
-};
+use super::{images, missions, photoclinometry, routes, rovers, terrain, texture};
 use crate::ReportError;
-use crate::content::{Block, Figure};
+use crate::content::{Block, Figure, Section};
 use crate::data::Data;
-use crate::render::number as set;
-use std::collections::BTreeSet;
 
-/// Registry entry.
-pub const QUESTION: Question = Question { id: "summary", name: "Summary", title: "What are the results?", answer };
+/// Anchor on the page.
+pub const ID: &str = "summary";
+/// Name in the list of sections.
+pub const NAME: &str = "Summary";
+/// Heading.
+pub const TITLE: &str = "What are the results?";
 
-fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let made = [made::in_words(data), photoclinometry::in_words(data), routes::in_words(data)];
-    let driven = [missions(data), probability::in_words(data), formations::in_words(data), rovers::in_words(data)];
-    let compared = [releases::result(data), logs::result(data), published::result(data), thesis::in_words(data)];
-    let judged = [comparison::claims(data), texture::in_words(data), failures::in_words(data)];
-    let all = made.into_iter().chain(driven).chain(compared).chain(judged);
-    let mut blocks: Vec<Block> = all.flatten().map(Block::Text).collect();
+/// What the release has, what the sections found, and a picture.
+pub fn answer(data: &Data, sections: &[Section]) -> Result<Vec<Block>, ReportError> {
+    let said = made::in_words(data).into_iter().chain(sections.iter().filter_map(results));
+    let mut blocks: Vec<Block> = said.map(Block::Text).collect();
     if !blocks.is_empty() {
-        blocks.push(Block::Figures(picture(data)?));
+        blocks.push(Block::Figures(picture(data, sections)?));
     }
     Ok(blocks)
 }
 
-/// How the missions ended.
-fn missions(data: &Data) -> Option<String> {
-    let groups = data.mission_groups();
-    let all: Vec<_> = groups.iter().flat_map(|g| g.rows.iter().copied()).collect();
-    let terrains = all.iter().map(|m| m.terrain_id.as_str()).collect::<BTreeSet<_>>().len();
-    let ends = outcome::counts(all.iter().copied());
-    let others: Vec<String> = outcome::ALL
-        .iter()
-        .zip(ends)
-        .skip(1)
-        .filter(|(_, n)| *n > 0)
-        .map(|(o, n)| format!("{}: {}", o.name, set::count(n)))
-        .collect();
-    let failed = if others.is_empty() { "none failed".to_owned() } else { others.join(", ") };
-    (!all.is_empty()).then(|| {
-        format!(
-            "{} of {} on {} reached the goal; {failed}.",
-            set::count(ends[0]),
-            set::counted(all.len(), "mission"),
-            set::counted(terrains, "terrain")
-        )
-    })
+/// The results of a section, each with the warnings that directly follow it, after the warnings that the section begins with; `None` without any.
+fn results(section: &Section) -> Option<String> {
+    let mut follows = true;
+    let told = section.blocks.iter().filter_map(|block| {
+        let words = match block {
+            Block::Result(words) => Some(words.as_str()),
+            Block::Warning(words) if follows => Some(words.as_str()),
+            _ => None,
+        };
+        follows = words.is_some();
+        words
+    });
+    let told: Vec<&str> = told.collect();
+    (!told.is_empty()).then(|| told.join(" "))
 }
 
-/// Pictures of one part of a release, as its section has them; none where the release lacks that part.
-type Pictures = fn(&Data) -> Result<Vec<Figure>, ReportError>;
-
-/// The first of these that a release has is its picture: results before surfaces.
-const PICTURES: [Pictures; 7] = [
-    of_missions,
-    routes::picture,
-    rovers::picture,
-    texture::side_by_side,
-    photoclinometry::picture,
-    images::picture,
-    terrain::picture,
-];
-
-/// The outcomes of the missions; none without missions.
-fn of_missions(data: &Data) -> Result<Vec<Figure>, ReportError> {
-    let groups = data.mission_groups();
-    Ok(if groups.is_empty() { Vec::new() } else { vec![outcomes::stacked(data, &groups)] })
-}
-
-/// The picture of a release; none if it has no rasters and no missions.
-fn picture(data: &Data) -> Result<Vec<Figure>, ReportError> {
-    for pictures in PICTURES {
-        let mut figures = pictures(data)?;
+/// The picture of a release, as its section has it: results before surfaces. None if it has no rasters and no missions.
+fn picture(data: &Data, sections: &[Section]) -> Result<Vec<Figure>, ReportError> {
+    let of_section = |id: &str, pictures: fn(&Section) -> Vec<Figure>| {
+        Ok(sections.iter().find(|section| section.id == id).map_or_else(Vec::new, pictures))
+    };
+    let all: [&dyn Fn() -> Result<Vec<Figure>, ReportError>; 7] = [
+        &|| of_section(missions::QUESTION.id, missions::picture),
+        &|| routes::picture(data),
+        &|| rovers::picture(data),
+        &|| of_section(texture::QUESTION.id, texture::side_by_side),
+        &|| photoclinometry::picture(data),
+        &|| images::picture(data),
+        &|| terrain::picture(data),
+    ];
+    for pictures in all {
+        let mut figures = pictures()?;
         if !figures.is_empty() {
             figures.iter_mut().for_each(|figure| figure.id = format!("summary-{}", figure.id));
             return Ok(figures);
         }
     }
     Ok(Vec::new())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Results are repeated with the warnings that qualify them; texts and later warnings are not.
+    #[test]
+    fn val_results_are_repeated_with_their_warnings() {
+        let [result, warning, text] = [Block::Result, Block::Warning, Block::Text];
+        let of = |blocks: Vec<Block>| results(&Section { id: "s", name: "", title: "", blocks });
+        let words = |block: fn(String) -> Block, words: &str| block(words.into());
+        let blocks = vec![
+            words(warning, "w1"),
+            words(result, "r1"),
+            words(warning, "w2"),
+            words(text, "t"),
+            words(warning, "w3"),
+            words(result, "r2"),
+        ];
+        assert_eq!(of(blocks).as_deref(), Some("w1 r1 w2 r2"));
+        assert_eq!(of(vec![words(text, "t"), words(warning, "w")]), None);
+    }
 }

@@ -14,7 +14,7 @@ use super::Question;
 use super::curves::{self, Curve};
 use super::sql::quoted;
 use crate::ReportError;
-use crate::content::{Block, Figure, Numbers, TableBlock, slug};
+use crate::content::{Block, Figure, Numbers, Section, TableBlock, slug};
 use crate::data::{self, Data};
 use crate::render::chart::Plot;
 use crate::render::number as set;
@@ -33,11 +33,12 @@ pub const QUESTION: Question =
 
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let textures = in_order(data);
-    let mut blocks = Vec::new();
-    let drawn = &textures[..textures.len().min(TEXTURES_DRAWN)];
-    for one in drawn {
-        blocks.extend(of_texture(data, one)?);
-    }
+    let first = &textures[..textures.len().min(TEXTURES_DRAWN)];
+    // The result begins the section, so the first texture needs no answer of its own.
+    let of_place = |(place, one)| of_texture(data, one, place > 0);
+    let drawn = first.iter().enumerate().map(of_place).collect::<Result<Vec<_>, _>>()?;
+    let mut blocks: Vec<Block> = in_words(&textures).map(Block::Result).into_iter().collect();
+    blocks.extend(drawn.into_iter().flatten());
     if textures.len() > TEXTURES_DRAWN {
         blocks.push(Block::Text(format!(
             "{TEXTURES_DRAWN} of {} textures are drawn: one of each group before a second one, and first those that do not match the measured \
@@ -46,7 +47,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         )));
     }
     let methods: BTreeSet<&str> =
-        drawn.iter().filter(|one| one.verdict.is_some()).map(|one| one.texture.kind.as_str()).collect();
+        first.iter().filter(|one| one.verdict.is_some()).map(|one| one.texture.kind.as_str()).collect();
     if !methods.is_empty() {
         blocks.push(Block::Heading("How the answers are reached".into()));
         blocks.extend(verdict::method(&methods).map(Block::Text));
@@ -56,14 +57,16 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
 }
 
 /// The answer on a texture, its figures and its table; nothing where the release has no figure of it.
-fn of_texture(data: &Data, one: &Judged<'_>) -> Result<Vec<Block>, ReportError> {
+fn of_texture(data: &Data, one: &Judged<'_>, with_answer: bool) -> Result<Vec<Block>, ReportError> {
     let rows = figures(data, one.texture)?;
     if rows.iter().all(Vec::is_empty) {
         return Ok(Vec::new());
     }
     let mut blocks = vec![Block::Heading(heading(one.texture))];
     let question = "Does it match the measured surface?";
-    blocks.extend(one.verdict.iter().map(|(_, sentence)| Block::Text(format!("{question} {sentence}"))));
+    blocks.extend(
+        one.verdict.iter().filter(|_| with_answer).map(|(_, sentence)| Block::Text(format!("{question} {sentence}"))),
+    );
     blocks.extend(rows.into_iter().map(Block::Figures));
     blocks.extend(alone(one.texture).map(|fit| Block::Table(figures::table(data, one.texture, &fit))));
     Ok(blocks)
@@ -108,17 +111,17 @@ fn synthesised(texture: &TerrainRow) -> String {
 
 /// Whether the textures match the measured surfaces: their numbers, and the sentence on the first that is drawn, which does not match if any
 /// does not. `None` if none can be compared.
-pub(super) fn in_words(data: &Data) -> Option<String> {
-    let judged = in_order(data).into_iter().filter_map(|one| one.verdict.map(|v| (one.texture, v.0, v.1)));
-    let answers: Vec<(&TerrainRow, Answer, String)> = judged.collect();
-    let worst = answers.first()?;
-    let quoted = format!("Does texture {} match the surface it was fitted to? {}", worst.0.terrain_id, worst.2);
+fn in_words(textures: &[Judged<'_>]) -> Option<String> {
+    let judged = |one: &Judged<'_>| one.verdict.as_ref().map(|(answer, _)| *answer);
+    let answers: Vec<Answer> = textures.iter().filter_map(judged).collect();
+    let (id, sentence) = textures.iter().find_map(|one| Some((&one.texture.terrain_id, &one.verdict.as_ref()?.1)))?;
+    let quoted = format!("Does texture {id} match the surface it was fitted to? {sentence}");
     let kinds = [
         (Answer::Yes, "1 matches", "match"),
         (Answer::No, "1 does not match", "do not match"),
         (Answer::CannotTell, "1 is undecided", "are undecided"),
     ];
-    let part = |(answer, one, many): (Answer, &str, &str)| match answers.iter().filter(|a| a.1 == answer).count() {
+    let part = |(answer, one, many): (Answer, &str, &str)| match answers.iter().filter(|a| **a == answer).count() {
         0 => None,
         1 => Some(one.to_owned()),
         n => Some(format!("{} {many}", set::count(n))),
@@ -134,12 +137,13 @@ pub(super) fn in_words(data: &Data) -> Option<String> {
     })
 }
 
-/// The first texture that is drawn and was not added to a surface, next to the residual of its fit if it has one; empty if the release has none.
-pub(super) fn side_by_side(data: &Data) -> Result<Vec<Figure>, ReportError> {
-    let first = in_order(data).into_iter().map(|one| one.texture).find(|texture| base(texture).is_none());
-    let of =
-        |texture: &TerrainRow| pictures::patches(data, texture, &data::parameter(texture, "fit").unwrap_or_default());
-    first.map_or(Ok(Vec::new()), of)
+/// The first drawn texture that was not added to a surface, next to the residual of its fit if it has one; empty without one.
+pub(super) fn side_by_side(section: &Section) -> Vec<Figure> {
+    let patches = |block: &Block| match block {
+        Block::Figures(figures) => figures.iter().filter(|f| pictures::is_patch(f)).cloned().collect(),
+        _ => Vec::new(),
+    };
+    section.blocks.iter().map(patches).find(|patches: &Vec<Figure>| !patches.is_empty()).unwrap_or_default()
 }
 
 fn heading(texture: &TerrainRow) -> String {
@@ -375,7 +379,7 @@ mod tests {
 
     fn texts_of(blocks: &[Block]) -> String {
         let text = |block: &Block| match block {
-            Block::Heading(text) | Block::Text(text) => Some(text.clone()),
+            Block::Heading(text) | Block::Text(text) | Block::Result(text) => Some(text.clone()),
             _ => None,
         };
         blocks.iter().filter_map(text).collect::<Vec<_>>().join("\n")
@@ -438,7 +442,7 @@ mod tests {
         let blocks = blocks(params, |_| ());
         let texts = texts_of(&blocks);
         assert!(
-            texts.contains("on the background of jacksboro-corrected") && texts.contains("Does it match"),
+            texts.contains("on the background of jacksboro-corrected") && texts.contains("Does texture texture match"),
             "{texts}"
         );
         let figures = figures_of(&blocks);
@@ -447,7 +451,7 @@ mod tests {
         assert!(figures.iter().all(|f| !f.id.starts_with("tiles-")));
     }
 
-    /// Every texture has its answer, but how answers are reached is said once, at the end.
+    /// Every texture has its answer, the first at the beginning of the section, but how answers are reached is said once, at the end.
     #[test]
     fn val_the_method_is_stated_once() {
         let blocks = blocks(r#"{"fit":"jacksboro-corrected"}"#, |data| {
@@ -464,7 +468,8 @@ mod tests {
             }
         });
         let texts = texts_of(&blocks);
-        assert_eq!(texts.matches("Does it match the measured surface?").count(), 3, "{texts}");
+        assert_eq!(texts.matches(" match the surface it was fitted to?").count(), 1, "{texts}");
+        assert_eq!(texts.matches("Does it match the measured surface?").count(), 2, "{texts}");
         assert_eq!(texts.matches("The probability of a wrong yes").count(), 1, "{texts}");
         let order =
             ["Texture v", "How the answers are reached", "Textures of fft_ma are", "Textures of wavelet_statistics"];

@@ -80,6 +80,11 @@ pub fn patches(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Vec<Figur
     Ok(figures)
 }
 
+/// True for one of these two.
+pub fn is_patch(figure: &Figure) -> bool {
+    ["measured-", "synthetic-"].iter().any(|what| figure.id.starts_with(what))
+}
+
 /// The heights of a texture, without the background that it may lie on, and words for what was removed.
 fn without_background(data: &Data, texture: &TerrainRow) -> Result<Option<(Grid, String)>, ReportError> {
     let Some(grid) = data.files.grid(&texture.path)? else { return Ok(None) };

@@ -78,12 +78,6 @@ impl Row {
     }
 }
 
-/// How many of the published ratios lie between ours; `None` without any to compare.
-pub(super) fn in_words(data: &Data) -> Option<String> {
-    let words = verdict(&all_rows(data, &bayrak::applicable(data)?))?;
-    Some(format!("{} (Bayrak, 2008).", words.trim_end_matches('.')))
-}
-
 /// Routes, then formations, as far as we have values.
 fn all_rows(data: &Data, thesis: &Thesis) -> Vec<Row> {
     let mut rows = route_rows(data, thesis);
@@ -98,7 +92,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     if rows.is_empty() {
         return Ok(Vec::new());
     }
-    let mut blocks: Vec<Block> = verdict(&rows).map(Block::Text).into_iter().collect();
+    let mut blocks: Vec<Block> = verdict(&rows).map(Block::Result).into_iter().collect();
     blocks.push(Block::Text(introduction(&thesis)));
     blocks.push(Block::Figures([SHARE, SMOOTHED, DEPTH, WIDTH].into_iter().filter_map(|q| figure(&rows, q)).collect()));
     blocks.extend(tables(&rows));
@@ -114,7 +108,7 @@ fn verdict(rows: &[Row]) -> Option<String> {
     };
     (!known.is_empty()).then(|| {
         format!(
-            "{} of {} published ratios lie{} between our smallest and largest value{open}.",
+            "{} of {} published ratios lie{} between our smallest and largest value{open} (Bayrak, 2008).",
             if inside == 0 { "None".into() } else { set::count(inside) },
             set::count(known.len()),
             if inside < 2 { "s" } else { "" }
