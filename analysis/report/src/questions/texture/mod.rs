@@ -37,15 +37,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     // The result begins the section, so the first texture needs no answer of its own.
     let of_place = |(place, one)| of_texture(data, one, place > 0);
     let drawn = first.iter().enumerate().map(of_place).collect::<Result<Vec<_>, _>>()?;
+    let count = drawn.iter().filter(|blocks| !blocks.is_empty()).count();
     let mut blocks: Vec<Block> = in_words(&textures).map(Block::Result).into_iter().collect();
     blocks.extend(drawn.into_iter().flatten());
-    if textures.len() > TEXTURES_DRAWN {
-        blocks.push(Block::Text(format!(
-            "{TEXTURES_DRAWN} of {} textures are drawn: one of each group before a second one, and first those that do not match the measured \
-             surface. The table lists all.",
-            set::count(textures.len())
-        )));
-    }
+    blocks.extend(left_out(count, textures.len()).map(Block::Text));
     let methods: BTreeSet<&str> =
         first.iter().filter(|one| one.verdict.is_some()).map(|one| one.texture.kind.as_str()).collect();
     if !methods.is_empty() {
@@ -54,6 +49,23 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     }
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
+}
+
+/// How many of the textures are drawn; `None` if all or none are.
+fn left_out(drawn: usize, all: usize) -> Option<String> {
+    let order = if all > TEXTURES_DRAWN {
+        ": one of each group before a second one, and first those that do not match the measured surface"
+    } else {
+        ""
+    };
+    (0 < drawn && drawn < all).then(|| {
+        format!(
+            "{} of {} {} drawn{order}. The table lists all.",
+            set::count(drawn),
+            set::counted(all, "texture"),
+            if drawn == 1 { "is" } else { "are" }
+        )
+    })
 }
 
 /// The answer on a texture, its figures and its table; nothing where the release has no figure of it.
@@ -433,6 +445,20 @@ mod tests {
         assert_eq!(ids, ["holes-texture", "filled-texture"]);
         assert!(!blocks.iter().any(|block| matches!(block, Block::Table(_))));
         assert!(texts_of(&blocks).starts_with("Texture texture in the holes of jacksboro"), "{}", texts_of(&blocks));
+    }
+
+    /// Textures are counted as drawn if the release has figures of them.
+    #[test]
+    fn val_textures_without_figures_are_not_counted_as_drawn() {
+        let blocks = blocks(r#"{"fit":{"model":"exponential"}}"#, |data| {
+            let texture = data.of_stage("texture").next().unwrap().clone();
+            data.terrains.push(TerrainRow { terrain_id: "u".into(), path: "texture/u.tif".into(), ..texture });
+        });
+        let texts = texts_of(&blocks);
+        assert!(texts.contains("1 of 2 textures is drawn. The table lists all."), "{texts}");
+        assert_eq!([left_out(2, 2), left_out(0, 2)], [None, None]);
+        let four = left_out(TEXTURES_DRAWN, 12).unwrap();
+        assert!(four.starts_with("4 of 12 textures are drawn: one of each group before a second one"), "{four}");
     }
 
     /// A texture on the background of a fit is compared; the curves are those of the residuals alone.
