@@ -11,8 +11,13 @@ use sastrugi_schemas::tables::FitRow;
 const LEVEL: f64 = 0.01;
 /// Standard errors by which fits at other windows may differ.
 const WINDOWS_Z: f64 = 2.58;
-/// Ratio of ranges, and of distances of correlation (Str), above which anisotropy is called slight, whatever its p value.
+/// Ratio of the fitted ranges above which anisotropy is called slight, whatever its p value, if Str says so too.
 const SLIGHT_RATIO: f64 = 0.9;
+/// Str above which it does. Str is the shortest over the longest distance, so it is below 1 for isotropic ground, too: in 200 simulated normal fields
+/// with isotropic exponential covariance, detrended by a moving average of 10 ranges, 95 % had at least 0.68, 0.86 and 0.91 on sites of 20, 40 and 80
+/// ranges a side (by a plane 0.62, 0.81 and 0.89). A threshold of 0.9 would refuse a third to a half of the isotropic sites of 40 ranges. Of fields whose
+/// ranges have a ratio of 0.8, four in ten pass 0.8; at a ratio of 0.7 none of 120 does.
+const SLIGHT_STR: f64 = 0.8;
 /// Ratio of block sigmas below which their spread is called slight, whatever its p value.
 const SLIGHT_SPREAD: f64 = 1.2;
 /// Width of an interval, high over low, beyond which a parameter is called poorly known.
@@ -196,7 +201,8 @@ pub fn direction(data: &Data, fit: &FitRow) -> Option<String> {
         return Some(format!("No anisotropy was detected ({}).", p_value(p)));
     }
     let measured = data.surface(&fit.fit_id).map(|s| s.aspect_ratio).filter(|ratio| *ratio > 0.0);
-    let is_slight = fit.isotropy_ratio >= SLIGHT_RATIO && measured.is_none_or(|ratio| ratio >= SLIGHT_RATIO);
+    // Without Str, the measured correlation does not fall to 0.2 in every direction: nothing says that the anisotropy is slight.
+    let is_slight = fit.isotropy_ratio >= SLIGHT_RATIO && measured.is_some_and(|ratio| ratio >= SLIGHT_STR);
     let measured = measured.map_or_else(String::new, |ratio| {
         format!(
             "; the measured correlation falls to 0.2 at distances that differ by a factor of {} (Str = {})",
@@ -349,7 +355,8 @@ mod tests {
         assert_eq!((table.rows.len(), names), (3, vec!["parameter", "estimate", "low", "high", "uncorrected"]));
     }
 
-    /// Anisotropy is slight only if neither the fitted ranges nor the measured correlation differ much by direction.
+    /// Anisotropy is slight only if neither the fitted ranges nor the measured correlation differ much by direction. Str is below 1 by chance, and unknown
+    /// where the correlation stays high in some direction.
     #[test]
     fn val_slight_anisotropy_is_slight_in_both() {
         let mut data = made_up::full(1, 24);
@@ -363,9 +370,10 @@ mod tests {
         assert!(
             said(0.668).contains("1.11 times the range across; the measured correlation falls to 0.2 at distances")
         );
-        assert!(said(0.95).starts_with("The residual is slightly anisotropic"));
+        assert!(said(0.79).starts_with("The residual is anisotropic"), "{}", said(0.79));
+        assert!(said(0.81).starts_with("The residual is slightly anisotropic"), "{}", said(0.81));
         let unknown = said(f64::NAN);
-        assert!(unknown.contains("slightly") && unknown.ends_with("1.11 times the range across."), "{unknown}");
+        assert!(!unknown.contains("slightly") && unknown.ends_with("1.11 times the range across."), "{unknown}");
     }
 
     /// What is fitted and tested beside a measured covariance is named.
