@@ -88,6 +88,18 @@ pub fn counted(n: usize, word: &str) -> String {
     sastrugi_schemas::counted(count(n), word)
 }
 
+/// Words as a list: `a`, `a and b`, `a, b and c`; empty without any.
+pub fn listed<S: AsRef<str>>(words: &[S]) -> String {
+    match words {
+        [] => String::new(),
+        [only] => only.as_ref().to_owned(),
+        [first @ .., last] => {
+            let first: Vec<&str> = first.iter().map(S::as_ref).collect();
+            format!("{} and {}", first.join(", "), last.as_ref())
+        }
+    }
+}
+
 /// A file size in decimal units.
 pub fn bytes(n: u64) -> String {
     let units = ["kB", "MB", "GB", "TB"];
@@ -168,6 +180,8 @@ mod tests {
         assert_eq!(count(1_234_567_i64), "1\u{202f}234\u{202f}567");
         assert_eq!(count(-1_i64), ABSENT);
         assert_eq!((counted(1, "terrain"), counted(2, "terrain")), ("1 terrain".into(), "2 terrains".into()));
+        let lists = ["", "a", "a b", "a b c"].map(|words| listed(&words.split_whitespace().collect::<Vec<_>>()));
+        assert_eq!(lists, ["", "a", "a and b", "a, b and c"]);
         assert_eq!(bytes(8_123_456), "8.12 MB");
         assert_eq!(percent(0.875, 1), "87.5 %");
         assert_eq!(unit("m/s2"), "m/s²");

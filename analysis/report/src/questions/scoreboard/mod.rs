@@ -102,7 +102,7 @@ fn share(error: f64) -> String {
 }
 
 fn names(curves: &[&Curve<'_>]) -> String {
-    curves.iter().map(|(score, _)| score.method.as_str()).collect::<Vec<_>>().join(" and ")
+    set::listed(&curves.iter().map(|(score, _)| score.method.as_str()).collect::<Vec<_>>())
 }
 
 /// A sentence on the targets if they differ.
@@ -260,6 +260,8 @@ mod tests {
             said(&[("cholesky", 1e-15, 0.9), ("fft_ma", 0.0, 0.9), ("gaussians", 0.187, 0.9)]),
             "cholesky and fft_ma come closest to the target covariance: the largest errors are below 0.0001 % of the variance."
         );
+        let three = said(&[("cholesky", 0.0, 0.9), ("fft_ma", 0.0, 0.9), ("gaussians", 0.0, 0.9)]);
+        assert!(three.starts_with("cholesky, fft_ma and gaussians come closest"), "{three}");
         let only = said(&[("fft_ma", 0.00079, 0.1731), ("wavelet_statistics", f64::NAN, 0.00348)]);
         assert!(
             only.starts_with("The largest error of fft_ma is 0.079 % of the variance. Not ranked, because"),

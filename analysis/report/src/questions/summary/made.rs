@@ -16,9 +16,7 @@ pub fn in_words(data: &Data) -> Option<String> {
     ];
     let others = others.into_iter().filter(|(n, _)| *n > 0).map(|(n, what)| set::counted(n, what));
     let parts: Vec<String> = terrains(data).into_iter().chain(others).collect();
-    let (last, first) = parts.split_last()?;
-    let list = if first.is_empty() { last.clone() } else { format!("{} and {last}", first.join(", ")) };
-    Some(format!("The release has {list}."))
+    (!parts.is_empty()).then(|| format!("The release has {}.", set::listed(&parts)))
 }
 
 /// Generated terrains with the ranges of their slope and relief; `None` where there are none.

@@ -120,7 +120,7 @@ pub fn method(methods: &BTreeSet<&str>) -> [String; 2] {
     );
     let shown = MEANINGS.iter().filter_map(|(names, meaning)| {
         let named: Vec<&str> = names.iter().copied().filter(|name| methods.contains(name)).collect();
-        (!named.is_empty()).then(|| format!("Textures of {} {meaning}.", named.join(" and ")))
+        (!named.is_empty()).then(|| format!("Textures of {} {meaning}.", set::listed(&named)))
     });
     let shown: Vec<String> = shown.collect();
     let split = "`sastrugi compare DEM --split-half` judges a texture on ground that was not used in the fit.";
