@@ -32,7 +32,9 @@ pub fn blocks(data: &Data, metrics: &[Metric], pairing: &Pairing) -> Vec<Block> 
         .collect();
     let left_out = match constant[..] {
         [] => String::new(),
-        _ => format!(" No power is given for what does not vary here: {}.", constant.join(", ")),
+        _ => {
+            format!(" No power is given without scatter between terrains or between missions: {}.", constant.join(", "))
+        }
     };
     let units = if pairing.is_common() { "blocks of paired terrains" } else { "terrains in each of two groups" };
     let [of_blocks, of_both] = match pairing.is_common() {
