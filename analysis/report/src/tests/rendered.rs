@@ -68,7 +68,7 @@ fn val_blank_terrains_are_counted() {
     let (files, summary) = report(&data);
     assert_sound(&files);
     assert!(summary.figures.iter().all(|f| !f.starts_with("rendered-elaborate")), "{:?}", summary.figures);
-    let words = "2 terrains would look blank, because their brightness varies by less than 10 % in pixels of this size: elaborate (2).";
+    let words = "2 terrains would look blank, because the brightness in their pictures varies by less than 10 %: elaborate (2).";
     assert!(files["index.html"].contains(words));
 }
 

@@ -83,9 +83,9 @@ fn left_blank(terrains: &[&TerrainRow]) -> Option<String> {
     let groups: Vec<String> = groups.into_iter().map(|(group, n)| format!("{} ({})", group.1, set::count(n))).collect();
     (!terrains.is_empty()).then(|| {
         format!(
-            "{} would look blank, because {} brightness varies by less than {} in pixels of this size: {}.",
+            "{} would look blank, because the brightness in {} varies by less than {}: {}.",
             set::counted(terrains.len(), "terrain"),
-            if terrains.len() == 1 { "its" } else { "their" },
+            if terrains.len() == 1 { "its picture" } else { "their pictures" },
             set::percent(CONTRAST_MIN, 0),
             groups.join(", ")
         )
