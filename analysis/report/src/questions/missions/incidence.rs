@@ -60,7 +60,7 @@ pub fn blocks(data: &Data, groups: &[Group<Mission>]) -> Vec<Block> {
             " Bands are pointwise {} % intervals from {REPLICATES} bootstrap samples of whole terrains{fewer}.",
             set::fixed(100.0 * LEVEL, 0)
         ),
-        false => " One terrain gives no intervals, so there are no bands.".to_owned(),
+        false => " With one terrain in each group there are no bands.".to_owned(),
     };
     let words = format!(
         "The curves give the share of missions that have failed up to a distance along their line, by cause: competing risks, \

@@ -117,7 +117,7 @@ fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing, has_b
              values.",
             in_words(pairing)
         ),
-        false => "and a single terrain gives no intervals and no bands.".to_owned(),
+        false => "so with one terrain in each group there are no intervals and no bands.".to_owned(),
     };
     format!(
         "The missions were driven by {}.{variants} Missions on one terrain are correlated, {intervals} Boxes are quartiles (linear \
