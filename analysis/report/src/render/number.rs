@@ -43,20 +43,22 @@ pub fn significant(value: f64, digits: usize) -> String {
     }
 }
 
-/// Units of quantities of which a billionth is rounding noise, as columns state them.
+/// Magnitude below which values of these units are rounding noise. Smooth ground has a σ²/b below 1e-9 m, which is not (σ 0.1 mm, b 20 m).
+const NOISE: f64 = 1e-11;
+/// Units of quantities that have rounding noise, as columns state them.
 const WITH_NOISE: [&str; 9] = ["1", "%", "points", "m", "s", "m/s", "m/s2", "deg", "deg/s"];
 
-/// The value, or 0 where it is below a billionth of its unit: rounding noise. Powers (m², m⁴) may be that small, and so may numbers without a unit,
+/// The value, or 0 where it is below 1e-11 of its unit: rounding noise. Powers (m², m⁴) may be that small, and so may numbers without a unit,
 /// such as p: they stay as they are.
 ///
 /// ```
 /// use sastrugi_report::render::number::without_noise;
 ///
-/// assert_eq!([3e-15, 2e-9].map(|v| without_noise(v, "m")), [0.0, 2e-9]);
+/// assert_eq!([1.1e-12, 5e-10].map(|v| without_noise(v, "m")), [0.0, 5e-10]);
 /// assert_eq!(["m2", ""].map(|unit| without_noise(3e-15, unit)), [3e-15; 2]);
 /// ```
 pub fn without_noise(value: f64, unit: &str) -> f64 {
-    if value.abs() < 1e-9 && WITH_NOISE.contains(&unit) { 0.0 } else { value }
+    if value.abs() < NOISE && WITH_NOISE.contains(&unit) { 0.0 } else { value }
 }
 
 /// As [`significant`], without trailing zeros of a decimal fraction.
