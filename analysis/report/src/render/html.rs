@@ -222,12 +222,13 @@ impl Column {
 
 /// The columns of a table as printed: the two ends of an interval share one.
 fn columns(numbers: &Numbers) -> Vec<Column> {
-    let intervals = (0..numbers.columns.len()).filter(|&i| ends(numbers, i).is_some()).count();
+    // An interval that says nothing else is named after its estimate where there are several.
+    let unnamed = (0..numbers.columns.len()).filter(|&i| ends(numbers, i).is_some_and(|name| name == INTERVAL)).count();
     let mut columns: Vec<Column> = Vec::new();
     let mut at = 0;
     while let Some(own) = numbers.columns.get(at) {
         let (is_interval, name) = match ends(numbers, at) {
-            Some(name) if name == INTERVAL && intervals > 1 => (true, format!("{}, {INTERVAL}", before(numbers, at))),
+            Some(name) if name == INTERVAL && unnamed > 1 => (true, format!("{}, {INTERVAL}", before(numbers, at))),
             Some(name) => (true, name),
             None => (false, own.name.clone()),
         };
@@ -253,14 +254,15 @@ fn ends(numbers: &Numbers, column: usize) -> Option<String> {
     let name = match (low.name.as_str(), high.name.as_str()) {
         // Without an estimate of the same unit before them, they are the ends of a range.
         ("low", "high") => estimate.filter(|e| e.unit == low.unit).map(|_| INTERVAL.to_owned()),
-        ("low, %", "high, %") => Some("interval, %".into()),
         ("band, 5 %", "band, 95 %") => Some("band, 5 to 95 %".into()),
         ("smallest", "largest") => Some("smallest to largest".into()),
-        (low, high) => low.strip_suffix(", low").zip(high.strip_suffix(", high")).and_then(|(name, other)| {
-            let of_one_world =
-                if name == "one world" { "band of one world".into() } else { format!("{name}, {INTERVAL}") };
-            (name == other).then_some(of_one_world)
-        }),
+        ("one world, low", "one world, high") => Some("band of one world".into()),
+        // "shift, low" says of what, "low, blocks" of which kind.
+        (low, high) => match (low.strip_suffix(", low"), low.strip_prefix("low, ")) {
+            (Some(of), _) if high.strip_suffix(", high") == Some(of) => Some(format!("{of}, {INTERVAL}")),
+            (_, Some(kind)) if high.strip_prefix("high, ") == Some(kind) => Some(format!("{INTERVAL}, {kind}")),
+            _ => None,
+        },
     };
     name.filter(|_| low.unit == high.unit)
 }
@@ -476,6 +478,10 @@ mod tests {
         let two = [("a", "1"), ("low", "1"), ("high", "1"), ("b", "m"), ("low", "m"), ("high", "m")];
         assert_eq!(names(&two), ["a", "a, interval", "b", "b, interval"]);
         assert_eq!(names(&[("shift, low", ""), ("shift, high", "")]), ["shift, interval"]);
+        let of_fit = [("estimate", "m"), ("low", "m"), ("high", "m"), ("low, blocks", "m"), ("high, blocks", "m")];
+        assert_eq!(names(&of_fit), ["estimate", "interval", "interval, blocks"]);
+        let kinds = [("low, %", ""), ("high, %", ""), ("low, a", ""), ("high, b", "")];
+        assert_eq!(names(&kinds), ["interval, %", "low, a", "high, b"]);
         assert_eq!(names(&[("band, 5 %", "m"), ("band, 95 %", "m")]), ["band, 5 to 95 %"]);
         assert_eq!(names(&[("cell_y_m", "m"), ("low", ""), ("high", "")]), ["cell_y_m", "low", "high"]);
         let mut numbers = Numbers::new("", &[("a", ""), ("low", ""), ("high", "")]);
