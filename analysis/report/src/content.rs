@@ -117,7 +117,7 @@ pub struct Numbers {
     pub columns: Vec<Heading>,
     /// Rows, each as long as `columns`.
     pub rows: Vec<Vec<Cell>>,
-    /// True if the rows of a column have different units, so that each number is set with its own digits.
+    /// True if the rows of a column measure different things, which other columns name: decimals are equal for each of these.
     pub mixed: bool,
     /// Number of rows of which these are a random sample; `None` if these are all.
     pub sampled_of: Option<usize>,
@@ -161,7 +161,7 @@ impl Numbers {
         Self { gives: Gives::File, ..Self::new(path, columns) }
     }
 
-    /// The same for rows that have different units.
+    /// The same for rows that measure different things.
     pub fn with_mixed_units(self) -> Self {
         Self { mixed: true, ..self }
     }

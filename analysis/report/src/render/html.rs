@@ -275,9 +275,9 @@ fn numeric(numbers: &Numbers, column: usize) -> bool {
 }
 
 /// Names of the columns whose words tell what the numbers of a row measure.
-const MEASURES: [&str; 5] = ["metric", "quantity", "ratio", "measure", "unit"];
+const MEASURES: [&str; 6] = ["metric", "quantity", "parameter", "ratio", "measure", "unit"];
 
-/// What the numbers of a row measure, where rows differ in it: by the columns that name it, otherwise by the first one.
+/// What the numbers of a row measure, where rows differ in it, in the words of the columns that name it.
 fn measure<'a>(numbers: &Numbers, row: &'a [Cell]) -> Vec<&'a str> {
     if !numbers.mixed {
         return Vec::new();
@@ -287,8 +287,7 @@ fn measure<'a>(numbers: &Numbers, row: &'a [Cell]) -> Vec<&'a str> {
         _ => None,
     };
     let names = numbers.columns.iter().zip(row).filter(|(heading, _)| MEASURES.contains(&heading.name.as_str()));
-    let named: Vec<&str> = names.filter_map(|(_, cell)| words(cell)).collect();
-    if named.is_empty() { row.first().and_then(words).into_iter().collect() } else { named }
+    names.filter_map(|(_, cell)| words(cell)).collect()
 }
 
 /// Decimals of every column, for each measure: numbers of one column and measure have the same.
@@ -501,8 +500,15 @@ mod tests {
         for (metric, median) in [("time", 14.7), ("time", 26.73), ("p", 0.05)] {
             numbers.row([Cell::Text(metric.into()), figure(median)]);
         }
-        let table = table(&numbers, "c");
-        assert!([">14.70<", ">26.73<", ">0.05<"].iter().all(|cell| table.contains(cell)), "{table}");
+        let printed = table(&numbers, "c");
+        assert!([">14.70<", ">26.73<", ">0.05<"].iter().all(|cell| printed.contains(cell)), "{printed}");
+        // Of one unit, but not of one magnitude; the first column names what has the parameters.
+        let mut numbers = Numbers::new("", &[("fit", ""), ("parameter", ""), ("estimate", "m")]).with_mixed_units();
+        for (parameter, estimate) in [("σ", 0.0521), ("σ", 0.13), ("b", 640.0), ("b", 12.5)] {
+            numbers.row([Cell::Text("f".into()), Cell::Text(parameter.into()), figure(estimate)]);
+        }
+        let printed = table(&numbers, "c");
+        assert!([">0.0521<", ">0.1300<", ">640.0<", ">12.5<"].iter().all(|cell| printed.contains(cell)), "{printed}");
     }
 
     /// Labels of cards may be broken after underscores, as headings are.

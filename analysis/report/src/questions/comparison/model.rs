@@ -52,7 +52,7 @@ fn table(data: &Data, groups: &[Group<Mission>]) -> Option<TableBlock> {
     ];
     let counts = "terrain_id, count(*) filter (where outcome = 'success') as successes, count(*) as missions";
     let query = format!("{} group by all", sql::missions(data, counts, None));
-    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(query, &columns);
     for (g, group) in groups.iter().enumerate().skip(1) {
         let weights: Vec<f64> = (0..groups.len()).map(|k| unit(k == g)).collect();
         let term = format!("{} versus {}", group.name, groups[0].name);

@@ -141,7 +141,7 @@ fn table(data: &Data) -> TableBlock {
     ];
     let query = "select formation, \"group\", stage_id, variant, outcome, depth_error_m, width_error_m, worst_depth_error_m, worst_width_error_m, \
                  in_range, tolerable, least_separation_m, waits, dodges, squeezed, time_s from 'tables/formations/*.parquet'";
-    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(query, &columns);
     for Set { name, runs } in sets(data) {
         let mut groups: BTreeMap<Natural, Vec<&FormationRow>> = BTreeMap::new();
         runs.iter().for_each(|r| groups.entry(natural(r.group.as_deref().unwrap_or("all"))).or_default().push(r));

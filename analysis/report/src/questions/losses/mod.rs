@@ -182,7 +182,7 @@ fn table(data: &Data, losses: &[Loss]) -> TableBlock {
         ("outcome", ""),
     ];
     let query = "select terrain_id, run_id, event, time_s, kind, member, text from 'tables/formation_events/*.parquet' where kind in ('lost', 'rearranged')";
-    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(query, &columns);
     for loss in losses {
         let known = loss.run.spacing_m > 0.0;
         let before = match loss.in_tolerance_before().filter(|_| known) {

@@ -24,8 +24,7 @@ const ERRORS: [Column; 9] = [
 pub fn errors(surfaces: &[Surface]) -> TableBlock {
     let columns: Vec<(&str, &str)> =
         [("recovered", ""), ("setting", ""), ("truth", "")].into_iter().chain(ERRORS.map(|c| (c.0, c.1))).collect();
-    let mut numbers =
-        Numbers::computed("select * from 'tables/photoclinometry/*.parquet'", &columns).with_mixed_units();
+    let mut numbers = Numbers::computed("select * from 'tables/photoclinometry/*.parquet'", &columns);
     for surface in surfaces {
         let row = surface.row;
         let head = [text(surface.id()), text(row.variant.as_deref().unwrap_or_default()), text(&row.surface_id)];
@@ -54,8 +53,7 @@ pub fn inversions(surfaces: &[Surface]) -> TableBlock {
         ("noise / assumed noise", "1"),
         ("mean albedo", "1"),
     ];
-    let mut numbers =
-        Numbers::computed("select * from 'tables/photoclinometry/*.parquet'", &columns).with_mixed_units();
+    let mut numbers = Numbers::computed("select * from 'tables/photoclinometry/*.parquet'", &columns);
     let whole = |n: i64| count(n.max(0) as usize);
     for surface in surfaces {
         let row = surface.row;

@@ -152,7 +152,7 @@ fn summary(data: &Data, methods: &[Method]) -> TableBlock {
     ];
     let query = "select \"group\", stage_id, variant, method, outcome, free_cells, vertices, edges, expansions, search_cost_m, path_cost_m, \
                  smoothed_cost_m from 'tables/routes/*.parquet'";
-    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(query, &columns);
     for (group, routes) in groups(data) {
         for method in methods {
             let rows: Vec<&RouteRow> = routes.iter().copied().filter(|r| method.holds(r)).collect();

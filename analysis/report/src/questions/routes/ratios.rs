@@ -113,7 +113,7 @@ pub fn table(ratios: &[Ratio]) -> TableBlock {
     let shown: Vec<bool> = columns.iter().map(|c| is_shown(c.0)).collect();
     let columns: Vec<(&str, &str)> = columns.into_iter().filter(|c| is_shown(c.0)).collect();
     let query = "select \"group\", terrain_id, pair_id, stage_id, variant, outcome, smoothed_cost_m, expansions from 'tables/routes/*.parquet'";
-    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(query, &columns);
     for r in ratios {
         let end = |i: &Option<Interval>, of: fn(&Interval) -> f64| number(i.as_ref().map_or(f64::NAN, of));
         let costs = || r.pairs.iter().map(|p| p.cost);

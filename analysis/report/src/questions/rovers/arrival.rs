@@ -184,7 +184,7 @@ fn budgets(curves: &[Curve]) -> TableBlock {
         ("over the straight line", "1"),
         ("note", ""),
     ];
-    let mut numbers = Numbers::computed(QUERY, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(QUERY, &columns);
     for curve in curves {
         let straight = sums::mean(&curve.set.rovers().map(|r| r.straight_m).collect::<Vec<_>>());
         let limit = curve.set.rovers().map(|r| r.distance_limit_m).fold(f64::NEG_INFINITY, f64::max);

@@ -287,7 +287,7 @@ pub fn effort(sets: &[Set]) -> TableBlock {
     ];
     let query = "select terrain_id, rover_id, \"group\", stage_id, variant, distance_m, time_s, cycles, turns, turned_deg, reversals, hazards, contacts, \
                  centre_contacts, max_tilt_deg, rms_pitch_rate_deg_s from 'tables/rovers/*.parquet'";
-    let mut numbers = Numbers::computed(query, &columns).with_mixed_units();
+    let mut numbers = Numbers::computed(query, &columns);
     for set in sets {
         let mean = |of: fn(&RoverRow) -> f64| number(set.mean(of, LEVEL).value);
         let [contacts, low, high] = contacts(set).map(number);
