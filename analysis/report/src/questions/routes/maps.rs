@@ -26,9 +26,10 @@ pub const LIGHT: Paint = Paint::Fixed([0xff, 0xff, 0xff]);
 /// Dashes by number, so that nothing depends on colour alone.
 const DASHES: [&str; 6] = ["", "7 3", "2 3", "9 3 2 3", "5 2 1 2 1 2", "1 4"];
 
-/// Line by number on a picture.
+/// Line by number on a picture. Each time the colours have been through, they have the next dashes: the first 36 lines differ.
 pub fn track(index: usize) -> Stroke {
-    Stroke::new(Paint::Fixed(SERIES[index % SERIES.len()]), 1.9).dashed(DASHES[index % DASHES.len()])
+    let dash = DASHES[(index + index / SERIES.len()) % DASHES.len()];
+    Stroke::new(Paint::Fixed(SERIES[index % SERIES.len()]), 1.9).dashed(dash)
 }
 
 /// The same in a legend, which follows the theme.
@@ -175,7 +176,15 @@ fn draw_ends(map: &mut Map, route: &RouteRow) {
 
 #[cfg(test)]
 mod tests {
-    use super::words;
+    use super::{track, words};
+    use std::collections::BTreeSet;
+
+    /// Colours repeat after six lines; colour and dashes together do not.
+    #[test]
+    fn val_many_lines_are_told_apart() {
+        let lines: BTreeSet<String> = (0..36).map(|k| format!("{:?} {}", track(k).paint, track(k).dash)).collect();
+        assert_eq!(lines.len(), 36);
+    }
 
     #[test]
     fn val_maps_are_counted_where_there_are_several() {

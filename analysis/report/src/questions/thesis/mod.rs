@@ -2,6 +2,7 @@
 
 use super::Question;
 use super::missions::boxes::capital;
+use super::routes::maps::legend_track;
 use super::routes::methods::{found, geometric_mean, methods};
 use crate::ReportError;
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, slug, text};
@@ -56,7 +57,7 @@ struct Row {
     of: String,
     paper: f64,
     origin: String,
-    /// Number of the colour of a method in the section on routes; `None` for a formation.
+    /// Number of the line of a method in the section on routes; `None` for a formation.
     colour: Option<usize>,
     /// Terrain and value.
     ours: Vec<(String, f64)>,
@@ -231,7 +232,7 @@ fn figure(rows: &[Row], quantity: Quantity) -> Option<Figure> {
         detail: format!("n = {}", g.iter().map(|r| r.ours.len()).max().unwrap_or(0)),
     };
     let labels: Vec<RowLabel> = groups.iter().map(label).collect();
-    let line = |i: usize| Stroke::new(Paint::Series(i), 3.0);
+    let line = |i: usize| Stroke { width: 3.0, ..legend_track(i) };
     let colour = |name: &str| {
         let own = rows.iter().find(|row| row.of == name).and_then(|row| row.colour);
         own.unwrap_or_else(|| names.iter().position(|other| *other == name).unwrap_or(0))
@@ -269,7 +270,7 @@ fn draw(drawn: &mut Rows, y: f64, row: &Row, stroke: Stroke) {
         drawn.svg.segment((from - 1.0, y), (to + 1.0, y), stroke.faint(0.6));
     }
     if let Some(x) = axis.at(row.mean()) {
-        drawn.svg.segment((x, y - 6.0), (x, y + 6.0), Stroke { width: 2.4, ..stroke });
+        drawn.svg.segment((x, y - 6.0), (x, y + 6.0), Stroke { width: 2.4, dash: "", ..stroke });
     }
     if let Some(x) = axis.at(row.paper) {
         drawn.svg.symbol(Symbol::Diamond, (x, y), 4.8, Paint::Paper);
