@@ -35,11 +35,20 @@ pub const QUESTION: Question =
 /// Measured DEMs that are drawn; the table has the fits of all.
 const DEMS_MAX: usize = 4;
 
+/// Ids of the measured DEMs with a fit.
+fn fitted(data: &Data) -> BTreeSet<&str> {
+    data.fits.iter().map(|f| f.dem_id.as_str()).collect()
+}
+
+/// Those that are drawn.
+pub(super) fn drawn(data: &Data) -> BTreeSet<&str> {
+    fitted(data).into_iter().take(DEMS_MAX).collect()
+}
+
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
-    let dems: BTreeSet<&str> = data.fits.iter().map(|f| f.dem_id.as_str()).collect();
     let mut blocks = Vec::new();
-    for dem in dems.iter().take(DEMS_MAX) {
-        let fits: Vec<&FitRow> = data.fits.iter().filter(|f| f.dem_id == *dem).collect();
+    for dem in drawn(data) {
+        let fits: Vec<&FitRow> = data.fits.iter().filter(|f| f.dem_id == dem).collect();
         blocks.push(Block::Heading(format!("DEM {dem}")));
         for fit in &fits {
             let file = file(data, fit)?;
@@ -55,6 +64,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
         blocks.push(Block::FoldedTable(parameters(dem, &fits)));
         blocks.push(Block::Figures(maps(data, dem, &fits)?));
     }
+    let dems = fitted(data);
     if dems.len() > DEMS_MAX {
         blocks.push(Block::Text(format!(
             "The first {DEMS_MAX} of {} DEMs are shown above; the table lists the fits of all.",

@@ -32,8 +32,9 @@ const GROUPS_MAX: usize = 12;
 fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let groups = data.terrain_groups();
     if groups.is_empty() {
-        let figures = Block::Figures(reliefs::of_dems(data)?);
-        return Ok(vec![figures, Block::FoldedTable(surfaces(data))]);
+        let mut blocks = reliefs::of_dems(data)?;
+        blocks.push(Block::FoldedTable(surfaces(data)));
+        return Ok(blocks);
     }
     let drawn = &groups[..groups.len().min(GROUPS_MAX)];
     let mut blocks = vec![Block::Text(introduction(&groups)), Block::Table(medians(&groups))];

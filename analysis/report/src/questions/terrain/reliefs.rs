@@ -3,8 +3,9 @@
 
 use super::{GROUPS_MAX, GROUPS_WITH_THREE, by_slope, median, shape, shapes};
 use crate::ReportError;
-use crate::content::{Figure, slug};
+use crate::content::{Block, Figure, slug};
 use crate::data::{Data, Group};
+use crate::questions::covariance;
 use crate::questions::relief::{Style, Words, exaggeration_words, middle_range, relief};
 use crate::render::number as set;
 use sastrugi_imaging::hillshade::exaggeration;
@@ -27,17 +28,26 @@ pub fn figures(data: &Data, families: &[Vec<Group<TerrainRow>>]) -> Result<Vec<F
     Ok(figures)
 }
 
-/// The measured DEMs that no fit draws, each in its own light and colours.
-pub fn of_dems(data: &Data) -> Result<Vec<Figure>, ReportError> {
-    let fitted = |t: &&TerrainRow| data.fits.iter().any(|fit| fit.dem_id == t.terrain_id);
+/// The measured DEMs that the section on fits does not draw, each in its own light and colours, and how many there are if not all are drawn.
+pub fn of_dems(data: &Data) -> Result<Vec<Block>, ReportError> {
+    let beside_fits = covariance::drawn(data);
+    let dems: Vec<&TerrainRow> =
+        data.of_stage("dem").filter(|t| !beside_fits.contains(t.terrain_id.as_str())).collect();
     let mut figures = Vec::new();
-    for dem in data.of_stage("dem").filter(|t| !fitted(t)).take(GROUPS_MAX) {
+    for dem in dems.iter().copied().take(GROUPS_MAX) {
         let choice = (dem, dem.terrain_id.clone(), "measured");
         let Some(style) = style(data, &[&choice])? else { continue };
         let words = Words { title: format!("Measured DEM {}.", dem.terrain_id), ..words(&choice, style) };
         figures.extend(relief(data, &dem.path, Some(style), words)?);
     }
-    Ok(figures)
+    let left_out = (dems.len() > GROUPS_MAX).then(|| {
+        let others = if beside_fits.is_empty() { "" } else { "other " };
+        format!(
+            "The first {GROUPS_MAX} of {} {others}measured DEMs are drawn; the table has all.",
+            set::count(dems.len())
+        )
+    });
+    Ok(left_out.map(Block::Text).into_iter().chain([Block::Figures(figures)]).collect())
 }
 
 fn in_one_style(data: &Data, choices: &[&Choice]) -> Result<Vec<Figure>, ReportError> {
@@ -80,4 +90,30 @@ fn words((terrain, group, why): &Choice, style: Style) -> Words {
     );
     let id = slug(&format!("relief-{}", terrain.terrain_id));
     Words { id, title: format!("Group {group}."), caption }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::tests::made_up;
+    use sastrugi_schemas::tables::FitRow;
+
+    /// The section on fits draws four DEMs; a fifth one, and others without a fit, are drawn here, twelve at most.
+    #[test]
+    fn val_dems_that_fits_do_not_draw_are_drawn() {
+        let mut data = made_up::full(1, 24);
+        let drawn = |data: &Data| match of_dems(data).unwrap().pop() {
+            Some(Block::Figures(figures)) => figures.len(),
+            _ => 0,
+        };
+        assert_eq!(drawn(&data), 0);
+        let fit = data.fits[0].clone();
+        data.fits.extend(["a", "b", "c", "d"].map(|dem| FitRow { dem_id: dem.into(), ..fit.clone() }));
+        assert_eq!((drawn(&data), of_dems(&data).unwrap().len()), (1, 1));
+        let dem = data.of_stage("dem").next().unwrap().clone();
+        data.terrains.extend((0..12).map(|k| TerrainRow { terrain_id: format!("other-{k}"), ..dem.clone() }));
+        let words = "The first 12 of 13 other measured DEMs are drawn; the table has all.";
+        assert!(matches!(&of_dems(&data).unwrap()[0], Block::Text(text) if text == words));
+        assert_eq!(drawn(&data), 12);
+    }
 }
