@@ -162,8 +162,7 @@ fn covariance(data: &Data, fit: &FitRow, bins: &[&CovarianceRow], (x, y): (Axis,
     let close = 0.01 * bins.iter().map(|b| b.model_m2.abs()).fold(0.0, f64::max);
     let same = bins.iter().all(|b| (b.model_m2 - b.surface_model_m2).abs() <= close);
     let mut legend = vec![(Mark::Symbol(Symbol::Disc, Paint::Ink), "measured (area: pairs)".to_owned())];
-    let banded = bins.iter().any(|b| b.covariance_low_m2.is_finite());
-    if banded {
+    if has_band(bins) {
         legend.push((Mark::Line(BAND), "95 % (jackknife)".into()));
     }
     let name = beside.unwrap_or("model");
@@ -193,13 +192,18 @@ fn covariance(data: &Data, fit: &FitRow, bins: &[&CovarianceRow], (x, y): (Axis,
         let limit = verdict::at_bound(file.as_ref(), name);
         limit.unwrap_or_else(|| format!("{name} = {}", set::with_unit(value, 3, "m")))
     };
-    plot.note(0, &format!("{of}{}", value("σ", fit.sigma_m)));
-    plot.note(1, &value("b", fit.range_m));
+    let parameters = [value("σ", fit.sigma_m), value("b", fit.range_m)];
+    plot.note(0, &format!("{of}{}", parameters[0]));
+    plot.note(1, &parameters[1]);
     let above = surface_high(bins);
     if above > plot.y.range().1 {
         plot.note(2, &format!("surface: {}, above the frame", set::with_unit(above, 3, "m²")));
     }
-    Ok(figure(id, fit, bins, plot, banded, beside))
+    Ok(figure(id, fit, bins, plot, beside, &parameters))
+}
+
+fn has_band(bins: &[&CovarianceRow]) -> bool {
+    bins.iter().any(|b| b.covariance_low_m2.is_finite())
 }
 
 /// Bars at the bins.
@@ -216,27 +220,34 @@ fn draw_bins(plot: &mut Plot, bins: &[&CovarianceRow]) {
     }
 }
 
-fn figure(id: String, fit: &FitRow, bins: &[&CovarianceRow], plot: Plot, banded: bool, beside: Option<&str>) -> Figure {
+/// The figure; `parameters` are σ and b of the model in words.
+fn figure(
+    id: String,
+    fit: &FitRow,
+    bins: &[&CovarianceRow],
+    plot: Plot,
+    beside: Option<&str>,
+    parameters: &[String],
+) -> Figure {
     let pairs = bins.iter().map(|b| b.pairs);
     let (fewest, most) = (pairs.clone().min().unwrap_or(0), pairs.max().unwrap_or(0));
-    let band = if banded { " Bars are 95 % intervals from a jackknife over tiles of the site." } else { "" };
+    let band = if has_band(bins) { " Bars are 95 % intervals from a jackknife over tiles of the site." } else { "" };
     let model = match beside {
-        None => format!("{} model", fit.model),
-        Some(name) => format!("which textures have, and the {name} model that extends it to longer waves"),
+        None => format!(", {} model", fit.model),
+        Some(name) => format!("; textures have this covariance, extended to longer waves by the {name} model"),
     };
     let caption = format!(
-        "Covariance of the residual after a moving average of {} × {} m, {model}; {} to {} pairs of cells in a bin.{band}",
+        "Covariance of the residual after a moving average of {} × {} m{model}; {} to {} pairs of cells in a bin.{band}",
         set::significant(fit.window_x_m, 3),
         set::significant(fit.window_y_m, 3),
         set::count(fewest),
         set::count(most)
     );
     let description = format!(
-        "Covariance against lag in {} bins with the fitted {} model: standard deviation {}, range {}.",
+        "Covariance against lag in {} bins with the fitted {} model: {}.",
         bins.len(),
         beside.unwrap_or(&fit.model),
-        set::with_unit(fit.sigma_m, 3, "m"),
-        set::with_unit(fit.range_m, 3, "m")
+        parameters.join(", ")
     );
     let names = [
         "bin",
@@ -372,26 +383,29 @@ mod tests {
         let (mut data, mut shelf) = made_up::parts(1, 24);
         let drawn = |data: &Data| {
             let figure = covariances(data, &[&data.fits[0]]).unwrap().remove(0);
-            (figure.svg.finish("x", "t", "d"), figure.caption)
+            (figure.svg.finish("x", "t", "d"), figure.caption, figure.description)
         };
-        let (svg, caption) = drawn(&data);
+        let (svg, caption, description) = drawn(&data);
         assert!(
             svg.contains("model, detrended")
                 && svg.contains(">σ = 21.0 m<")
                 && caption.contains(" m, exponential model; ")
+                && description.ends_with("with the fitted exponential model: σ = 21.0 m, b = 640 m.")
         );
         data.fits[0].model = EMPIRICAL.into();
-        let (svg, caption) = drawn(&data);
+        let (svg, caption, _) = drawn(&data);
         for part in ["exponential, detrended", "exponential of the surface", ">exponential: σ = 21.0 m<", ">b = 640 m<"]
         {
             assert!(svg.contains(part), "{part}");
         }
-        assert!(caption.contains("which textures have, and the exponential model that extends it"), "{caption}");
+        let words = " m; textures have this covariance, extended to longer waves by the exponential model; ";
+        assert!(caption.contains(words), "{caption}");
         let file = shelf.fits.get_mut("fit/jacksboro-corrected.json").unwrap();
         file.diagnostics.range_at_search_bound = true;
         file.parameters = [("sigma_m".to_owned(), 21.0), ("range_m".to_owned(), 640.0)].into();
         data.files = Box::new(shelf);
-        let (svg, _) = drawn(&data);
+        let (svg, _, description) = drawn(&data);
         assert!(svg.contains(">exponential: σ not identified<") && svg.contains(">b not identified<"));
+        assert!(description.ends_with("exponential model: σ not identified, b not identified."), "{description}");
     }
 }
