@@ -2,7 +2,7 @@
 
 use super::{amplitude, background};
 use crate::ReportError;
-use crate::content::{Figure, slug};
+use crate::content::{Figure, Numbers, slug};
 use crate::data::Data;
 use crate::questions::relief::{
     Style, Words, deviations, exaggeration_words, limit_m, middle_range, relief, relief_of,
@@ -77,12 +77,22 @@ pub fn patches(data: &Data, texture: &TerrainRow, fit: &str) -> Result<Vec<Figur
     let caption = format!("{}{removed} about its mean, {ground}{scaled}{alike}.", texture.terrain_id);
     let around = words(texture, "synthetic", "Synthetic.", caption);
     figures.extend(deviations(&synthetic, &texture.path, limit, "no data", around)?);
+    figures.iter_mut().for_each(|figure| name_about_mean(&mut figure.numbers));
     Ok(figures)
 }
 
 /// True for one of these two.
 pub fn is_patch(figure: &Figure) -> bool {
     ["measured-", "synthetic-"].iter().any(|what| figure.id.starts_with(what))
+}
+
+/// Names the ends of heights about their mean as such: the file has other heights.
+fn name_about_mean(numbers: &mut Numbers) {
+    for heading in &mut numbers.columns {
+        if matches!(heading.name.as_str(), "low_m" | "high_m") {
+            heading.name = heading.name.replace("_m", "_about_mean_m");
+        }
+    }
 }
 
 /// The heights of a texture, without the background that it may lie on, and words for what was removed.
@@ -151,7 +161,7 @@ mod tests {
             let column = figure.numbers.columns.iter().position(|c| c.name == name).unwrap();
             if let sastrugi_schemas::Cell::F64(value) = row[column] { value } else { f64::NAN }
         };
-        [at("low_m"), at("high_m")]
+        [at("low_about_mean_m"), at("high_about_mean_m")]
     }
 
     /// A release whose texture is raised by `raise_m`, with these parameters; `background_m` is the level of the fit's background, on its cells.
