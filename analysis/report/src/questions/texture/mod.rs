@@ -22,7 +22,6 @@ use crate::render::svg::{Paint, Stroke};
 use crate::sample::{ROWS_MAX, sample};
 use order::{Judged, TEXTURES_DRAWN, in_order};
 use sastrugi_schemas::tables::TerrainRow;
-use std::collections::BTreeSet;
 use verdict::Answer;
 
 pub(crate) use order::undrawn;
@@ -41,11 +40,10 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
     let mut blocks: Vec<Block> = in_words(&textures).map(Block::Result).into_iter().collect();
     blocks.extend(drawn.into_iter().flatten());
     blocks.extend(left_out(count, textures.len()).map(Block::Text));
-    let methods: BTreeSet<&str> =
-        first.iter().filter(|one| one.verdict.is_some()).map(|one| one.texture.kind.as_str()).collect();
-    if !methods.is_empty() {
+    let judged: Vec<&TerrainRow> = first.iter().filter(|one| one.verdict.is_some()).map(|one| one.texture).collect();
+    if !judged.is_empty() {
         blocks.push(Block::Heading("How the answers are reached".into()));
-        blocks.extend(verdict::method(&methods).map(Block::Text));
+        blocks.extend(verdict::method(&judged).map(Block::Text));
     }
     blocks.push(Block::FoldedTable(all(data)));
     Ok(blocks)
