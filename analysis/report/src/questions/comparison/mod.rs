@@ -73,9 +73,10 @@ fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> St
         _ => "Exploratory: nothing below was declared before the run, so its p values are only indicative.",
     };
     let tests = if pairing.is_common() {
-        "The groups share their random draws, so terrains are compared within blocks, using only pairs of missions that have the \
-         metric in all groups compared: signed-rank tests for pairs of groups, shift and delta of the differences within blocks, \
-         and Page's test for trend; signs or labels are permuted within blocks."
+        "Groups that share missions (the same random draws, or the same missions of several vehicles) are compared within blocks \
+         of terrains, using only pairs of missions that have the metric in all groups compared: signed-rank tests for pairs of \
+         groups, shift and delta of the differences within blocks, and Page's test for trend; signs or labels are permuted within \
+         blocks. Groups that share none are compared by rank-sum tests; the table says what was compared."
     } else {
         "Pairs of groups are compared by rank-sum tests; the trend is the rank correlation with the order of the groups. Terrain \
          labels are permuted."
