@@ -159,163 +159,279 @@ pub fn add(builder: &mut Builder<'_>) -> Result<(), BuildError> {
 }
 
 fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildError> {
-    let kinds = kinds();
-    let (item, params): (TextureItem, Value) = entry.read()?;
-    let matched = matched(builder, entry, &item);
-    let fit = matched.as_ref().ok().and_then(Matched::parent);
-    let prospect = fit.and_then(|fit| builder.prospects.get(&fit.id)).copied();
-    let methods = methods(entry, &item, &kinds, matched.is_err() || prospect.is_some_and(|fit| fit.has_statistics))?;
-    if item.methods.is_none() {
-        sastrugi_texture::check_keys(&item.method, &params).map_err(|e| entry.refuse(e))?;
-    }
-    entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
-    check_purpose(entry, &item, &params)?;
-    let matched = matched?;
-    let site = matched.parent().and_then(|fit| builder.sites.get(&fit.id)).cloned();
-    let exemplar_of = |method: &str| site.clone().filter(|_| needs(method) == Some(Needs::Residual));
-    let bases = Base::all(builder, entry, &item, &matched)?;
-    let fill = item.fill.as_deref().map(|id| builder.surface(entry, "fill", id).cloned()).transpose()?;
-    let modulation = modulation(builder, entry, &item)?;
-    let mut ids = Vec::new();
-    // Replicates cost the same. To state the cost of a covariance may take a transform.
-    let mut costs: BTreeMap<(Arc<str>, String), Cost> = BTreeMap::new();
-    for one in entry.expand(&item.id, item.count, &item.sweep, &params)? {
-        let side_by_side = item.methods.is_some();
-        let base = bases.get(one.replicate as usize).or(bases.first()).cloned();
-        let one = on_background(one, &base, &matched, &item);
-        let streams = builder.streams(STAGE, &one.id, item.seed, one.replicate);
+    let table = Table::read(builder, entry)?;
+    let (mut ids, mut costs) = (Vec::new(), Costs::new());
+    for one in entry.expand(&table.item.id, table.item.count, &table.item.sweep, &table.params)? {
+        let one = One::of(&table, one);
         let mut entrants = Vec::new();
         let mut refusal = None;
-        for method in &methods {
-            let mut own =
-                if side_by_side { own_parameters(&one.params, &kinds, method) } else { Value::clone(&one.params) };
-            on_site_cells(method, &mut own, prospect.and_then(|fit| fit.cell_m));
-            if let Some(field) = fill.as_ref().filter(|_| needs(method) != Some(Needs::Covariance)) {
-                on_cells_of(field, &mut own).map_err(|message| entry.error("fill", message))?;
+        for method in &table.methods {
+            let (entrant, checked) = one.entrant(builder, method, &mut costs)?;
+            entrants.push(entrant);
+            match checked {
+                Ok(checked) => ids.push(one.add(builder, method, checked)?),
+                Err(error) => refusal = refusal.or(Some(error)),
             }
-            // Methods that are compared keep the default size and cells, on which the scoreboard compares them.
-            let place = base.as_ref().and_then(|base| base.expected).filter(|_| !side_by_side);
-            let states_size = states_size(&own);
-            let made = match &place {
-                Some(place) => on_base(place, method, &mut own),
-                None => sastrugi_texture::method(method, &own),
-            };
-            let alike = (Arc::clone(&one.part), method.clone());
-            let known = costs.get(&alike).copied();
-            let checked = made.and_then(|synthesis| {
-                // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
-                if !side_by_side && fill.is_none() {
-                    check_before_run(prospect.as_ref(), base.as_ref(), synthesis.as_ref())?;
-                } else if let Some(fit) = prospect.filter(|_| needs(method) != Some(Needs::Covariance)) {
-                    synthesis.check_prospect(&fit)?;
-                }
-                let cost = known.map_or_else(|| matched.cost(synthesis.as_ref(), &builder.prospects), Ok)?;
-                Ok((cost, synthesis))
-            });
-            let cost = checked.as_ref().ok().map(|(cost, _)| *cost);
-            costs.extend(cost.map(|cost| (alike, cost)));
-            let stated = checked.as_ref().ok().filter(|_| states_size).map(|(_, synthesis)| synthesis.geometry());
-            let doubt = place.zip(stated).and_then(|(place, stated)| size_doubt(&place, &stated));
-            if let Some(doubt) = doubt.map(|doubt| format!("texture \"{}\": {doubt}", item.id))
-                && !builder.doubts.contains(&doubt)
-            {
-                builder.doubts.push(doubt);
-            }
-            entrants.push(Entrant { method: method.clone(), parameters: own, cost });
-            let (cost, synthesis) = match checked {
-                Ok(checked) => checked,
-                Err(error) => {
-                    refusal = refusal.or(Some(error));
-                    continue;
-                }
-            };
-            let id = if side_by_side { format!("{}-{}", one.id, method.replace('_', "-")) } else { one.id.clone() };
-            builder.claim(entry, STAGE, &id)?;
-            let streams =
-                if side_by_side { builder.streams(STAGE, &id, item.seed, one.replicate) } else { streams.clone() };
-            let own_label =
-                if side_by_side { format!("{}-{}", item.id, method.replace('_', "-")) } else { item.id.clone() };
-            let field = Heightfield {
-                item: ItemRef::new(STAGE, &id),
-                group: item.group.clone().or_else(|| one.sweep.clone()).or(Some(own_label)),
-                is_grouped: item.group.is_some() || one.sweep.is_some(),
-                variant: one.sweep.clone().filter(|_| item.group.is_some()),
-                replicate: Some(one.replicate),
-                kind: method.clone(),
-                parameters: Arc::new(parameters(
-                    &item,
-                    base.as_ref().filter(|_| bases.len() > 1),
-                    &matched,
-                    synthesis.as_ref(),
-                )),
-                streams: Some(streams.clone()),
-                release_path: format!("texture/{id}.tif"),
-                cells: match (&base, &fill) {
-                    (Some(Base { cells, .. }), _) | (None, Some(Heightfield { cells, .. })) => *cells,
-                    (None, None) => synthesis.geometry().len() as u64,
-                },
-                raster_cells: None,
-                cell_m: Some(synthesis.geometry().cell.into_iter().fold(f64::INFINITY, f64::min)),
-                geometry: (base.is_none() && fill.is_none()).then(|| synthesis.geometry()),
-                expected: match (&base, &fill) {
-                    (Some(Base { expected, .. }), _) | (None, Some(Heightfield { expected, .. })) => *expected,
-                    (None, None) => Some(synthesis.geometry()),
-                },
-            };
-            let cells = field.cells;
-            let one_of_many = item.count.is_some_and(|count| count > 1);
-            let (base, fill) = (base.clone(), fill.as_ref().map(|field| field.item.clone()));
-            let raster = match &modulation {
-                Some(Modulation::Raster(raster)) => Some(raster.item.clone()),
-                _ => None,
-            };
-            let exemplar = exemplar_of(method);
-            let others = [matched.parent(), fill.clone(), raster].into_iter().flatten();
-            let of_site = exemplar.iter().flat_map(Site::parents);
-            let parents: BTreeSet<ItemRef> = others.chain(of_site).chain(base.iter().flat_map(Base::parents)).collect();
-            let parents = parents.into_iter().collect();
-            let (method, matched, modulation) = (method.clone(), matched.clone(), modulation.clone());
-            let job = TextureJob {
-                id: id.clone(),
-                matched,
-                base,
-                amplitude: item.amplitude,
-                modulation,
-                fill,
-                exemplar,
-                method,
-                synthesis,
-                cost,
-                one_of_many,
-                cells,
-                streams,
-                geotiff: builder.study.head.geotiff,
-            };
-            let stream = field.stream();
-            let node = Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) };
-            builder.node(node)?;
-            builder.heightfields.insert(id.clone(), field);
-            ids.push(id);
         }
         if let Some(error) = refusal.filter(|_| entrants.iter().all(|e| e.cost.is_none())) {
             return Err(entry.refuse(error).into());
         }
-        if side_by_side && one.replicate == 0 {
-            builder.claim(entry, scoreboard::STAGE, &one.id)?;
-            let stream = Some(streams.label());
-            let realisations = item.realisations;
-            let matched = matched.clone();
-            let exemplar = entrants.iter().filter(|e| e.cost.is_some()).find_map(|e| exemplar_of(&e.method));
-            let parents: BTreeSet<ItemRef> =
-                matched.parent().into_iter().chain(exemplar.iter().flat_map(Site::parents)).collect();
-            let parents = parents.into_iter().collect();
-            let job = ScoreboardJob { id: one.id.clone(), matched, entrants, realisations, exemplar, streams };
-            let item = ItemRef::new(scoreboard::STAGE, &one.id);
-            builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
+        if table.is_side_by_side() && one.expanded.replicate == 0 {
+            one.add_scoreboard(builder, entrants)?;
         }
     }
-    builder.name_family(entry, &item.id, ids)?;
+    builder.name_family(entry, &table.item.id, ids)?;
     Ok(())
+}
+
+/// Costs by item without its replicate number, and by method: replicates cost the same, and to state the cost of a covariance may take a
+/// transform.
+type Costs = BTreeMap<(Arc<str>, String), Cost>;
+
+/// What all items of a table share.
+struct Table<'e> {
+    entry: &'e Entry<'e>,
+    item: TextureItem,
+    /// Parameters of the methods, as they are written.
+    params: Value,
+    /// All methods that there are.
+    kinds: Vec<Kind>,
+    /// Those of this table.
+    methods: Vec<String>,
+    matched: Matched,
+    /// What is known about the fit before the run.
+    prospect: Option<Prospect>,
+    /// The DEM of the fit.
+    site: Option<Site>,
+    bases: Vec<Base>,
+    /// The DEM whose holes are filled.
+    fill: Option<Heightfield>,
+    modulation: Option<Modulation>,
+}
+
+impl<'e> Table<'e> {
+    fn read(builder: &Builder<'_>, entry: &'e Entry<'e>) -> Result<Self, BuildError> {
+        let kinds = kinds();
+        let (item, params): (TextureItem, Value) = entry.read()?;
+        let matched = matched(builder, entry, &item);
+        let fit = matched.as_ref().ok().and_then(Matched::parent);
+        let prospect = fit.as_ref().and_then(|fit| builder.prospects.get(&fit.id)).copied();
+        let has_statistics = matched.is_err() || prospect.is_some_and(|fit| fit.has_statistics);
+        let methods = methods(entry, &item, &kinds, has_statistics)?;
+        if item.methods.is_none() {
+            sastrugi_texture::check_keys(&item.method, &params).map_err(|e| entry.refuse(e))?;
+        }
+        entry.check_keys::<TextureItem>(&params, &joined_schema(&kinds, &methods))?;
+        check_purpose(entry, &item, &params)?;
+        let matched = matched?;
+        let site = fit.and_then(|fit| builder.sites.get(&fit.id)).cloned();
+        let bases = Base::all(builder, entry, &item, &matched)?;
+        let fill = item.fill.as_deref().map(|id| builder.surface(entry, "fill", id).cloned()).transpose()?;
+        let modulation = modulation(builder, entry, &item)?;
+        Ok(Self { entry, item, params, kinds, methods, matched, prospect, site, bases, fill, modulation })
+    }
+
+    /// Whether methods are compared.
+    fn is_side_by_side(&self) -> bool {
+        self.item.methods.is_some()
+    }
+
+    /// A name, followed by that of the method if several are compared.
+    fn named(&self, name: &str, method: &str) -> String {
+        if self.is_side_by_side() { format!("{name}-{}", method.replace('_', "-")) } else { name.to_owned() }
+    }
+
+    /// The DEM of the fit, if the method copies from its residual.
+    fn exemplar_of(&self, method: &str) -> Option<Site> {
+        self.site.clone().filter(|_| needs(method) == Some(Needs::Residual))
+    }
+}
+
+/// One item of a table, at which each of its methods makes a texture.
+struct One<'t> {
+    table: &'t Table<'t>,
+    expanded: Expanded,
+    base: Option<&'t Base>,
+}
+
+/// A method that accepts the parameters of an item.
+struct Checked {
+    synthesis: Box<dyn Method>,
+    cost: Cost,
+}
+
+impl<'t> One<'t> {
+    fn of(table: &'t Table<'t>, expanded: Expanded) -> Self {
+        let base = table.bases.get(expanded.replicate as usize).or(table.bases.first());
+        Self { table, expanded: on_background(expanded, base, &table.matched, &table.item), base }
+    }
+
+    /// A method with its parameters, and whether it accepts them.
+    fn entrant(
+        &self,
+        builder: &mut Builder<'_>,
+        method: &str,
+        costs: &mut Costs,
+    ) -> Result<(Entrant, Result<Checked, ParameterError>), StudyError> {
+        let mut parameters = self.parameters(method)?;
+        let states_size = states_size(&parameters);
+        let checked = self.synthesis(method, &mut parameters).and_then(|synthesis| {
+            self.check(method, synthesis.as_ref())?;
+            let cost = self.cost(builder, method, synthesis.as_ref(), costs)?;
+            Ok(Checked { synthesis, cost })
+        });
+        if let Some(Checked { synthesis, .. }) = checked.as_ref().ok().filter(|_| states_size) {
+            self.doubt_size(builder, &synthesis.geometry());
+        }
+        let cost = checked.as_ref().ok().map(|checked| checked.cost);
+        Ok((Entrant { method: method.to_owned(), parameters, cost }, checked))
+    }
+
+    /// The parameters of a method. Cells that are not stated are those of the site or of the DEM that is filled, where the method has no others.
+    fn parameters(&self, method: &str) -> Result<Value, StudyError> {
+        let Table { entry, kinds, prospect, fill, .. } = self.table;
+        let params = &self.expanded.params;
+        let mut own = match self.table.is_side_by_side() {
+            true => own_parameters(params, kinds, method),
+            false => Value::clone(params),
+        };
+        on_site_cells(method, &mut own, prospect.and_then(|fit| fit.cell_m));
+        if let Some(dem) = fill.as_ref().filter(|_| needs(method) != Some(Needs::Covariance)) {
+            on_cells_of(dem, &mut own).map_err(|message| entry.error("fill", message))?;
+        }
+        Ok(own)
+    }
+
+    /// The method with these parameters, to which those that follow from the base are added.
+    fn synthesis(&self, method: &str, own: &mut Value) -> Result<Box<dyn Method>, ParameterError> {
+        match self.place() {
+            Some(place) => on_base(&place, method, own),
+            None => sastrugi_texture::method(method, own),
+        }
+    }
+
+    /// Geometry of the base, if it is known before the run. Methods that are compared keep the default size and cells, on which the scoreboard
+    /// compares them.
+    fn place(&self) -> Option<Geometry> {
+        self.base.and_then(|base| base.expected).filter(|_| !self.table.is_side_by_side())
+    }
+
+    /// Refuses a texture that is known before the run to fail.
+    fn check(&self, method: &str, synthesis: &dyn Method) -> Result<(), ParameterError> {
+        let Table { prospect, fill, .. } = self.table;
+        // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
+        if !self.table.is_side_by_side() && fill.is_none() {
+            return check_before_run(prospect.as_ref(), self.base, synthesis);
+        }
+        match prospect.filter(|_| needs(method) != Some(Needs::Covariance)) {
+            Some(fit) => synthesis.check_prospect(&fit),
+            None => Ok(()),
+        }
+    }
+
+    fn cost(
+        &self,
+        builder: &Builder<'_>,
+        method: &str,
+        synthesis: &dyn Method,
+        costs: &mut Costs,
+    ) -> Result<Cost, ParameterError> {
+        let alike = (Arc::clone(&self.expanded.part), method.to_owned());
+        if let Some(known) = costs.get(&alike) {
+            return Ok(*known);
+        }
+        let cost = self.table.matched.cost(synthesis, &builder.prospects)?;
+        costs.insert(alike, cost);
+        Ok(cost)
+    }
+
+    /// Tells, once, that the stated size of a texture is not that of its base.
+    fn doubt_size(&self, builder: &mut Builder<'_>, stated: &Geometry) {
+        let Some(doubt) = self.place().and_then(|place| size_doubt(&place, stated)) else { return };
+        let doubt = format!("texture \"{}\": {doubt}", self.table.item.id);
+        if !builder.doubts.contains(&doubt) {
+            builder.doubts.push(doubt);
+        }
+    }
+
+    /// Adds the texture of a method; returns its id.
+    fn add(&self, builder: &mut Builder<'_>, method: &str, checked: Checked) -> Result<String, StudyError> {
+        let (table, item) = (self.table, &self.table.item);
+        let id = table.named(&self.expanded.id, method);
+        builder.claim(table.entry, STAGE, &id)?;
+        let streams = builder.streams(STAGE, &id, item.seed, self.expanded.replicate);
+        let field = self.field(&id, method, checked.synthesis.as_ref(), &streams);
+        let job = TextureJob {
+            id: id.clone(),
+            matched: table.matched.clone(),
+            base: self.base.cloned(),
+            amplitude: item.amplitude,
+            modulation: table.modulation.clone(),
+            fill: table.fill.as_ref().map(|dem| dem.item.clone()),
+            exemplar: table.exemplar_of(method),
+            method: method.to_owned(),
+            synthesis: checked.synthesis,
+            cost: checked.cost,
+            one_of_many: item.count.is_some_and(|count| count > 1),
+            cells: field.cells,
+            streams,
+            geotiff: builder.study.head.geotiff,
+        };
+        let (parents, stream) = (job.parents(), field.stream());
+        builder.node(Node { item: field.item.clone(), parents, inputs: Vec::new(), stream, job: Box::new(job) })?;
+        builder.heightfields.insert(id.clone(), field);
+        Ok(id)
+    }
+
+    /// The heightfield that a method makes. On a base, or where it fills a DEM, it has the cells of that.
+    fn field(&self, id: &str, method: &str, synthesis: &dyn Method, streams: &Streams) -> Heightfield {
+        let Table { item, matched, bases, fill, .. } = self.table;
+        let Expanded { replicate, sweep, .. } = &self.expanded;
+        let tile = synthesis.geometry();
+        let (cells, geometry, expected) = match (self.base, fill.as_ref()) {
+            (Some(base), _) => (base.cells, None, base.expected),
+            (None, Some(dem)) => (dem.cells, None, dem.expected),
+            (None, None) => (tile.len() as u64, Some(tile), Some(tile)),
+        };
+        let own_base = self.base.filter(|_| bases.len() > 1);
+        Heightfield {
+            item: ItemRef::new(STAGE, id),
+            group: item.group.clone().or_else(|| sweep.clone()).or(Some(self.table.named(&item.id, method))),
+            is_grouped: item.group.is_some() || sweep.is_some(),
+            variant: sweep.clone().filter(|_| item.group.is_some()),
+            replicate: Some(*replicate),
+            kind: method.to_owned(),
+            parameters: Arc::new(parameters(item, own_base, matched, synthesis)),
+            streams: Some(streams.clone()),
+            release_path: format!("texture/{id}.tif"),
+            cells,
+            raster_cells: None,
+            cell_m: Some(tile.cell.into_iter().fold(f64::INFINITY, f64::min)),
+            geometry,
+            expected,
+        }
+    }
+
+    /// Adds the scoreboard of the methods.
+    fn add_scoreboard(&self, builder: &mut Builder<'_>, entrants: Vec<Entrant>) -> Result<(), StudyError> {
+        let (table, id) = (self.table, &self.expanded.id);
+        builder.claim(table.entry, scoreboard::STAGE, id)?;
+        let exemplar = entrants.iter().filter(|e| e.cost.is_some()).find_map(|e| table.exemplar_of(&e.method));
+        let parents: BTreeSet<ItemRef> =
+            table.matched.parent().into_iter().chain(exemplar.iter().flat_map(Site::parents)).collect();
+        let streams = builder.streams(STAGE, id, table.item.seed, self.expanded.replicate);
+        let stream = Some(streams.label());
+        let job = ScoreboardJob {
+            id: id.clone(),
+            matched: table.matched.clone(),
+            entrants,
+            realisations: table.item.realisations,
+            exemplar,
+            streams,
+        };
+        let (item, parents) = (ItemRef::new(scoreboard::STAGE, id), parents.into_iter().collect());
+        builder.node(Node { item, parents, inputs: Vec::new(), stream, job: Box::new(job) })
+    }
 }
 
 /// Sets the cells of a texture to those of the DEM whose holes it fills.
@@ -367,8 +483,8 @@ fn check_before_run(
 }
 
 /// On a measured DEM or the background of a fit, a texture defaults to the covariance of the residual, which such a base lacks.
-fn on_background(mut one: Expanded, base: &Option<Base>, matched: &Matched, item: &TextureItem) -> Expanded {
-    let measured = base.as_ref().is_some_and(|base| [dem_job::STAGE, fit::STAGE].contains(&base.item.stage.as_str()));
+fn on_background(mut one: Expanded, base: Option<&Base>, matched: &Matched, item: &TextureItem) -> Expanded {
+    let measured = base.is_some_and(|base| [dem_job::STAGE, fit::STAGE].contains(&base.item.stage.as_str()));
     let fitted = matches!(matched, Matched::Item(_)) && item.methods.is_none() && completes_background(&item.method);
     if measured && fitted && one.params["covariance"].is_null() {
         Arc::make_mut(&mut one.params)["covariance"] = json!(fft_ma::CovarianceOf::Residual);
@@ -602,6 +718,18 @@ impl Job for TextureJob {
 }
 
 impl TextureJob {
+    /// The items whose artifacts it reads.
+    fn parents(&self) -> Vec<ItemRef> {
+        let raster = match &self.modulation {
+            Some(Modulation::Raster(raster)) => Some(raster.item.clone()),
+            _ => None,
+        };
+        let others = [self.matched.parent(), self.fill.clone(), raster].into_iter().flatten();
+        let of_site = self.exemplar.iter().flat_map(Site::parents);
+        let all: BTreeSet<ItemRef> = others.chain(of_site).chain(self.base.iter().flat_map(Base::parents)).collect();
+        all.into_iter().collect()
+    }
+
     /// The method bound to the fit, and its texture.
     fn made(&self, work: &Work<'_>, fit: &FitFile) -> Result<(Box<dyn Synthesis>, TextureOutcome), JobError> {
         let measured = self.exemplar.as_ref().map(|site| site.residual(work)).transpose()?.map(Arc::new);
