@@ -168,7 +168,11 @@ fn val_places_are_refused_before_the_run() {
         ),
         (
             texture("exponential", "cell_m = 1.0\nonto = \"site\""),
-            &["`cell_m`", "generate the texture at the base's cell size"],
+            &["`cell_m`", "generate the texture at the base's cell size, or leave out `cell_m`"],
+        ),
+        (
+            fine("[105.0, 205.0]") + &texture("exponential", "method = \"quilting\"\nonto = \"fine\""),
+            &["`onto` does not match the site", "`quilting` works only on the cells of the site"],
         ),
     ] {
         let (code, told) = told(&tables);

@@ -24,7 +24,7 @@ use sastrugi_store::dem::{self, Crs};
 use sastrugi_store::digest;
 use sastrugi_texture::covariance::Covariance;
 use sastrugi_texture::synth::{conditional, fft_ma};
-use sastrugi_texture::{Cost, Method, Needs, Prospect, SlopeFactors, Synthesis, TextureOutcome, needs};
+use sastrugi_texture::{Cost, Method, Needs, OntoError, Prospect, SlopeFactors, Synthesis, TextureOutcome, needs};
 use serde_json::{Map, Value, json};
 use std::collections::{BTreeMap, BTreeSet};
 use std::sync::Arc;
@@ -321,7 +321,7 @@ impl<'t> One<'t> {
         let Table { prospect, fill, .. } = self.table;
         // When methods are compared, the scoreboard lists those that fail; filling a DEM does not use a tile.
         if !self.table.is_side_by_side() && fill.is_none() {
-            return check_before_run(prospect.as_ref(), self.base, synthesis);
+            return check_before_run(prospect.as_ref(), self.base, method, synthesis);
         }
         match prospect.filter(|_| needs(method) != Some(Needs::Covariance)) {
             Some(fit) => synthesis.check_prospect(&fit),
@@ -482,18 +482,32 @@ fn of_base_size(method: &str, own: &mut Value) -> Result<Box<dyn Method>, Parame
 fn check_before_run(
     prospect: Option<&Prospect>,
     base: Option<&Base>,
+    method: &str,
     synthesis: &dyn Method,
 ) -> Result<(), ParameterError> {
     prospect.map_or(Ok(()), |fit| synthesis.check_prospect(fit))?;
     let Some(place) = base.and_then(|base| base.expected) else { return Ok(()) };
     let geometry = synthesis.geometry();
-    sastrugi_texture::check_cells(place.cell, geometry.cell).map_err(|error| {
-        ParameterError::new("cell_m", format!("does not match `onto`: {error}, or leave out `cell_m`"))
-    })?;
+    sastrugi_texture::check_cells(place.cell, geometry.cell)
+        .map_err(|error| other_cells(&error, method, prospect.and_then(|fit| fit.cell_m)))?;
     let key = if synthesis.parameters()["size_px"].is_null() { "size_m" } else { "size_px" };
     match uncovered(&place, &geometry).filter(|_| !synthesis.is_periodic()) {
         Some(why) => Err(ParameterError::new(key, format!("is too small: {why}, or leave out `{key}`"))),
         None => Ok(()),
+    }
+}
+
+/// The error for cells that are not those of the base. A method that repeats a site makes no others than the site's, whether they are stated or not.
+fn other_cells(error: &OntoError, method: &str, site_m: Option<[f64; 2]>) -> ParameterError {
+    match site_m.filter(|_| needs(method) != Some(Needs::Covariance)) {
+        Some(_) => {
+            let message = format!(
+                "does not match the site: {error} with a method such as `fft_ma` (`{method}` works only on the cells of the site), or \
+                 resample the base"
+            );
+            ParameterError::new("onto", message)
+        }
+        None => ParameterError::new("cell_m", format!("does not match `onto`: {error}, or leave out `cell_m`")),
     }
 }
 
