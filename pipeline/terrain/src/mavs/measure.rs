@@ -95,8 +95,10 @@ impl Roughness {
     }
 
     fn of(raw: &RawRoughness, frame: &Frame) -> Result<Option<Self>, ParameterError> {
-        if let Some(rms) = raw.rms_m {
-            ParameterError::positive("rms_m", rms)?;
+        for (key, value) in
+            [("rms_m", raw.rms_m), ("wheelbase_m", raw.wheelbase_m), ("tyre_radius_m", raw.tyre_radius_m)]
+        {
+            value.map(|value| ParameterError::positive(key, value)).transpose()?;
         }
         let (key, band) = match (raw.band_m, raw.wheelbase_m, raw.tyre_radius_m) {
             (None, None, None) if raw.rms_m.is_none() => return Ok(None),

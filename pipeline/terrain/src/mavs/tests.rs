@@ -509,7 +509,7 @@ fn val_impossible_parameters_are_refused() {
         assert_eq!(roughness(json!({"wheelbase_m": 2.7})), "roughness.tyre_radius_m");
         assert_eq!(roughness(json!({"tyre_radius_m": 0.33})), "roughness.wheelbase_m");
         assert_eq!(roughness(json!({"wheelbase_m": -2.7, "tyre_radius_m": 0.33})), "roughness.wheelbase_m");
-        assert_eq!(roughness(json!({"wheelbase_m": 2.7, "tyre_radius_m": 0.0})), "roughness.wheelbase_m");
+        assert_eq!(roughness(json!({"wheelbase_m": 2.7, "tyre_radius_m": 0.0})), "roughness.tyre_radius_m");
         assert_eq!(roughness(json!({"wheelbase_m": 2.7, "tyre_radius_m": 0.29})), "roughness.wheelbase_m");
         let coarse = json!({"roughness": {"wheelbase_m": 2.7, "tyre_radius_m": 0.29, "allow_coarse": true}});
         assert!(made(kind, &coarse, 1).notes.iter().any(|n| n.contains("do not resolve the complete band")), "{kind}");
