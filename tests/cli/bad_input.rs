@@ -158,6 +158,11 @@ fn val_places_are_refused_before_the_run() {
             texture("exponential", "").replace("outer_scale_m = 6.0", "outer_scale_m = 7.0"),
             &["fit \"f\"", "the outer scale of 7 m is more than a third of the DEM; it must be at most 6.66"],
         ),
+        // One value of a sweep is enough: it is named, and the sweep is shown.
+        (
+            texture("exponential", "").replace("outer_scale_m = 6.0", "sweep.outer_scale_m = [6.0, 7.0]"),
+            &["the outer scale of 7 m is more than a third of the DEM", "sweep.outer_scale_m = [6.0, 7.0]"],
+        ),
         (
             texture("exponential", "").replace("outer_scale_m = 6.0", "outer_scale_m = 5.0"),
             &["fit \"f\"", "the outer scale of 5 m is less than three cells of 2 m"],
