@@ -43,9 +43,7 @@ impl Kind {
     /// ```
     pub fn description(&self) -> String {
         let [summary, source] = [self.summary, self.source].map(|text| text.trim_end_matches('.'));
-        let first = summary.chars().take(1).flat_map(char::to_uppercase);
-        let summary: String = first.chain(summary.chars().skip(1)).collect();
-        format!("{summary}. Source: {source}.")
+        format!("{}. Source: {source}.", capital(summary))
     }
 }
 
@@ -145,6 +143,18 @@ pub fn counted(number: impl Display, noun: &str) -> String {
         _ if ["s", "x", "ch", "sh"].iter().any(|end| noun.ends_with(end)) => format!("{number} {noun}es"),
         _ => format!("{number} {noun}s"),
     }
+}
+
+/// Words with a capital first letter.
+///
+/// ```
+/// use sastrugi_schemas::capital;
+///
+/// assert_eq!(["success rate", "RMS", ""].map(capital), ["Success rate", "RMS", ""]);
+/// ```
+pub fn capital(words: &str) -> String {
+    let mut letters = words.chars();
+    letters.next().map_or_else(String::new, |first| first.to_uppercase().chain(letters).collect())
 }
 
 /// JSON Schema of a parameter type.

@@ -53,5 +53,5 @@ pub mod topics;
 
 pub use answer::Answer;
 pub use class::RoughnessClass;
-pub use kind::{Kind, ParameterError, counted, shown};
+pub use kind::{Kind, ParameterError, capital, counted, shown};
 pub use tables::{Cell, Column, ColumnType, Record, Table};

@@ -2,9 +2,9 @@
 
 use crate::examples::EXAMPLES;
 use crate::parameters::{Parameter, parameters, text_of};
-use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::schema_of;
 use sastrugi_schemas::study::StudyHead;
+use sastrugi_schemas::{Kind, capital};
 use sastrugi_stages::registry::{self, Form, SECTIONS, Section};
 use sastrugi_stages::starting::STARTING;
 use sastrugi_stages::verbs::parameters::to_toml;
@@ -55,11 +55,6 @@ fn heading(name: &str, form: Form) -> String {
 fn purpose(envelope: &Value) -> String {
     let text = text_of(envelope);
     capital(text.split_once("`: ").map_or(text.as_str(), |(_, purpose)| purpose))
-}
-
-fn capital(text: &str) -> String {
-    let mut letters = text.chars();
-    letters.next().map(|first| first.to_uppercase().collect::<String>() + letters.as_str()).unwrap_or_default()
 }
 
 fn chapter(name: &str, form: Form, envelope: &Value) -> String {

@@ -31,8 +31,6 @@ use std::sync::Arc;
 
 /// Name of the stage.
 pub const STAGE: &str = "texture";
-/// Maximum number of realisations of a scoreboard.
-const REALISATIONS_MAX: u32 = TextureItem::REALISATIONS_MAX;
 
 /// Approximate time to detrend, trim and describe one cell of a texture, s.
 const SECONDS_PER_DESCRIBED_CELL: f64 = 6e-7;
@@ -574,8 +572,9 @@ fn methods(
         Some(Methods::Word(word)) => ("methods", vec![word.clone()]),
         Some(Methods::List(list)) => ("methods", list.clone()),
     };
-    if item.realisations == 0 || item.realisations > REALISATIONS_MAX {
-        let message = format!("`realisations` is {}; it must lie in 1 to {REALISATIONS_MAX}", item.realisations);
+    let most = TextureItem::REALISATIONS_MAX;
+    if item.realisations == 0 || item.realisations > most {
+        let message = format!("`realisations` is {}; it must lie in 1 to {most}", item.realisations);
         return Err(entry.error("realisations", message));
     }
     match wanted.iter().find(|w| !known.contains(w)) {

@@ -19,6 +19,7 @@ use crate::render::chart::{Mark, Plot, WIDTH};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_imaging::hillshade::exaggeration;
+use sastrugi_schemas::capital;
 use sastrugi_schemas::fit::FitFile;
 use sastrugi_schemas::tables::{CovarianceRow, FitRow};
 use std::collections::BTreeSet;
@@ -113,13 +114,8 @@ const SYMBOLS: [&str; 3] = ["b ", "sigma ", "sigma^2"];
 fn sentence(words: &str) -> String {
     let words = words.trim();
     let symbol = SYMBOLS.iter().any(|symbol| words.starts_with(symbol));
-    let mut chars = words.chars();
-    let start: String = match chars.next() {
-        Some(first) if symbol => first.to_string(),
-        first => first.map(|c| c.to_uppercase().collect()).unwrap_or_default(),
-    };
     let stop = if words.ends_with(['.', '!', '?']) { "" } else { "." };
-    format!("{start}{}{stop}", chars.as_str())
+    if symbol { format!("{words}{stop}") } else { capital(words) + stop }
 }
 
 /// Isotropic bins of a fit.

@@ -66,7 +66,7 @@ fn answer(data: &Data) -> Result<Vec<Block>, ReportError> {
             "{} of {}: those with the shortest, the median and the longest time until the team returned to tolerance, where they differ. \
              Members are marked at the loss; the window is fourteen spacings wide.",
             set::count(maps.len()),
-            counted(losses.len())
+            set::counted(losses.len(), "loss")
         );
         blocks.extend([Block::Heading("Tracks around a loss".into()), Block::Text(words), Block::Figures(maps)]);
     }
@@ -116,7 +116,7 @@ fn verdict(data: &Data, losses: &[Loss], rows: &[&FormationRow]) -> String {
             "After {} of {}, the team returned to tolerance ({} of the spacing, every follower, for at least {} s); the median time is {}{}, \
              counting losses without a return as longer than any.",
             set::count(back.len()),
-            counted(telling.len()),
+            set::counted(telling.len(), "loss"),
             set::percent(TOLERABLE, 0),
             set::fixed(HOLD_S, 0),
             time_words(sums::median(&recoveries(&telling).iter().map(|r| r.1).collect::<Vec<_>>())),
@@ -133,11 +133,6 @@ fn verdict(data: &Data, losses: &[Loss], rows: &[&FormationRow]) -> String {
 
 fn count_of(n: i64) -> usize {
     usize::try_from(n).unwrap_or(0)
-}
-
-/// Number of losses in words.
-fn counted(losses: usize) -> String {
-    if losses == 1 { "1 loss".into() } else { format!("{} losses", set::count(losses)) }
 }
 
 /// Recovery time after each loss, with its terrain; [`NEVER_S`] if the team does not recover.
@@ -232,7 +227,7 @@ fn curves(losses: &[Loss]) -> Vec<Figure> {
     let figure = |(formation, series): (&str, Vec<Vec<Instant>>)| {
         let caption = format!(
             "{}. Means over followers and losses; the band holds 5 to 95 % of the losses. A loss drops out at the next loss of its run.",
-            counted(series.len())
+            set::counted(series.len(), "loss")
         );
         let query = "select terrain_id, run_id, member, time_s, depth_error_m, width_error_m from 'tables/formation_samples/*.parquet' where state != 'lost'";
         let words = [format!("Errors around a loss, {formation}."), caption];

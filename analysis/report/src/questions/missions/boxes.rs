@@ -12,6 +12,7 @@ use crate::render::chart::{Beside, Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use crate::sample::{ROWS_MAX, sample};
+use sastrugi_schemas::capital;
 use sastrugi_statistics::{BoxPlot, Interval};
 use std::collections::{BTreeMap, BTreeSet};
 
@@ -256,12 +257,6 @@ fn describe(samples: &[Sample], axis: &str) -> String {
         format!("group {}: median {}{band}{paper}, n = {}", s.group, set::significant(s.plot.median, 3), s.plot.count)
     };
     format!("Box plots of {axis}. {}.", samples.iter().map(group).collect::<Vec<_>>().join("; "))
-}
-
-/// The words with a capital first letter.
-pub fn capital(words: &str) -> String {
-    let mut chars = words.chars();
-    chars.next().map_or_else(String::new, |c| c.to_uppercase().chain(chars).collect())
 }
 
 #[cfg(test)]

@@ -7,12 +7,12 @@ use super::worlds::{ARRIVED, DISTANCE, EFFICIENCY, GREATEST, LEAST, OF_ARRIVALS,
 use crate::content::{self, Numbers, TableBlock, count, number, text};
 use crate::data::Data;
 use crate::questions::clusters::LEVEL;
-use crate::questions::missions::boxes::capital;
 use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
 use crate::render::number as set_number;
 use crate::render::svg::{Paint, Stroke, Symbol};
 use sastrugi_numeric::sums;
+use sastrugi_schemas::capital;
 use sastrugi_schemas::tables::RoverRow;
 use sastrugi_statistics::Intraclass;
 

@@ -1,7 +1,6 @@
 //! Published routes and formations of Bayrak (2008) compared with ours, as ratios.
 
 use super::Question;
-use super::missions::boxes::capital;
 use super::routes::maps::legend_track;
 use super::routes::methods::{found, geometric_mean, methods};
 use crate::ReportError;
@@ -12,6 +11,7 @@ use crate::render::axis::Axis;
 use crate::render::chart::{Entry, Mark, RowLabel, Rows};
 use crate::render::number as set;
 use crate::render::svg::{Paint, Stroke, Symbol};
+use sastrugi_schemas::capital;
 use sastrugi_schemas::tables::{FormationRow, RouteRow};
 use std::collections::{BTreeMap, BTreeSet};
 
