@@ -5,13 +5,15 @@
 //! change earlier ones; on maps with the same cells, draw n of a pair is the same on all of them.
 
 use crate::map::{Node, TravelMap};
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::{ParameterError, limits};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Draws after which a pair is abandoned.
 const DRAWS_MAX: u32 = 100_000;
+/// Relative rounding error of distances between cells.
+const ROUNDING: f64 = 1e-9;
 
 /// Rules for drawing starts and goals.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -34,6 +36,12 @@ impl PairParameters {
         ParameterError::not_negative("border_m", self.border_m)?;
         self.distance_min_m.map(|m| ParameterError::positive("distance_min_m", m)).transpose().map(drop)
     }
+
+    /// Least distance from start to goal on a terrain, m.
+    fn distance_min_on_m(&self, terrain: &Geometry) -> f64 {
+        let [width_m, height_m] = terrain.size();
+        self.distance_min_m.unwrap_or(0.5 * width_m.min(height_m))
+    }
 }
 
 /// A start and a goal.
@@ -52,15 +60,31 @@ pub struct Pair {
 pub enum PairError {
     /// The border leaves no cells.
     #[error(
-        "draw starts and goals: a border of {border_m} m leaves no cells of the {rows} x {cols}; use a narrower border"
+        "draw starts and goals: a border of {border_m} m on every side leaves no cells of the terrain, which is {:.2} x {:.2} m; \
+         `border_m` may be at most {border_max_m} m",
+        size_m[0],
+        size_m[1]
     )]
     Border {
         /// Border, m.
         border_m: f64,
-        /// Rows.
-        rows: usize,
-        /// Columns.
-        cols: usize,
+        /// Extent of the terrain east-west and north-south, m.
+        size_m: [f64; 2],
+        /// Widest border that leaves cells, m, rounded down to 1 mm.
+        border_max_m: f64,
+    },
+    /// The cells inside the border are closer together than starts and goals must be.
+    #[error(
+        "draw starts and goals: inside a border of {border_m} m cells are at most {longest_m:.2} m apart, but `distance_min_m` is \
+         {distance_min_m:.2} m; lower it (by default it is half the shorter side of the terrain), or lower `border_m`"
+    )]
+    Distance {
+        /// Border, m.
+        border_m: f64,
+        /// Distance between the farthest cells inside it, m.
+        longest_m: f64,
+        /// Least distance, m.
+        distance_min_m: f64,
     },
     /// No draw satisfied the rules.
     #[error(
@@ -77,10 +101,36 @@ pub enum PairError {
     },
 }
 
+impl PairError {
+    /// The key to change.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Self::Border { .. } => "border_m",
+            Self::Distance { .. } | Self::Exhausted { .. } => "distance_min_m",
+        }
+    }
+}
+
+/// Checks that a terrain, if nothing on it is blocked, has places for starts and goals.
+///
+/// # Errors
+/// A border that leaves no cells, or cells inside it that are all too close to each other.
+pub fn check_size(terrain: &Geometry, rules: &PairParameters) -> Result<(), PairError> {
+    let [[_, rows], [_, cols]] = inside(terrain, rules.border_m)?;
+    let [dx, dy] = terrain.cell;
+    let (x_m, y_m) = ((cols - 1) as f64 * dx, (rows - 1) as f64 * dy);
+    let longest_m = (x_m * x_m + y_m * y_m).sqrt();
+    let distance_min_m = rules.distance_min_on_m(terrain);
+    match distance_min_m <= longest_m * (1.0 + ROUNDING) {
+        true => Ok(()),
+        false => Err(PairError::Distance { border_m: rules.border_m, longest_m, distance_min_m }),
+    }
+}
+
 /// Draws pairs on a map.
 ///
 /// # Errors
-/// A border that leaves no cells, or rules that no draw satisfies.
+/// As [`check_size`], or rules that no draw satisfies.
 ///
 /// # Examples
 /// ```
@@ -106,11 +156,11 @@ pub fn draw_pairs(
     count: usize,
     streams: &Streams,
 ) -> Result<Vec<Pair>, PairError> {
-    let cells = inside(map, rules.border_m)?;
+    let terrain = &map.heights().geometry;
+    check_size(terrain, rules)?;
+    let cells = inside(terrain, rules.border_m)?;
     let [[_, rows], [_, cols]] = cells;
-    let [dx, dy] = map.cell_m();
-    let shorter_m = ((map.shape()[1] as f64) * dx).min((map.shape()[0] as f64) * dy);
-    let distance_min_m = rules.distance_min_m.unwrap_or(0.5 * shorter_m);
+    let distance_min_m = rules.distance_min_on_m(terrain);
     let pair = |index: usize| {
         let mut stream = streams.stream(&format!("pair-{:04}", index + 1));
         for draws in 1..=DRAWS_MAX {
@@ -129,16 +179,23 @@ pub fn draw_pairs(
 }
 
 /// First row and number of rows inside the border, and the same for columns.
-fn inside(map: &TravelMap, border_m: f64) -> Result<[[usize; 2]; 2], PairError> {
-    let ([rows, cols], [dx, dy]) = (map.shape(), map.cell_m());
+fn inside(terrain: &Geometry, border_m: f64) -> Result<[[usize; 2]; 2], PairError> {
+    let Geometry { rows, cols, cell: [dx, dy], .. } = *terrain;
     let within = |cells: usize, cell_m: f64| {
         let skip = libm::ceil((border_m / cell_m).min(cells as f64)) as usize;
         (cells > 2 * skip).then(|| [skip, cells - 2 * skip])
     };
     match (within(rows, dy), within(cols, dx)) {
         (Some(rows), Some(cols)) => Ok([rows, cols]),
-        _ => Err(PairError::Border { border_m, rows, cols }),
+        _ => Err(PairError::Border { border_m, size_m: terrain.size(), border_max_m: border_max_m(terrain) }),
     }
+}
+
+/// Widest border that leaves at least one cell, m, rounded down to 1 mm.
+fn border_max_m(terrain: &Geometry) -> f64 {
+    let Geometry { rows, cols, cell: [dx, dy], .. } = *terrain;
+    let of = |cells: usize, cell_m: f64| (cells.saturating_sub(1) / 2) as f64 * cell_m;
+    libm::floor(1e3 * of(rows, dy).min(of(cols, dx))) / 1e3
 }
 
 fn distance_m(map: &TravelMap, a: Node, b: Node) -> f64 {
@@ -218,16 +275,39 @@ mod tests {
         assert_eq!([range(0), range(1)], [[Some(2), Some(7)], [Some(3), Some(16)]]);
     }
 
+    /// Starts and goals may be as far apart as the farthest cells inside the border, and no farther. A wide border alone can bring all cells
+    /// closer together than the default distance.
+    #[test]
+    fn val_a_terrain_has_room_up_to_its_diagonal() {
+        let terrain = Geometry::square(9, 12, 0.5);
+        let has_room =
+            |distance_min_m, border_m| check_size(&terrain, &PairParameters { distance_min_m, border_m }).is_ok();
+        // Inside 1 m: 5 x 8 cells, whose outer centres are 2 m and 3.5 m apart.
+        let longest_m = 16.25_f64.sqrt();
+        assert!(has_room(Some(longest_m), 1.0) && !has_room(Some(longest_m + 1e-3), 1.0));
+        assert!(has_room(None, 0.0) && !has_room(None, 2.0));
+    }
+
     #[test]
     fn val_impossible_rules_are_refused() {
         let rules = |distance_min_m, border_m| PairParameters { distance_min_m: Some(distance_min_m), border_m };
         let free = map(10, 10, |_, _| false);
-        let error = draw_pairs(&free, &rules(1.0, 2.5), 1, &streams()).unwrap_err();
+        let refused = |map: &TravelMap, distance_min_m, border_m| {
+            draw_pairs(map, &rules(distance_min_m, border_m), 1, &streams()).unwrap_err()
+        };
+        // Ten cells of 0.5 m: a border of four leaves two of them, whose centres are 0.71 m apart along the diagonal.
+        let error = refused(&free, 1.0, 2.5);
         assert_eq!(
             error.to_string(),
-            "draw starts and goals: a border of 2.5 m leaves no cells of the 10 x 10; use a narrower border"
+            "draw starts and goals: a border of 2.5 m on every side leaves no cells of the terrain, which is 5.00 x 5.00 m; \
+             `border_m` may be at most 2 m"
         );
-        let error = draw_pairs(&free, &rules(100.0, 0.0), 1, &streams()).unwrap_err();
+        assert_eq!(error.key(), "border_m");
+        let error = refused(&free, 0.75, 2.0);
+        assert!(error.to_string().contains("at most 0.71 m apart, but `distance_min_m` is 0.75 m"), "{error}");
+        assert_eq!(error.key(), "distance_min_m");
+        // Two cells are far enough apart, but blocked.
+        let error = refused(&map(10, 10, |row, col| row + col > 2), 4.0, 0.0);
         assert!(error.to_string().contains("pair 1: none of 100000 draws"), "{error}");
         assert!(rules(-1.0, 0.0).check().is_err() && rules(1.0, f64::NAN).check().is_err());
     }

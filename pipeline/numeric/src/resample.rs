@@ -104,8 +104,9 @@ pub fn thin(grid: &Grid, step: usize) -> Grid {
 /// assert_eq!(coarse.geometry, Geometry::square(1, 2, 1.0));
 /// ```
 pub fn block_means(grid: &Grid, step: usize) -> Grid {
-    let (g, step) = (grid.geometry, step.max(1));
-    let (rows, cols) = (g.rows / step, g.cols / step);
+    let step = step.max(1);
+    let coarse = block_geometry(&grid.geometry, step);
+    let (rows, cols) = (coarse.rows, coarse.cols);
     let mean = |row: usize, col: usize| {
         let cells = (0..step).flat_map(|r| &grid.row(row * step + r)[col * step..][..step]);
         let known = cells.filter(|z| !z.is_nan());
@@ -113,9 +114,16 @@ pub fn block_means(grid: &Grid, step: usize) -> Grid {
         if 2 * count >= step * step { sum / count as f64 } else { f64::NAN }
     };
     let values = (0..rows).into_par_iter().flat_map_iter(|r| (0..cols).map(move |c| mean(r, c))).collect();
+    Grid::new(coarse, values)
+}
+
+/// Shape and position of the result of [`block_means`].
+pub fn block_geometry(g: &Geometry, step: usize) -> Geometry {
+    let step = step.max(1);
+    let (rows, cols) = (g.rows / step, g.cols / step);
     let cell = g.cell.map(|cell| cell * step as f64);
     let origin = [g.origin[0], g.origin[1] + (g.rows - rows * step) as f64 * g.cell[1]];
-    Grid::new(Geometry { rows, cols, cell, origin }, values)
+    Geometry { rows, cols, cell, origin }
 }
 
 /// Heights at `rows` x `cols` evenly spaced points whose outer ones coincide with the outer cell centres of the grid. Interpolation

@@ -759,6 +759,68 @@ mod tests {
         assert_eq!(doubts("CC-BY-4.0", &format!("{gpl}\nlicense_file = \"terms.txt\"")), [""; 0]);
     }
 
+    /// A study with a square terrain of 40 m, `hills`, one of 150 m, `plain`, and more tables.
+    fn on_hills(tables: &str) -> Result<Loaded, Error> {
+        let head = STUDY.split_once("[[terrain]]").unwrap().0;
+        let terrain = |id: &str, side: u32| {
+            format!("[[terrain]]\nid = \"{id}\"\nkind = \"multifractal\"\nsize_px = [{side}, {side}]\ncell_m = 0.5\n")
+        };
+        load_text(&format!("{head}{}{}{tables}", terrain("hills", 80), terrain("plain", 300)), "study", Path::new(""))
+    }
+
+    /// The key and the message of the only refusal.
+    fn only_refusal(loaded: Result<Loaded, Error>) -> (String, String) {
+        match loaded {
+            Err(Error::Study { refusals: Refusals(errors), .. }) if errors.len() == 1 => {
+                (errors[0].key.last().cloned().unwrap_or_default(), errors[0].message.clone())
+            }
+            Err(other) => panic!("{other}"),
+            Ok(_) => panic!("the study is not refused"),
+        }
+    }
+
+    /// Routes for which no terrain has room are refused before the run, at the key that asks for too much; if some terrains have room, it is a doubt.
+    #[test]
+    fn val_routes_need_room_on_their_terrains() {
+        let route = |terrains: &str, more: &str| {
+            on_hills(&format!("[[route]]\nid = \"way\"\nterrains = [{terrains}]\n{more}\n"))
+        };
+        for (more, key, words) in [
+            (
+                "border_m = 25.0",
+                "border_m",
+                "leaves no cells of the terrain, which is 40.00 x 40.00 m; `border_m` may be at most 19.5 m",
+            ),
+            (
+                "border_m = 2.0\ndistance_min_m = 60.0",
+                "distance_min_m",
+                "at most 50.20 m apart, but `distance_min_m` is 60.00 m",
+            ),
+            ("sweep.distance_min_m = [20.0, 60.0]", "distance_min_m", "but `distance_min_m` is 60.00 m"),
+            ("plan_cell_m = 30.0", "plan_cell_m", "`plan_cell_m` of 30 m leaves fewer than two planning cells"),
+            ("start = [1.0, 1.0]\ngoal = [41.0, 1.0]", "", "the goal (41, 1) lies outside the terrain"),
+            (
+                "vehicle = \"husky_a200\"\ncost = \"band_rms\"",
+                "cost",
+                "`cost` is \"band_rms\", but cells of 0.5 m are too coarse",
+            ),
+        ] {
+            let (of, said) = only_refusal(route("\"hills\"", more));
+            assert!(
+                of == key && said.starts_with("route \"way\": on \"hills\": ") && said.contains(words),
+                "{of}: {said}"
+            );
+        }
+        let doubts =
+            |terrains: &str, more: &str| route(terrains, more).unwrap_or_else(|error| panic!("{more}: {error}")).doubts;
+        assert_eq!(doubts("\"hills\"", "border_m = 19.5\ndistance_min_m = 0.5"), [""; 0]);
+        let some = doubts("\"hills\", \"plain\"", "sweep.border_m = [25.0, 30.0]");
+        let words = "route \"way\" on \"hills\": cannot draw starts and goals: a border of ";
+        assert!(some.len() == 2 && some.iter().all(|doubt| doubt.starts_with(words)), "{some:?}");
+        let (_, said) = only_refusal(route("\"hills\", \"plain\"", "border_m = 80.0"));
+        assert!(said.starts_with("route \"way\": on \"hills\" and on 1 more: "), "{said}");
+    }
+
     /// Numbers, of which most parameters accept some.
     const NUMBERS: &[&str] =
         &["-1", "0", "1", "2", "3", "64", "300", "0.0", "0.05", "0.5", "2.5", "-2.5", "1e300", "1e-300"];

@@ -1,5 +1,6 @@
 //! Stage `route`: plans paths from starts to goals on each terrain.
 
+use super::dem as measured;
 use super::mask::{self, Mask};
 use super::rasters::Raster;
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
@@ -7,8 +8,9 @@ use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
 use crate::operations::drawn::Routes;
 use crate::operations::place::{PLACE, Place};
+use crate::operations::room::{self, Lack};
 use crate::operations::roughness::settings;
-use crate::operations::routes::{self, Given, Outcome as Found, Site};
+use crate::operations::routes::{self, Given, Outcome as Found, Site, cells_of_ends, planning_cells};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::entry::joined;
@@ -16,9 +18,9 @@ use crate::study::{Entry, Expanded, StudyError, keys};
 use sastrugi_mobility::registry;
 use sastrugi_mobility::vehicle::Vehicle;
 use sastrugi_navigation::SlopeCost;
-use sastrugi_navigation::pairs::{Pair, PairParameters, draw_pairs};
+use sastrugi_navigation::pairs::{Pair, PairParameters, check_size, draw_pairs};
 use sastrugi_navigation::parameters::{Cost, RouteParameters, Search as Method};
-use sastrugi_numeric::Streams;
+use sastrugi_numeric::{Geometry, Streams};
 use sastrugi_schemas::Record;
 use sastrugi_schemas::study::{RoughnessSection, RouteItem};
 use sastrugi_schemas::tables::{RoutePointRow, RouteRow};
@@ -124,6 +126,10 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
     let searches = expanded.iter().map(|one| parameters_of(entry, &envelope, one)).collect::<Result<Vec<_>, _>>()?;
     let terrains = terrains(builder, entry, &envelope.terrains)?;
+    for search in &searches {
+        let has_room = |field: &Heightfield, terrain: &Geometry| check_room(field, terrain, search, vehicle.as_ref());
+        room::check(builder, entry, &terrains, has_room)?;
+    }
     let cost_raster = envelope.cost_raster.as_deref().map(|id| builder.surface(entry, "cost_raster", id));
     let cost_raster = cost_raster.transpose()?.map(Raster::from);
     let obstacles = mask::add_obstacles(builder, entry, &envelope)?;
@@ -161,6 +167,22 @@ fn parameters_of(
     let given = parameters.check_given(envelope.vehicle.is_some(), envelope.cost_raster.is_some());
     given.map_err(|e| entry.refuse(e))?;
     Ok((parameters, pairs(entry, envelope, rules)?))
+}
+
+/// Checks that a terrain has cells to plan on, and places for starts and goals.
+fn check_room(
+    field: &Heightfield,
+    terrain: &Geometry,
+    (parameters, pairs): &(RouteParameters, Pairs),
+    vehicle: Option<&Vehicle>,
+) -> Result<(), Lack> {
+    let cells = planning_cells(terrain, parameters, vehicle)?;
+    match pairs {
+        // In the coordinates of its file, which may be degrees.
+        Pairs::Given(_) if field.item.stage == measured::STAGE => Ok(()),
+        Pairs::Given(ends_m) => cells_of_ends(&cells, *ends_m).map(drop).map_err(|why| Lack::new("", why)),
+        Pairs::Drawn { rules, .. } => check_size(&cells, rules).map_err(|e| Lack::new(e.key(), format!("cannot {e}"))),
+    }
 }
 
 /// Ids of the terrains that a key `terrains` names.

@@ -5,7 +5,7 @@
 //! | read and prepare a DEM | [`mod@dem`] (window, metres), [`place`] (position in its raster), [`masks`], [`coregistration`] |
 //! | generate and write surfaces | [`terrains`], [`inputs`], [`textures`], [`fits`] (file and table rows) |
 //! | render images and recover heights from them | [`images`], [`photoclinometry`] |
-//! | plan and drive | [`routes`], [`drawn`] (missions of other sections), [`rovers`], [`planner`], [`roughness`] (settings) |
+//! | plan and drive | [`routes`], [`drawn`] (missions of other sections), [`rovers`], [`planner`], [`roughness`] (settings), [`room`] on surfaces |
 
 pub mod coregistration;
 pub mod dem;
@@ -17,6 +17,7 @@ pub mod masks;
 pub mod photoclinometry;
 pub mod place;
 pub mod planner;
+pub mod room;
 pub mod roughness;
 pub mod routes;
 pub mod rovers;

@@ -8,10 +8,13 @@ use sastrugi_navigation::obstacles::{self, Polygon};
 use sastrugi_navigation::pairs::Pair;
 use sastrugi_navigation::parameters::{Cost, RouteParameters};
 use sastrugi_navigation::{CostModel, Node, Planner, Route, RouteError, RouteSettings, TravelMap};
-use sastrugi_numeric::{Grid, Surface, resample};
-use sastrugi_roughness::{ClassThresholds, Detrended, Detrender, WaveBand, classify, moore_gradient};
+use sastrugi_numeric::{Geometry, Grid, Surface, resample};
+use sastrugi_roughness::{BandError, ClassThresholds, Detrended, Detrender, WaveBand, classify, moore_gradient};
 use sastrugi_schemas::ParameterError;
 use std::fmt::Display;
+
+/// The ends of a route, as messages name them.
+const ENDS: [&str; 2] = ["start", "goal"];
 
 /// Inputs of route planning besides the heights.
 #[derive(Clone, Debug, Default)]
@@ -86,7 +89,7 @@ impl Site {
     /// # Errors
     /// Heights on which no route can be planned, or inputs that do not match them.
     pub fn new(heights: &Grid, parameters: &RouteParameters, given: &Given) -> Result<Self, JobError> {
-        let step = coarsening(heights, parameters)?;
+        let step = coarsening(&heights.geometry, parameters).map_err(refused)?;
         let coarse = |grid: &Grid| if step > 1 { resample::block_means(grid, step) } else { grid.clone() };
         let ability = given.vehicle.as_ref().map(|v| SlopeAbility::of(v, &SurfaceParameters::default()));
         let limits_deg = ability.map_or(RouteParameters::WITHOUT_VEHICLE_DEG, |a| [a.up_deg, a.down_deg]);
@@ -148,28 +151,14 @@ impl Site {
     ///
     /// # Errors
     /// A point that is not on the map or cannot be entered, or both points in the same cell.
-    pub fn pair(&self, [start_m, goal_m]: [[f64; 2]; 2]) -> Result<Pair, JobError> {
-        let pair = Pair { start: self.node("start", start_m)?, goal: self.node("goal", goal_m)?, draws: 1 };
-        if pair.start != pair.goal {
-            return Ok(pair);
-        }
-        let ([x, y], [dx, dy]) = (start_m, self.map.cell_m());
-        Err(JobError::input(format!(
-            "the start ({x}, {y}) and the goal ({}, {}) lie in the same cell of {dx} x {dy} m; choose points farther apart",
-            goal_m[0], goal_m[1]
-        )))
+    pub fn pair(&self, ends_m: [[f64; 2]; 2]) -> Result<Pair, JobError> {
+        let cells = cells_of_ends(&self.map.heights().geometry, ends_m).map_err(JobError::input)?;
+        let node = |end: usize| self.entered(ENDS[end], ends_m[end], cells[end]);
+        Ok(Pair { start: node(0)?, goal: node(1)?, draws: 1 })
     }
 
-    fn node(&self, name: &str, [x, y]: [f64; 2]) -> Result<Node, JobError> {
-        let g = self.map.heights().geometry;
-        let outside = || {
-            let ([x0, y0], [width, height]) = (g.origin, g.size());
-            let (x1, y1) = (x0 + width, y0 + height);
-            JobError::input(format!(
-                "the {name} ({x}, {y}) lies outside the terrain, which covers x from {x0} to {x1} and y from {y0} to {y1} m"
-            ))
-        };
-        let (row, col) = g.cell_at(x, y).ok_or_else(outside)?;
+    /// The node of a cell, which must not be blocked.
+    fn entered(&self, name: &str, [x, y]: [f64; 2], (row, col): (usize, usize)) -> Result<Node, JobError> {
         let node = self.map.node(row, col);
         if !self.map.is_blocked(node) {
             return Ok(node);
@@ -242,18 +231,59 @@ pub fn distances_m(points: &[[f64; 3]]) -> Vec<f64> {
     all
 }
 
+/// Checks the cells of a terrain against the settings of a search, and returns those on which routes are planned.
+///
+/// # Errors
+/// Planning cells that are too large for the terrain, or a terrain on which the vehicle's band of wavelengths cannot be measured.
+pub fn planning_cells(
+    terrain: &Geometry,
+    parameters: &RouteParameters,
+    vehicle: Option<&Vehicle>,
+) -> Result<Geometry, ParameterError> {
+    let step = coarsening(terrain, parameters)?;
+    if let (Cost::BandRms, Some(vehicle)) = (parameters.cost, vehicle) {
+        let refused = |e: BandError| ParameterError::new("cost", format!("is \"band_rms\", but {e}"));
+        band_of(vehicle, terrain).map_err(refused)?;
+    }
+    Ok(resample::block_geometry(terrain, step))
+}
+
+/// Rows and columns of a start and a goal in the coordinates of the heights, m.
+///
+/// # Errors
+/// The message on a point outside the terrain, or on both points in the same cell.
+pub fn cells_of_ends(terrain: &Geometry, ends_m: [[f64; 2]; 2]) -> Result<[(usize, usize); 2], String> {
+    let cell = |end: usize| {
+        let [x, y] = ends_m[end];
+        terrain.cell_at(x, y).ok_or_else(|| {
+            let ([x0, y0], [width, height]) = (terrain.origin, terrain.size());
+            let (x1, y1) = (x0 + width, y0 + height);
+            format!(
+                "the {} ({x}, {y}) lies outside the terrain, which covers x from {x0} to {x1} and y from {y0} to {y1} m",
+                ENDS[end]
+            )
+        })
+    };
+    let cells = [cell(0)?, cell(1)?];
+    if cells[0] != cells[1] {
+        return Ok(cells);
+    }
+    let ([[x, y], [goal_x, goal_y]], [dx, dy]) = (ends_m, terrain.cell);
+    Err(format!(
+        "the start ({x}, {y}) and the goal ({goal_x}, {goal_y}) lie in the same cell of {dx} x {dy} m; choose points farther apart"
+    ))
+}
+
 /// Width of a planning cell in cells of the heights.
-fn coarsening(heights: &Grid, parameters: &RouteParameters) -> Result<usize, JobError> {
+fn coarsening(terrain: &Geometry, parameters: &RouteParameters) -> Result<usize, ParameterError> {
     let Some(plan_cell_m) = parameters.plan_cell_m else { return Ok(1) };
-    let g = &heights.geometry;
-    let [dx, dy] = g.cell;
+    let Geometry { rows, cols, cell: [dx, dy], .. } = *terrain;
     let step = (plan_cell_m / dx.max(dy)).round().max(1.0);
-    let side = g.rows.min(g.cols) as f64;
-    if step * 2.0 > side {
-        return Err(JobError::input(format!(
-            "`plan_cell_m` of {plan_cell_m} m leaves fewer than two planning cells along a side of the terrain, which has {} x {} cells of {dx} x {dy} m",
-            g.rows, g.cols
-        )));
+    if step * 2.0 > rows.min(cols) as f64 {
+        let message = format!(
+            "of {plan_cell_m} m leaves fewer than two planning cells along a side of the terrain, which has {rows} x {cols} cells of {dx} x {dy} m"
+        );
+        return Err(ParameterError::new("plan_cell_m", message));
     }
     Ok(step as usize)
 }
@@ -281,12 +311,20 @@ fn factors(heights: &Grid, parameters: &RouteParameters, given: &Given) -> Resul
 /// RMS height around each cell in the band of wavelengths that excites the vehicle, m.
 fn band_rms(heights: &Grid, given: &Given) -> Result<Grid, JobError> {
     let vehicle = given.vehicle.as_ref().ok_or_else(|| JobError::new("`cost = \"band_rms\"` needs a `vehicle`"))?;
-    let band = WaveBand::of_vehicle(vehicle.wheelbase_m(), vehicle.parameters().wheels.radius_m).map_err(failed)?;
-    let [dx, dy] = heights.geometry.cell;
-    let [x, y] = heights.geometry.size();
-    band.fits_cells(dx.max(dy)).map_err(failed)?;
-    band.fits_length(x.max(y)).map_err(failed)?;
+    let band = band_of(vehicle, &heights.geometry).map_err(JobError::input)?;
     Ok(Detrended::of(heights, &band, Detrender::Band).rms_map())
+}
+
+/// The band of wavelengths that excites a vehicle.
+///
+/// # Errors
+/// A terrain whose cells are too large, or which is too short, to measure it.
+fn band_of(vehicle: &Vehicle, terrain: &Geometry) -> Result<WaveBand, BandError> {
+    let band = WaveBand::of_vehicle(vehicle.wheelbase_m(), vehicle.parameters().wheels.radius_m)?;
+    let ([dx, dy], [x, y]) = (terrain.cell, terrain.size());
+    band.fits_cells(dx.max(dy))?;
+    band.fits_length(x.max(y))?;
+    Ok(band)
 }
 
 /// A raster resampled to the cells of the heights; NaN where it has no data.
@@ -319,7 +357,6 @@ fn failed(error: impl Display) -> JobError {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use sastrugi_numeric::Geometry;
 
     fn heights() -> Grid {
         Grid::filled(Geometry { rows: 10, cols: 20, cell: [0.5, 0.25], origin: [100.0, 50.0] }, 0.0)
@@ -338,12 +375,45 @@ mod tests {
     fn val_planning_cells_are_whole_numbers_of_cells() {
         let of = |plan_cell_m: Option<f64>| {
             let parameters = RouteParameters { plan_cell_m, ..RouteParameters::default() };
-            coarsening(&heights(), &parameters).map_err(|e| e.message)
+            coarsening(&heights().geometry, &parameters).map_err(|e| e.to_string())
         };
         let steps = [None, Some(0.1), Some(0.6), Some(1.3), Some(2.5)].map(|cell| of(cell).unwrap());
         assert_eq!(steps, [1, 1, 1, 3, 5]);
         let error = of(Some(3.0)).unwrap_err();
         assert!(error.starts_with("`plan_cell_m` of 3 m leaves fewer than two planning cells"), "{error}");
+    }
+
+    /// Both ends must lie on the terrain, in different cells.
+    #[test]
+    fn val_ends_lie_in_two_cells_of_the_terrain() {
+        // It covers x from 100 to 110 and y from 50 to 52.5.
+        let cells = |ends_m: [[f64; 2]; 2]| cells_of_ends(&heights().geometry, ends_m);
+        assert_eq!(cells([[100.1, 50.1], [109.9, 52.4]]), Ok([(9, 0), (0, 19)]));
+        for (ends_m, words) in [
+            (
+                [[99.0, 50.1], [109.9, 52.4]],
+                "the start (99, 50.1) lies outside the terrain, which covers x from 100 to 110",
+            ),
+            ([[100.1, 50.1], [109.9, 53.0]], "the goal (109.9, 53) lies outside"),
+            ([[100.1, 50.1], [100.4, 50.2]], "lie in the same cell of 0.5 x 0.25 m"),
+        ] {
+            let why = cells(ends_m).unwrap_err();
+            assert!(why.contains(words), "{why}");
+        }
+    }
+
+    /// The band of a Husky begins below 1 m: cells of 1 m cannot hold it, whatever is planned on; other costs do not need it.
+    #[test]
+    fn val_a_band_needs_fine_cells() {
+        let husky = sastrugi_mobility::registry::vehicle("husky_a200", &Default::default()).unwrap();
+        let of = |cell_m: f64, cost: Cost| {
+            let parameters = RouteParameters { cost, plan_cell_m: Some(2.0), ..RouteParameters::default() };
+            planning_cells(&Geometry::square(400, 400, cell_m), &parameters, Some(&husky)).map_err(|e| e.to_string())
+        };
+        assert_eq!(of(1.0, Cost::Slope), Ok(Geometry::square(200, 200, 2.0)));
+        assert_eq!(of(0.05, Cost::BandRms), Ok(Geometry::square(10, 10, 2.0)));
+        let refused = of(1.0, Cost::BandRms).unwrap_err();
+        assert!(refused.starts_with("`cost` is \"band_rms\", but cells of 1 m are too coarse"), "{refused}");
     }
 
     /// A plane stays a plane on other cells; beyond the raster, there are no factors.

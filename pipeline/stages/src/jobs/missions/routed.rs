@@ -8,8 +8,9 @@ use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, unknown_id};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
 use crate::operations::drawn::{Drawn, Lines};
+use crate::operations::room::{self, Lack};
 use crate::operations::roughness::settings;
-use crate::operations::routes::{Given, Site};
+use crate::operations::routes::{Given, Site, planning_cells};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
@@ -17,7 +18,7 @@ use sastrugi_mobility::missions::{Mission, Polyline};
 use sastrugi_mobility::registry;
 use sastrugi_mobility::vehicle::Vehicle;
 use sastrugi_navigation::parameters::{Cost, RouteParameters};
-use sastrugi_numeric::Grid;
+use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{MissionsItem, RoughnessSection};
 use sastrugi_schemas::{Kind, counted};
@@ -104,6 +105,11 @@ pub fn add(
     };
     let plan = Plan { parameters: raw.route.clone(), vehicle, roughness: builder.study.roughness.clone() };
     let plan = Arc::new(plan);
+    let has_room = |_: &Heightfield, terrain: &Geometry| {
+        let cells = planning_cells(terrain, &plan.parameters, plan.vehicle.as_ref());
+        cells.map(drop).map_err(|e| Lack::from(e.within("route")))
+    };
+    room::check(builder, entry, straight.lines.iter().map(|line| &line.heightfield), has_room)?;
     let (mut all, mut rules) = (Vec::new(), None);
     for line in &straight.lines {
         let Some(field) = builder.heightfields.get(&line.heightfield).cloned() else { continue };
