@@ -20,7 +20,8 @@ fn main() {
 fn plan(bencher: Bencher, terrains: usize) {
     let text = format!(
         "[study]\nname = \"many\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
-         size_px = [64, 64]\ncount = {terrains}\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = 20\n\n\
+         size_px = [64, 64]\ncount = {terrains}\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = 20\n\
+         length_m = 2.0\nborder_m = 0.5\n\n\
          [[traverse]]\nid = \"h\"\nmissions = \"m\"\n"
     );
     let folder = tempfile::tempdir().unwrap_or_else(|e| panic!("{e}"));

@@ -15,7 +15,8 @@ fn study(folder: &Path, missions: usize) {
     let terrains = missions.div_ceil(MISSIONS_PER_TERRAIN);
     let text = format!(
         "[study]\nname = \"many\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\nsize_px = [64, 64]\n\
-         count = {terrains}\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = {MISSIONS_PER_TERRAIN}\n\n[[traverse]]\nid = \"h\"\n\
+         count = {terrains}\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\ncount = {MISSIONS_PER_TERRAIN}\n\
+         length_m = 2.0\nborder_m = 0.5\n\n[[traverse]]\nid = \"h\"\n\
          missions = \"m\"\n"
     );
     write(folder, "study.toml", &text);
@@ -111,8 +112,11 @@ fn val_files_of_a_release_are_linked() {
     let folder = area();
     study(folder.path(), 20);
     let text = std::fs::read_to_string(folder.path().join("study.toml")).unwrap();
-    let short = "count = 2\nlength_m = 5.0\nborder_m = 1.5\n";
-    let study = text.replace("count = 20\n", short).replace("size_px = [64, 64]", "size_px = [320, 300]");
+    let study = [
+        ("count = 20\nlength_m = 2.0\nborder_m = 0.5\n", "count = 2\nlength_m = 5.0\nborder_m = 1.5\n"),
+        ("size_px = [64, 64]", "size_px = [320, 300]"),
+    ];
+    let study = study.iter().fold(text, |text, (small, large)| text.replace(small, large));
     sastrugi_tests::run_study(folder.path(), &study, &[]);
     let release = folder.path().join("release");
     let names = |path: &str| std::fs::metadata(release.join(path)).unwrap().nlink();

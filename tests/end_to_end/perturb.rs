@@ -34,6 +34,8 @@ cell_m = 0.1
 id = "plain"
 terrains = ["plate"]
 count = 1
+length_m = 5.0
+border_m = 1.5
 
 [[rover]]
 id = "rays"

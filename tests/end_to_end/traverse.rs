@@ -276,14 +276,15 @@ fn val_measured_dems_are_driven_or_refused() {
 
     let other = area();
     let short = ["--set-missions", "length_m=2.0", "--set-missions", "border_m=0.5", "--set", "timeout_s=40"];
-    for (dem, more, words) in [
-        // 423 x 331 cells of 2 cm.
-        (&gaps, &[][..], "the terrain is 8.46 x 6.62 m, including a border of 5 m"),
-        (&gaps, &short[..], "there is no low roughness in the"),
-        (&catchment, &[][..], "cells of 1 m: they are larger than its wheelbase of 0.512 m"),
+    for (dem, more, expected, words) in [
+        // 423 x 331 cells of 2 cm, which is known before the heights are read.
+        (&gaps, &[][..], 2, "the terrain is 8.46 x 6.62 m, including a border of 5 m"),
+        (&gaps, &short[..], 65, "there is no low roughness in the"),
+        (&catchment, &[][..], 65, "cells of 1 m: they are larger than its wheelbase of 0.512 m"),
     ] {
         let (code, said) = drive(other.path(), dem, more);
-        assert!(code == 65 && said.contains(words), "{code} {said}");
+        let said: String = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+        assert!(code == expected && said.contains(words), "{code} {said}");
         assert!(!other.path().join("drive").exists(), "a release without a mission");
     }
     // If gaps are not filled, the release states how many missions were not driven, and why: three of five starts have a wheel over a gap.

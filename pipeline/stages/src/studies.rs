@@ -428,8 +428,8 @@ mod tests {
     use serde_json::json;
 
     const STUDY: &str = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\n\
-        count = 2\nsize_px = [64, 64]\nhigh.fractal_dimension = 2.5\nsweep.cell_m = [0.05, 0.1]\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\n\n\
-        [[traverse]]\nid = \"h\"\nmissions = \"m\"\ncontroller.lookahead_m = 1.0\n";
+        count = 2\nsize_px = [64, 64]\nhigh.fractal_dimension = 2.5\nsweep.cell_m = [0.05, 0.1]\n\n[[missions]]\nid = \"m\"\nterrains = [\"t\"]\n\
+        length_m = 2.0\nborder_m = 0.5\n\n[[traverse]]\nid = \"h\"\nmissions = \"m\"\ncontroller.lookahead_m = 1.0\n";
 
     #[test]
     fn val_a_study_becomes_its_items() {
@@ -819,6 +819,31 @@ mod tests {
         assert!(some.len() == 2 && some.iter().all(|doubt| doubt.starts_with(words)), "{some:?}");
         let (_, said) = only_refusal(route("\"hills\", \"plain\"", "border_m = 80.0"));
         assert!(said.starts_with("route \"way\": on \"hills\" and on 1 more: "), "{said}");
+    }
+
+    /// Missions that are too long for all their terrains are refused before the run; if some terrains can hold them, it is a doubt. Routed missions
+    /// need cells to plan on.
+    #[test]
+    fn val_missions_need_room_on_their_terrains() {
+        let missions = |terrains: &str, more: &str| {
+            on_hills(&format!("[[missions]]\nid = \"m\"\nterrains = [{terrains}]\n{more}\n"))
+        };
+        let words =
+            "on \"hills\": cannot place missions of 45 m: the terrain is 40.00 x 40.00 m, including a border of 5 m";
+        let (key, said) = only_refusal(missions("\"hills\"", "length_m = 45.0"));
+        assert!(key == "length_m" && said.starts_with(&format!("missions \"m\": {words}")), "{key}: {said}");
+        let doubts = |terrains: &str, more: &str| {
+            missions(terrains, more).unwrap_or_else(|error| panic!("{more}: {error}")).doubts
+        };
+        let some = doubts("\"hills\", \"plain\"", "length_m = 45.0");
+        assert!(some.len() == 1 && some[0].starts_with(&format!("missions \"m\" {words}")), "{some:?}");
+        assert_eq!(doubts("\"hills\"", "length_m = 40.0"), [""; 0]);
+        let planned = "[[missions]]\nid = \"planned\"\nkind = \"routed\"\nof = \"m\"\nroute = { plan_cell_m = 30.0 }";
+        let (key, said) = only_refusal(missions("\"hills\"", planned));
+        assert!(
+            key == "plan_cell_m" && said.contains("`route.plan_cell_m` of 30 m leaves fewer than two"),
+            "{key}: {said}"
+        );
     }
 
     /// Numbers, of which most parameters accept some.

@@ -319,7 +319,8 @@ mod tests {
 
     const STUDY: &str = "# A study.\n[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n\n[[terrain]]\nid = \"a\"\nkind = \"multifractal\"\n\
         count = 2\nsize_px = [64, 64]\n\n# Not for rovers.\n[[terrain]]\nid = \"b\"\nkind = \"multifractal\"\nsize_px = [64, 64]\n\n\
-        [[missions]]\nid = \"m\"\nterrains = [\"a\", \"b\"]\n\n[[rover]]\nid = \"r\"\nkind = \"sojourner_like\"\nterrains = [\"a-0002\"]\n\
+        [[missions]]\nid = \"m\"\nterrains = [\"a\", \"b\"]\nlength_m = 2.0\nborder_m = 0.5\n\n\
+        [[rover]]\nid = \"r\"\nkind = \"sojourner_like\"\nterrains = [\"a-0002\"]\n\
         rovers = 3\nradius_m = 1.0\nnoise = { turn = 0.1 }\n\n\
         [[rover]]\nid = \"q\"\nkind = \"schoppers_like\"\nterrains = [\"a\"]\nrovers = 3\nradius_m = 1.0\nperturb.parameters = [\"commit_m\"]\n";
 

@@ -6,6 +6,7 @@ use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::jobs::roughness;
 use crate::operations::dem::input_error;
 use crate::operations::drawn::{Drawn, Lines};
+use crate::operations::room::{self, Lack};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
@@ -93,8 +94,9 @@ pub fn add(
     let of = |id: String| Arc::new(lines(builder, &envelope.id, &rules, id));
     let lines: Vec<Arc<Lines>> = heightfields.into_iter().map(of).collect();
     check_geometry(builder, entry, &lines)?;
-    let doubt = doubt_of_size(builder, &envelope.id, &lines, &settings);
-    builder.doubts.extend(doubt);
+    room::check(builder, entry, lines.iter().map(|one| &one.heightfield), |_, terrain| {
+        check_size(terrain, &settings).map_err(|e| Lack::new("length_m", format!("cannot {e}")))
+    })?;
     for one in &lines {
         let words = format!("{}@{}", envelope.id, one.word);
         let streams = builder.streams(STAGE, &words, envelope.seed, one.shared.unwrap_or(0));
@@ -128,25 +130,6 @@ fn lines(builder: &Builder<'_>, missions: &str, rules: &Arc<Value>, heightfield:
         shared,
         heightfield,
     }
-}
-
-/// A warning about heightfields that are too small for the missions, as far as this is known before the run: all their missions will fail.
-fn doubt_of_size(
-    builder: &Builder<'_>,
-    missions: &str,
-    lines: &[Arc<Lines>],
-    settings: &MissionSettings,
-) -> Option<String> {
-    let mut small = lines.iter().filter_map(|one| {
-        let geometry = builder.heightfields.get(&one.heightfield)?.expected?;
-        Some((&one.heightfield, check_size(&geometry, settings).err()?))
-    });
-    let (id, error) = small.next()?;
-    let others = match small.count() {
-        0 => String::new(),
-        n => format!(" and on {n} more"),
-    };
-    Some(format!("missions \"{missions}\" on \"{id}\"{others}: cannot {error}"))
 }
 
 /// Refuses heightfields that share draws but have different cells, as far as this is known before the run.
