@@ -102,6 +102,26 @@ pub fn doubts(kind: &str, changes: &Map<String, Value>) -> Vec<String> {
     vehicle(kind, changes).map(|changed| crate::vehicle::doubts(changed.parameters(), base)).unwrap_or_default()
 }
 
+/// A warning about a commanded speed that a vehicle does not reach.
+///
+/// ```
+/// use sastrugi_mobility::registry::{doubt_of_speed, vehicle};
+/// use serde_json::Map;
+///
+/// let husky = vehicle("husky_a200", &Map::new()).unwrap();
+/// assert!(doubt_of_speed(&husky, 1.0).is_none());
+/// assert!(doubt_of_speed(&husky, 3.0).unwrap().starts_with("speed_m_s is 3 m/s, but the vehicle reaches at most 1 m/s"));
+/// ```
+pub fn doubt_of_speed(vehicle: &Vehicle, speed_m_s: f64) -> Option<String> {
+    let limit_m_s = vehicle.speed_limit_m_s();
+    (speed_m_s > limit_m_s).then(|| {
+        format!(
+            "speed_m_s is {speed_m_s} m/s, but the vehicle reaches at most {limit_m_s} m/s (drive.speed_limit_m_s), so the results are \
+             those of {limit_m_s} m/s"
+        )
+    })
+}
+
 /// One parameter of a run: its path, its value as JSON and its source.
 #[derive(Clone, Debug, PartialEq, Eq)]
 pub struct Number {

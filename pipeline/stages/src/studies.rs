@@ -846,6 +846,28 @@ mod tests {
         );
     }
 
+    /// A stated speed that the vehicle does not reach is told with its limit, once for each value of a sweep; the default is not.
+    #[test]
+    fn val_speeds_out_of_reach_are_told_before_the_run() {
+        let doubts = |more: &str| {
+            let loaded = load_text(&format!("{STUDY}{more}\n"), "study", Path::new(""));
+            loaded.unwrap_or_else(|error| panic!("{more}: {error}")).doubts
+        };
+        let told = |speed: &str, limit: &str| {
+            format!(
+                "traverse \"h\": speed_m_s is {speed} m/s, but the vehicle reaches at most {limit} m/s (drive.speed_limit_m_s), so the \
+                 results are those of {limit} m/s"
+            )
+        };
+        let rover = "vehicle = \"rocker_bogie_rover\"";
+        assert_eq!(doubts("speed_m_s = 3.0"), [told("3", "1")]);
+        assert_eq!(doubts("sweep.speed_m_s = [0.5, 1.0, 3.0, 4.0]"), [told("3", "1"), told("4", "1")]);
+        assert_eq!(doubts(&format!("{rover}\nspeed_m_s = 0.6")), [told("0.6", "0.5")]);
+        for more in ["speed_m_s = 1.0", "vehicle_changes.drive.speed_limit_m_s = 3.0\nspeed_m_s = 3.0", rover] {
+            assert_eq!(doubts(more), [""; 0], "{more}");
+        }
+    }
+
     /// Numbers, of which most parameters accept some.
     const NUMBERS: &[&str] =
         &["-1", "0", "1", "2", "3", "64", "300", "0.0", "0.05", "0.5", "2.5", "-2.5", "1e300", "1e-300"];

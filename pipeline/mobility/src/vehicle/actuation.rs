@@ -52,6 +52,13 @@ impl Limits {
     }
 }
 
+impl Vehicle {
+    /// Highest speed at which it is driven, m/s, whatever a run commands.
+    pub fn speed_limit_m_s(&self) -> f64 {
+        Limits::of(self).speed_m_s
+    }
+}
+
 /// Smallest turning radius, m, at which the inner one of the farthest steered wheels reaches its limit.
 fn turn_radius_m(vehicle: &Vehicle, drive: &AckermannParameters) -> f64 {
     let steered = vehicle.wheels.iter().filter(|wheel| wheel.steered);

@@ -3,7 +3,7 @@
 use crate::error::Error;
 use crate::study::keys;
 use crate::study::text::{StudyText, value_to_json};
-use sastrugi_mobility::registry::{CUSTOM, doubts, vehicle};
+use sastrugi_mobility::registry::{CUSTOM, doubt_of_speed, doubts, vehicle};
 use sastrugi_schemas::Kind;
 use serde_json::{Map, Value};
 use std::path::Path;
@@ -109,8 +109,10 @@ fn check_vehicle((key, base): (&str, &str), changes: &Map<String, Value>) -> Res
 
 /// Warnings about the vehicle of a run, one sentence each.
 pub fn vehicle_doubts(params: &Value) -> Vec<String> {
+    let Some(kind) = params["vehicle"].as_str() else { return Vec::new() };
     let changes = params[CHANGES].as_object().cloned().unwrap_or_default();
-    params["vehicle"].as_str().map(|kind| doubts(kind, &changes)).unwrap_or_default()
+    let of_speed = || doubt_of_speed(&vehicle(kind, &changes).ok()?, params["speed_m_s"].as_f64()?);
+    doubts(kind, &changes).into_iter().chain(of_speed()).collect()
 }
 
 fn parse_value(pair: &str, text: &str) -> Result<Value, Error> {
