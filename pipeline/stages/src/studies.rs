@@ -868,6 +868,36 @@ mod tests {
         }
     }
 
+    /// A formation larger than its terrain is a doubt, as the team runs all the same: a column of four is three times its spacing deep, a line of four as
+    /// wide, and a custom formation as large as its slots. The terrain's diagonal is 56.6 m.
+    #[test]
+    fn val_formations_larger_than_their_terrain_are_told() {
+        let doubts = |more: &str| {
+            let route = "[[route]]\nid = \"way\"\nterrains = [\"hills\"]\n";
+            let loaded = on_hills(&format!("{route}[[navigate]]\nid = \"team\"\nroute = \"way\"\n{more}\n"));
+            loaded.unwrap_or_else(|error| panic!("{more}: {error}")).doubts
+        };
+        for (more, sizes) in [
+            ("spacing_m = 60.0", &["180.0 m deep and 0.0 m wide"][..]),
+            (
+                "spacing_m = 20.0\nsweep.formation = [\"column\", \"line\", \"wedge\"]",
+                &["60.0 m deep and 0.0 m wide", "0.0 m deep and 60.0 m wide", "40.0 m deep and 60.0 m wide"],
+            ),
+            (
+                "formation = \"custom\"\nslots = [{ id = 1 }, { id = 2, predecessor = 1, depth_m = 50.0, width_m = 30.0 }]",
+                &["50.0 m deep and 30.0 m wide"],
+            ),
+            ("spacing_m = 18.0", &[]),
+        ] {
+            let found = doubts(more);
+            assert_eq!(found.len(), sizes.len(), "{found:?}");
+            for (doubt, size) in found.iter().zip(sizes) {
+                let words = format!("navigate \"team\" on \"hills\": the formation, {size}, has no room");
+                assert!(doubt.starts_with(&words), "{doubt}");
+            }
+        }
+    }
+
     /// Numbers, of which most parameters accept some.
     const NUMBERS: &[&str] =
         &["-1", "0", "1", "2", "3", "64", "300", "0.0", "0.05", "0.5", "2.5", "-2.5", "1e300", "1e-300"];

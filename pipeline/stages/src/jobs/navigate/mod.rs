@@ -8,6 +8,7 @@ use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::dem::input_error;
 use crate::operations::drawn::Routes;
 use crate::operations::place::{PLACE, Place};
+use crate::operations::room::{self, Lack};
 use crate::operations::routes::distances_m;
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -20,7 +21,7 @@ use sastrugi_navigation::formation::parameters::Shape;
 use sastrugi_navigation::formation::{Outcome as Ended, Team, TeamError, TeamGround, TeamParameters};
 use sastrugi_navigation::vertices::Vertices;
 use sastrugi_navigation::{CostModel, Ground, Method, SlopeLimits, TravelMap};
-use sastrugi_numeric::{Grid, Streams};
+use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::{McapFlavour, NavigateItem, StudyHead};
 use sastrugi_schemas::tables::{FormationEventRow, FormationRow, FormationSampleRow};
@@ -94,6 +95,10 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         return Err(unknown_id(entry, "route", &envelope.route, builder.routes.keys()).into());
     };
     one_search(entry, &routes)?;
+    for team in &teams {
+        let terrains = routes.iter().map(|one| &one.terrain);
+        room::doubt(builder, entry, terrains, |_, terrain| check_room(team, terrain));
+    }
     for (one, parameters) in expanded.into_iter().zip(teams) {
         builder.claim(entry, STAGE, &one.id)?;
         let lead =
@@ -109,6 +114,22 @@ fn parameters_of(entry: &Entry<'_>, one: &Expanded) -> Result<TeamParameters, Bu
     let parameters: TeamParameters = read_parameters(&one.params).map_err(|e| entry.refuse(e))?;
     parameters.check().map_err(|e| entry.refuse(e))?;
     Ok(parameters)
+}
+
+/// Checks that a terrain has room for the formation of a team in some direction. Without it the team runs all the same, but never in formation.
+fn check_room(team: &TeamParameters, terrain: &Geometry) -> Result<(), Lack> {
+    let [leftmost_m, rightmost_m, depth_m] = team.formation()?.extent_m();
+    let width_m = rightmost_m - leftmost_m;
+    let diagonal_m = |[x_m, y_m]: [f64; 2]| (x_m * x_m + y_m * y_m).sqrt();
+    let terrain_m = diagonal_m(terrain.size());
+    if diagonal_m([width_m, depth_m]) <= terrain_m {
+        return Ok(());
+    }
+    let why = format!(
+        "the formation, {depth_m:.1} m deep and {width_m:.1} m wide, has no room on the terrain, whose diagonal is {terrain_m:.1} m; it will be \
+         compressed everywhere: use a smaller spacing, fewer members or a larger terrain"
+    );
+    Err(Lack::new("spacing_m", why))
 }
 
 /// Refuses the id of a swept route, which refers to several searches.
