@@ -898,6 +898,53 @@ mod tests {
         }
     }
 
+    /// Rovers whose starts and goals have no ground are refused before the run: all places on a circle must lie on it, and drawn ones within its reach.
+    /// The ground is 0.25 to 39.75 m along x and y.
+    #[test]
+    fn val_rovers_need_ground_at_starts_and_goals() {
+        let rover = |more: &str| {
+            on_hills(&format!(
+                "[[rover]]\nid = \"r\"\nkind = \"sojourner_like\"\nterrains = [\"hills\"]\nrovers = 4\n{more}\n"
+            ))
+        };
+        let drawn = "starts = \"drawn\"\nradius_m = 10.0\n";
+        for (more, key, words) in [
+            (
+                "radius_m = 5.0".to_owned(),
+                "centre_m",
+                "a goal lies off the terrain: there is no ground at x = 0.000, y = 0.000 m",
+            ),
+            (
+                "centre_m = [20.0, 20.0]\nradius_m = 20.0".to_owned(),
+                "radius_m",
+                "a start lies off the terrain: there is no ground at x = 40.000",
+            ),
+            (
+                format!("{drawn}centre_m = [50.0, 20.0]"),
+                "centre_m",
+                "the disk in which starts are drawn lies off the terrain (it extends from x = 0",
+            ),
+            (
+                format!("{drawn}centre_m = [20.0, 20.0]\ndistance_m = 56.0"),
+                "distance_m",
+                "`distance_m` is 56 m; from start to goal there are at most 55.86 m",
+            ),
+        ] {
+            let (of, said) = only_refusal(rover(&more));
+            assert!(
+                of == key && said.starts_with("rover \"r\": on \"hills\": ") && said.contains(words),
+                "{of}: {said}"
+            );
+        }
+        for more in [
+            "centre_m = [20.0, 20.0]\nradius_m = 19.75".to_owned(),
+            format!("{drawn}centre_m = [49.0, 20.0]\ndistance_m = 30.0"),
+        ] {
+            let loaded = rover(&more).unwrap_or_else(|error| panic!("{more}: {error}"));
+            assert_eq!(loaded.doubts, [""; 0], "{more}");
+        }
+    }
+
     /// Numbers, of which most parameters accept some.
     const NUMBERS: &[&str] =
         &["-1", "0", "1", "2", "3", "64", "300", "0.0", "0.05", "0.5", "2.5", "-2.5", "1e300", "1e-300"];
@@ -937,11 +984,23 @@ mod tests {
         ),
         ("image", &[("id", &["\"i\"", "\"j\""]), ("surface", &["\"t\""])]),
         ("photoclinometry", &[("id", &["\"p\""]), ("images", &["[\"i\"]"])]),
-        ("missions", &[("id", &["\"m\"", "\"n\""]), ("terrains", &["[\"t\"]"])]),
+        (
+            "missions",
+            &[("id", &["\"m\"", "\"n\""]), ("terrains", &["[\"t\"]"]), ("length_m", &["2.0"]), ("border_m", &["0.5"])],
+        ),
         ("traverse", &[("id", &["\"d\"", "\"e\""]), ("missions", &["\"m\""])]),
         ("route", &[("id", &["\"r\""]), ("terrains", &["[\"t\"]"])]),
         ("navigate", &[("id", &["\"o\""]), ("route", &["\"r\""])]),
-        ("rover", &[("id", &["\"q\""]), ("kind", &["\"sojourner_like\""]), ("terrains", &["[\"t\"]"])]),
+        (
+            "rover",
+            &[
+                ("id", &["\"q\""]),
+                ("kind", &["\"sojourner_like\""]),
+                ("terrains", &["[\"t\"]"]),
+                ("centre_m", &["[1.6, 1.6]"]),
+                ("radius_m", &["1.0"]),
+            ],
+        ),
         (
             "hypothesis",
             &[

@@ -4,6 +4,7 @@ use super::rover_designs;
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::operations::planner;
+use crate::operations::room;
 use crate::operations::rovers::{self, Grounds, Oracle};
 use crate::revision::Room;
 use crate::runner::graph::Node;
@@ -217,6 +218,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
     let trials = expanded.iter().map(prepared).collect::<Result<Vec<_>, _>>()?;
     let terrains = terrains(builder, entry, &envelope.terrains)?;
+    for (_, parameters) in &trials {
+        room::check(builder, entry, &terrains, rovers::room_for(parameters))?;
+    }
     for (one, (navigator, parameters)) in expanded.into_iter().zip(trials) {
         builder.claim(entry, STAGE, &one.id)?;
         rover_designs::add(builder, entry, &envelope, &one, &terrains)?;

@@ -4,13 +4,15 @@ use crate::builder::Heightfield;
 use crate::job::JobError;
 use crate::operations::dem::input_error;
 use crate::operations::inputs::read_kept;
+use crate::operations::room::Lack;
 use rayon::prelude::*;
 use sastrugi_mobility::rover::obstacles;
+use sastrugi_mobility::rover::parameters::Starts;
 use sastrugi_mobility::rover::quantised::{HEIGHT_STEP_MAX_M, height_step_m};
 use sastrugi_mobility::rover::{Drive, Ending, RoverParameters, Start, Surroundings, Task};
 use sastrugi_navigation::map::{Neighbourhood, Node};
 use sastrugi_navigation::{CostModel, Method, RouteError, RouteSettings, SlopeCost, SlopeLimits, TravelMap, line};
-use sastrugi_numeric::{Geometry, Grid, Ground, GroundClass, GroundGrid, Streams};
+use sastrugi_numeric::{Geometry, Grid, Ground, GroundClass, GroundGrid, NoGround, Streams};
 use sastrugi_schemas::{ParameterError, RoughnessClass, counted};
 use sastrugi_store::dem;
 use sastrugi_store::mcap::{ROCK, SAND};
@@ -21,6 +23,8 @@ use std::path::Path;
 const TILES: usize = 400;
 /// Margin of the map of an oracle beyond all starts and goals, m.
 const BEYOND_M: f64 = 10.0;
+/// Rounding error of places, m.
+const ROUNDING_M: f64 = 1e-6;
 /// Slope limit of a flat map on which steep cells are blocked already, deg.
 const LEVEL_DEG: f64 = 45.0;
 /// Maps of a terrain next to its heights.
@@ -220,12 +224,66 @@ fn extent(g: &Geometry) -> String {
 /// Refuses starts and goals without ground.
 fn check_ground(ground: &impl Ground, starts: &[Start], extent: &str) -> Result<(), JobError> {
     for (what, [x, y]) in starts.iter().flat_map(|s| [("start", s.start_m), ("goal", s.goal_m)]) {
-        ground.at(x, y).map_err(|nowhere| {
-            let advice = "choose another centre or a smaller `radius_m` or `distance_m`";
-            JobError::input(format!("a {what} lies off the terrain: {nowhere}{extent}; {advice}"))
-        })?;
+        ground.at(x, y).map_err(|nowhere| JobError::input(off_ground(what, &nowhere, extent)))?;
     }
     Ok(())
+}
+
+/// The message on a start or goal without ground.
+fn off_ground(what: &str, nowhere: &NoGround, extent: &str) -> String {
+    let advice = "choose another centre or a smaller `radius_m` or `distance_m`";
+    format!("a {what} lies off the terrain: {nowhere}{extent}; {advice}")
+}
+
+/// A check of terrains by their size: whether there is ground at all starts and goals on a circle or, if they are drawn, within reach. A world is
+/// unbounded.
+pub fn room_for(parameters: &RoverParameters) -> impl Fn(&Heightfield, &Geometry) -> Result<(), Lack> {
+    // Nothing about places on a circle is drawn.
+    let on_circle = match parameters.starts {
+        Starts::Circle => unchecked_starts(parameters, &Streams::for_seed(0, "")),
+        Starts::Drawn => Vec::new(),
+    };
+    move |field: &Heightfield, terrain: &Geometry| match on_circle.is_empty() {
+        _ if field.kind == planetary::KIND => Ok(()),
+        true => room_to_draw(terrain, parameters),
+        false => room_on_circle(terrain, parameters.centre_m, &on_circle),
+    }
+}
+
+/// Checks that the goal and the starts of a circle lie on a terrain.
+fn room_on_circle(terrain: &Geometry, goal_m: [f64; 2], starts: &[Start]) -> Result<(), Lack> {
+    let goal = [("centre_m", "goal", goal_m)].into_iter();
+    let mut places = goal.chain(starts.iter().map(|start| ("radius_m", "start", start.start_m)));
+    let Some((key, what, [x_m, y_m])) = places.find(|&(_, _, place)| off_m(terrain, place) > ROUNDING_M) else {
+        return Ok(());
+    };
+    Err(Lack::new(key, off_ground(what, &NoGround { x_m, y_m }, &extent(terrain))))
+}
+
+/// Checks that some start drawn in the disk, and some goal for it, can lie on a terrain.
+fn room_to_draw(terrain: &Geometry, parameters: &RoverParameters) -> Result<(), Lack> {
+    let &RoverParameters { centre_m, radius_m, distance_m, .. } = parameters;
+    if off_m(terrain, centre_m) > radius_m + ROUNDING_M {
+        let why = format!("the disk in which starts are drawn lies off the terrain{}", extent(terrain));
+        return Err(Lack::new("centre_m", format!("{why}; choose another centre or a larger `radius_m`")));
+    }
+    let (x_m, y_m) = (terrain.x(terrain.cols - 1) - terrain.x(0), terrain.y(0) - terrain.y(terrain.rows - 1));
+    let diagonal_m = (x_m * x_m + y_m * y_m).sqrt();
+    if distance_m > diagonal_m + ROUNDING_M {
+        let why = format!(
+            "`distance_m` is {distance_m} m; from start to goal there are at most {diagonal_m:.2} m on the terrain; choose a smaller one"
+        );
+        return Err(Lack::new("distance_m", why));
+    }
+    Ok(())
+}
+
+/// Distance of a place from the ground of a terrain, which ends at the outer cell centres, m; 0 on it.
+fn off_m(terrain: &Geometry, [x, y]: [f64; 2]) -> f64 {
+    let beyond = |at: f64, low: f64, high: f64| (low - at).max(at - high).max(0.0);
+    let x_m = beyond(x, terrain.x(0), terrain.x(terrain.cols - 1));
+    let y_m = beyond(y, terrain.y(terrain.rows - 1), terrain.y(0));
+    (x_m * x_m + y_m * y_m).sqrt()
 }
 
 /// A note on why a rover did not reach its goal.

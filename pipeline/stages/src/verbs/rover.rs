@@ -321,8 +321,9 @@ mod tests {
         count = 2\nsize_px = [64, 64]\n\n# Not for rovers.\n[[terrain]]\nid = \"b\"\nkind = \"multifractal\"\nsize_px = [64, 64]\n\n\
         [[missions]]\nid = \"m\"\nterrains = [\"a\", \"b\"]\nlength_m = 2.0\nborder_m = 0.5\n\n\
         [[rover]]\nid = \"r\"\nkind = \"sojourner_like\"\nterrains = [\"a-0002\"]\n\
-        rovers = 3\nradius_m = 1.0\nnoise = { turn = 0.1 }\n\n\
-        [[rover]]\nid = \"q\"\nkind = \"schoppers_like\"\nterrains = [\"a\"]\nrovers = 3\nradius_m = 1.0\nperturb.parameters = [\"commit_m\"]\n";
+        rovers = 3\ncentre_m = [1.6, 1.6]\nradius_m = 1.0\nnoise = { turn = 0.1 }\n\n\
+        [[rover]]\nid = \"q\"\nkind = \"schoppers_like\"\nterrains = [\"a\"]\nrovers = 3\ncentre_m = [1.6, 1.6]\nradius_m = 1.0\n\
+        perturb.parameters = [\"commit_m\"]\n";
 
     fn loaded(text: &str, request: Request) -> Result<Loaded, String> {
         let folder = tempfile::tempdir().unwrap();
@@ -381,11 +382,9 @@ mod tests {
         assert_eq!(perturbed.released.matches("share = 0.2").count(), 2, "{}", perturbed.released);
         assert!(perturbed.released.contains("perturb.parameters = [\"commit_m\"]"), "{}", perturbed.released);
         assert_eq!(perturbed.graph.len(), 2 + 2 + 1 + 2 + 2 + 1 + 4 + 1);
-        let inline = STUDY
-            .split("[[rover]]")
-            .next()
-            .unwrap()
-            .replace("# A study.\n", "rover = [{ id = \"r\", kind = \"sojourner_like\", terrains = [\"a\"] }]\n");
+        let rover =
+            "{ id = \"r\", kind = \"sojourner_like\", terrains = [\"a\"], centre_m = [1.6, 1.6], radius_m = 1.0 }";
+        let inline = STUDY.split("[[rover]]").next().unwrap().replace("# A study.\n", &format!("rover = [{rover}]\n"));
         let perturbed = loaded(&inline, request).unwrap();
         assert!(perturbed.released.contains("perturb = { share = 0.2, trajectories = 2 }"), "{}", perturbed.released);
     }
