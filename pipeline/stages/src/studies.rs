@@ -846,6 +846,25 @@ mod tests {
         );
     }
 
+    /// Missions along a trail that no process of the terrain lays are refused before the run.
+    #[test]
+    fn val_trails_must_be_laid() {
+        let forest = "[[terrain]]\nid = \"forest\"\nkind = \"compose\"\nsize_px = [150, 150]\ncell_m = 0.2\nprocesses = [{ kind = \"multifractal\" }, \
+                      { operation = \"trail\", trail = { follows = \"valleys\" } }]\n";
+        let missions = |terrain: &str, more: &str| {
+            let table = format!("[[missions]]\nid = \"m\"\nkind = \"trail\"\nterrains = [\"{terrain}\"]\n{more}\n");
+            on_hills(&format!("{forest}{table}"))
+        };
+        let (_, said) = only_refusal(missions("hills", ""));
+        assert_eq!(said, "missions \"m\": \"hills\" has no trail; name a terrain of kind `compose` with a trail");
+        for name in ["trail-2", "trail-1", "path"] {
+            let (key, said) = only_refusal(missions("forest", &format!("trail = \"{name}\"")));
+            let words = format!("missions \"m\": `trail` is \"{name}\", but \"forest\" has 1 trail");
+            assert_eq!((key.as_str(), said), ("trail", words));
+        }
+        assert!(missions("forest", "backwards = true").is_ok());
+    }
+
     /// A stated speed that the vehicle does not reach is told with its limit, once for each value of a sweep; the default is not.
     #[test]
     fn val_speeds_out_of_reach_are_told_before_the_run() {

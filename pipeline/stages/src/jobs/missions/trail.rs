@@ -11,7 +11,7 @@ use crate::study::Entry;
 use sastrugi_mobility::missions::{Mission, Polyline};
 use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::MissionsItem;
-use sastrugi_schemas::{Kind, ParameterError};
+use sastrugi_schemas::{Kind, ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
@@ -77,11 +77,16 @@ pub fn add(
     for (k, id) in envelope.terrains.iter().enumerate() {
         let key = format!("terrains.{k}");
         for one in builder.family(entry, &key, id)? {
-            let made = builder.heightfields.get(&one).is_some_and(|field| field.item.stage == terrain::STAGE);
-            if !made {
+            let made = builder.heightfields.get(&one).filter(|field| field.item.stage == terrain::STAGE);
+            let count = made.map_or(0, |field| trails(&field.parameters));
+            if count == 0 {
                 return Err(entry
                     .error(&key, format!("\"{one}\" has no trail; name a terrain of kind `compose` with a trail"))
                     .into());
+            }
+            if number(&parameters.trail).is_none_or(|number| number > count) {
+                let (trail, has) = (&parameters.trail, counted(count, "trail"));
+                return Err(entry.error("trail", format!("`trail` is \"{trail}\", but \"{one}\" has {has}")).into());
             }
             ids.insert(one);
         }
@@ -104,6 +109,26 @@ pub fn add(
     }
     builder.missions.insert(envelope.id.clone(), Drawn { lines, count: 1, length_m: LENGTH_GUESS_M });
     Ok(())
+}
+
+/// Number of trails that a terrain may have: those that the parameters of its kind name at any depth, since trails of operands are kept.
+fn trails(parameters: &Value) -> usize {
+    match parameters {
+        Value::Object(map) => {
+            let own = map.get("operation").is_some_and(|operation| operation == "trail");
+            usize::from(own) + map.values().map(trails).sum::<usize>()
+        }
+        Value::Array(values) => values.iter().map(trails).sum(),
+        _ => 0,
+    }
+}
+
+/// Number of a trail by its name, from 1; `None` for a name that no trail has.
+fn number(name: &str) -> Option<usize> {
+    match name.strip_prefix("trail")? {
+        "" => Some(1),
+        rest => rest.strip_prefix('-')?.parse::<usize>().ok().filter(|number| *number > 1),
+    }
 }
 
 impl Job for TrailJob {
