@@ -359,7 +359,8 @@ impl Doubts {
                 self.caveat()
             )
         };
-        let carried = findings.carried.as_ref().map(|c| carried_sentence(c, case)).unwrap_or_default();
+        let carried =
+            findings.carried.as_ref().map(|c| carried_sentence(c, can_be_empirical(case))).unwrap_or_default();
         format!("{described}.{carried}")
     }
 
@@ -374,8 +375,13 @@ impl Doubts {
     }
 }
 
-/// How much a texture reproduces, as the last sentence of a verdict.
-fn carried_sentence(carried: &Carried, case: &Case) -> String {
+/// Whether another fit of the same heights could take the measured covariance itself as its model.
+fn can_be_empirical(case: &Case) -> bool {
+    !case.settings.empirical && !case.heights.are_profiles()
+}
+
+/// How much a texture reproduces, as the last sentence of a verdict, with advice where `can_be_empirical`.
+fn carried_sentence(carried: &Carried, can_be_empirical: bool) -> String {
     let [of_rms, of_increments] = CARRIED_TOLERANCES;
     let off = |share: f64, tolerance: f64| (share - 1.0).abs() > tolerance;
     let worst = carried.increments.iter().max_by(|a, b| (a.share - 1.0).abs().total_cmp(&(b.share - 1.0).abs()));
@@ -383,10 +389,11 @@ fn carried_sentence(carried: &Carried, case: &Case) -> String {
     let octave = worst.map_or_else(String::new, |o| {
         format!(", {:.0} % of its squared increments at {}-{} m", 100.0 * o.share, digits2(o.from_m), digits2(o.to_m))
     });
-    let is_off = off(carried.rms_share, of_rms) || worst.is_some();
-    let can_be_better = !case.settings.empirical && !case.heights.are_profiles();
-    let better =
-        if is_off && can_be_better { "; model = \"empirical\" (--model empirical) reproduces both" } else { "" };
+    let better = match (worst.is_some(), off(carried.rms_share, of_rms)) {
+        (true, _) if can_be_empirical => "; model = \"empirical\" (--model empirical) reproduces both",
+        (false, true) if can_be_empirical => "; model = \"empirical\" (--model empirical) reproduces it",
+        _ => "",
+    };
     format!(" A texture reproduces {:.0} % of the residual's RMS{octave}{better}.", 100.0 * carried.rms_share)
 }
 
@@ -532,6 +539,7 @@ fn normality_warning(findings: &Findings) -> Option<String> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sastrugi_schemas::fit::CarriedOctave;
 
     /// Below 99 replicates p comes from chi-squared, so that their number does not limit it.
     #[test]
@@ -540,5 +548,23 @@ mod tests {
         assert_eq!(p_value(0.0042, 50), "p = 0.004");
         assert_eq!(p_value(0.01, 99), "p <= 0.010, the smallest possible with 99 replicates");
         assert_eq!(p_value(0.02, 99), "p = 0.020");
+    }
+
+    /// The advice refers to what the sentence names: the RMS alone, or the RMS and the increments of an octave.
+    #[test]
+    fn val_the_empirical_model_reproduces_what_the_sentence_names() {
+        let told = |rms_share: f64, share: f64, can_be_empirical: bool| {
+            let octave = CarriedOctave { from_m: 0.5, to_m: 1.0, share };
+            let (variance_share, increments) = (rms_share * rms_share, vec![octave]);
+            let carried = Carried { rms_share, variance_share, untrimmed_rms_share: rms_share, increments };
+            carried_sentence(&carried, can_be_empirical)
+        };
+        let advice = "; model = \"empirical\" (--model empirical) reproduces";
+        let (of_rms, octave) = (" A texture reproduces", ", 70 % of its squared increments at 0.50-1.0 m");
+        assert_eq!(told(0.87, 1.0, true), format!("{of_rms} 87 % of the residual's RMS{advice} it."));
+        assert_eq!(told(0.87, 0.7, true), format!("{of_rms} 87 % of the residual's RMS{octave}{advice} both."));
+        assert_eq!(told(1.0, 0.7, true), format!("{of_rms} 100 % of the residual's RMS{octave}{advice} both."));
+        assert_eq!(told(1.0, 1.0, true), format!("{of_rms} 100 % of the residual's RMS."));
+        assert_eq!(told(0.87, 0.7, false), format!("{of_rms} 87 % of the residual's RMS{octave}."));
     }
 }
