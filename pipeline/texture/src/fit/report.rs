@@ -293,7 +293,8 @@ impl Summary {
         let objects = (case.survey.measured - self.trusted) as f64 / case.survey.measured as f64;
         (objects > OBJECT_SHARE_MAX).then(|| {
             format!(
-                "{:.1} % of the cells were left out as objects; on a bare site set find_objects = false",
+                "{:.1} % of the cells were left out as objects; on a bare site set find_objects = false \
+                 (--set find_objects=false)",
                 100.0 * objects
             )
         })
