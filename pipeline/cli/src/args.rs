@@ -16,7 +16,7 @@ use std::path::{Path, PathBuf};
     after_help = "Exit codes: 0 done, 1 failed, 2 bad usage or study, 3 done but some items failed, 4 verification\n\
         (or compare --fail-on-difference) found a difference, 65 input data missing or unusable, 75\n\
         interrupted or retryable.\n\n\
-        Example:\n  sastrugi run fixtures/studies/quickstart.toml -o release"
+        Example:\n  sastrugi init\n  sastrugi run study.toml -o release"
 )]
 pub struct Arguments {
     /// What to do.
@@ -146,8 +146,8 @@ pub enum Verb {
         reduced study, and `run` on it produces the same release. --perturb varies the parameters of every\n\
         navigator along trajectories (elementary effects: Morris, 1991) while worlds, starts and noise\n\
         stay fixed. `sastrugi plan` on the released study shows the cost.\n\n\
-        Examples:\n  sastrugi rover fixtures/studies/rover_design.toml -o design\n  \
-        sastrugi rover fixtures/studies/rover_design.toml --perturb 10% --trajectories 4 -o perturbed"
+        Examples:\n  sastrugi rover study.toml -o design\n  \
+        sastrugi rover study.toml --perturb 10% --trajectories 4 -o perturbed"
     )]
     Rover(Rover),
     /// Compute traversal metrics from MCAP logs of any vehicle: sastrugi, ROS 2 or Foxglove messages.
@@ -249,7 +249,7 @@ pub enum Verb {
         after_help = "A WORLD.toml has the format of a `terrain` specification, kind planetary or elaborate. A\n\
         STUDY.toml serves all its planetary terrains; a RELEASE serves its terrains with their maps,\n\
         missions and rovers. With SASTRUGI_TOKEN set, requests must send that token.\n\n\
-        Examples:\n  sastrugi serve fixtures/worlds/planet.toml\n  \
+        Examples:\n  sastrugi serve planet.toml\n  \
         sastrugi serve study.toml release --library tiles --library-bytes 10G --listen 127.0.0.1:9000\n  \
         curl -o patch.tif \\\n    \
         'http://127.0.0.1:8080/v1/collections/planet/patch?center=0,0&size=512,512&resolution_m=0.02'"
