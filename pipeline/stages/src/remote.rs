@@ -72,9 +72,14 @@ pub fn releasing(
     let Some(address) = address(output) else { return make(output, work, replace) };
     // Opened first: what is wrong with it should not come to light after the run.
     let bucket = Bucket::open(address)?;
-    let work = work.map_or_else(|| default_work(&local_name(address)), Path::to_owned);
-    let summary = releasing_to(&bucket, &work, progress, make)?;
+    let summary = releasing_to(&bucket, &work_area(output, work), progress, make)?;
     Ok(RunSummary { output: output.to_owned(), ..summary })
+}
+
+/// The work area of a release; by default beside its folder, and of one in an object store in the current folder.
+pub fn work_area(output: &Path, work: Option<&Path>) -> PathBuf {
+    let default = || address(output).map_or_else(|| default_work(output), |at| default_work(&local_name(at)));
+    work.map_or_else(default, Path::to_owned)
 }
 
 /// Makes a release in the work area and uploads it.
@@ -222,6 +227,19 @@ mod tests {
         builder.write_text(STUDY, study, Origin::default()).unwrap();
         builder.seal(&dest).unwrap();
         Release::open(&dest).unwrap()
+    }
+
+    /// Addresses are no folders: the work area of a release there has a name of its own in the current folder, unless another is given.
+    #[test]
+    fn val_the_work_area_of_a_release() {
+        assert_eq!(work_area(Path::new("out/snow"), None), Path::new("out/snow.work"));
+        let [snow, other] = ["s3://terrains/snow", "s3://other/snow"].map(|at| work_area(Path::new(at), None));
+        let name = snow.to_str().unwrap();
+        assert!(name.starts_with("snow.s3-") && name.ends_with(".work") && !name.contains('/'), "{name}");
+        assert_ne!(snow, other);
+        for output in ["out/snow", "s3://terrains/snow"] {
+            assert_eq!(work_area(Path::new(output), Some(Path::new("scratch"))), Path::new("scratch"));
+        }
     }
 
     /// What is uploaded is downloaded and verifies; uploading it again changes nothing; another release is refused.

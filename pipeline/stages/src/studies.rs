@@ -4,7 +4,7 @@ use crate::error::Error;
 use crate::jobs::{fit, original};
 use crate::loaded::{Loaded, load_text};
 use crate::registry;
-use crate::remote::check_local;
+use crate::remote::{check_local, work_area};
 use crate::runner::assemble::{Contents, assemble, check_other_study};
 use crate::runner::cache::Cache;
 use crate::runner::damage::Changed;
@@ -336,8 +336,7 @@ fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
 /// # }
 /// ```
 pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>, part: Option<Part>) -> Result<PlanSummary, Error> {
-    let work = work.map_or_else(|| default_work(output), Path::to_owned);
-    let plan = plan(&loaded.graph, &needed(loaded, part), &Cache::look(&work));
+    let plan = plan(&loaded.graph, &needed(loaded, part), &Cache::look(&work_area(output, work)));
     Ok(PlanSummary { doubts: loaded.doubts.clone(), ..plan })
 }
 
