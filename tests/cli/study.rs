@@ -86,6 +86,25 @@ fn val_the_first_study_gives_plausible_terrains() {
     assert_eq!(terrains, 11);
 }
 
+/// A plan with many items has a line for each stage, with the reasons of its items; before the first run it names no release.
+#[test]
+fn val_a_long_plan_is_told_by_stage() {
+    let folder = area();
+    let path = folder.path();
+    let study = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\nlicense = \"CC0-1.0\"\n\n[[terrain]]\nid = \"a\"\n\
+        kind = \"weierstrass_mandelbrot\"\nsize_px = [32, 32]\ncell_m = 0.2\ncount = 30\n";
+    write(path, "study.toml", study);
+    let call = sastrugi_in(path, &["plan", "study.toml"]);
+    assert_eq!(call.code, 0, "{}", call.stderr);
+    let first = call.stdout;
+    assert!(first.contains("; no results in ./release.work yet: all items are new\n"), "{first}");
+    let lines: Vec<&str> = first.lines().skip(1).collect();
+    let is_of = |line: &str, stage: &str| line.split_whitespace().take(3).eq([stage, "30", "items"]);
+    assert!(lines.len() == 3 && is_of(lines[0], "terrain") && is_of(lines[1], "roughness"), "{first}");
+    assert!(lines[0].ends_with("  new") && lines[2] == "  (--json lists all items)", "{first}");
+    assert_eq!(planned(path, "study.toml").0["stale"].as_array().map(Vec::len), Some(60));
+}
+
 /// All that is wrong is told in one call, in the order of the text, and what follows from another error is not.
 #[test]
 fn val_all_errors_are_told_at_once() {

@@ -12,6 +12,7 @@ mod lerobot;
 mod lists;
 mod navigate;
 mod photoclinometry;
+mod plan;
 mod render;
 mod rover;
 pub mod serve;
@@ -38,7 +39,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
     match &arguments.verb {
         Verb::Init(args) => init::init(args, common),
         Verb::Run(args) => study::run(args, common),
-        Verb::Plan(args) => study::plan(args, common),
+        Verb::Plan(args) => plan::plan(args, common),
         Verb::Merge(args) => study::merge(args, common),
         Verb::Cache(args) => cache::cache(args, common),
         Verb::Verify(args) => study::verify(args, common),

@@ -1,9 +1,9 @@
 //! Verbs on studies and releases.
 
 use crate::Verdict;
-use crate::args::{Common, Merge, Pack, Place, Plan, Report, Run, Traverse, Verify};
+use crate::args::{Common, Merge, Pack, Place, Report, Run, Traverse, Verify};
 use crate::failure::{Code, Failure};
-use crate::output::{bytes, columns, print, print_long, seconds, warn};
+use crate::output::{bytes, print, seconds, warn};
 use crate::progress::Reporter;
 use sastrugi_report::{Companions, ReportError};
 use sastrugi_schemas::counted;
@@ -11,7 +11,6 @@ use sastrugi_schemas::manifest::ItemNote;
 use sastrugi_stages::loaded;
 use sastrugi_stages::packing;
 use sastrugi_stages::remote;
-use sastrugi_stages::runner::division::{Cost, Division, ShardCost};
 use sastrugi_stages::runner::execute::{Failure as Failed, Limits};
 use sastrugi_stages::runner::progress::Progress;
 use sastrugi_stages::runner::shard::Part;
@@ -20,7 +19,7 @@ use sastrugi_stages::studies::{self, RunRequest, RunSummary};
 use sastrugi_stages::verbs::{parameters, traverse as drive};
 use sastrugi_stages::verification::{self, Difference, Recompute};
 use serde_json::json;
-use std::path::{Component, Path, PathBuf};
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// Default limit on the working memory of concurrent items, GiB.
@@ -33,8 +32,6 @@ const NOTES_MAX: usize = 3;
 const SKIPPED_MAX: usize = 5;
 /// The first page of the report, in a release.
 const PAGE: &str = "report/index.html";
-/// Maximum number of lines of a printed plan.
-const PLAN_LINES: usize = 40;
 
 /// Limits of a run; without `memory_gib`, memory limits only which items run concurrently.
 pub(super) fn limits(memory_gib: Option<f64>) -> Result<Limits, Failure> {
@@ -82,7 +79,7 @@ fn sharing(args: &Run) -> Result<Option<Sharing>, Failure> {
 }
 
 /// Prints warnings that a user should see before a long run.
-fn print_warnings(doubts: &[String], common: &Common) {
+pub(super) fn print_warnings(doubts: &[String], common: &Common) {
     if !common.quiet {
         doubts.iter().for_each(|doubt| warn(&format!("sastrugi: warning: {doubt}")));
     }
@@ -221,80 +218,6 @@ fn notes(summary: &RunSummary) -> String {
     text
 }
 
-/// `plan`.
-pub fn plan(args: &Plan, common: &Common) -> Verdict {
-    let loaded = loaded::load(&args.study)?;
-    if let Some(count) = args.shards {
-        print_warnings(&loaded.doubts, common);
-        let division = studies::plan_shards(&loaded, count);
-        print(common.json, &serde_json::to_value(&division).map_err(Failure::failed)?, &divided(&division))?;
-        return Ok(Code::Done);
-    }
-    let part = args.shard.as_deref().map(Part::parse).transpose()?;
-    let plan = studies::plan_of(&loaded, &args.place.output, args.place.work.as_deref(), part)?;
-    print_warnings(&loaded.doubts, common);
-    let total_seconds = plan.stale.iter().fold(0.0, |sum, s| sum + s.seconds);
-    let total_bytes = plan.stale.iter().fold(0.0, |sum, s| sum + s.bytes);
-    let mut text = format!(
-        "{}, {} ready, {} to compute: about {} on one core, about {} of artifacts",
-        counted(plan.items, "item"),
-        plan.ready,
-        plan.stale.len(),
-        seconds(total_seconds),
-        bytes(total_bytes)
-    );
-    if let Some(largest) = plan.stale.iter().max_by_key(|s| s.memory_bytes) {
-        text.push_str(&format!(", at most {} of memory (for {})", bytes(largest.memory_bytes as f64), largest.item));
-    }
-    text.push_str(&format!("; compared with {}", compared_with(&args.place)));
-    let shown = plan.stale.iter().take(PLAN_LINES);
-    let rows: Vec<Vec<String>> =
-        shown.map(|s| vec![format!("  {}", s.item), seconds(s.seconds), s.reason.to_string()]).collect();
-    text.push('\n');
-    text.push_str(&columns(&rows));
-    if plan.stale.len() > PLAN_LINES {
-        text.push_str(&format!("\n  and {} more (--json lists all)", plan.stale.len() - PLAN_LINES));
-    }
-    print_long(common.json, &plan, &text)?;
-    Ok(Code::Done)
-}
-
-/// What a plan compares the study with: the results of a release, or of another work area.
-fn compared_with(place: &Place) -> String {
-    let path = place.work.as_ref().unwrap_or(&place.output);
-    // A bare name does not look like a folder.
-    let is_bare = path.components().eq([Component::Normal(path.as_os_str())]);
-    let start = if is_bare { "./" } else { "" };
-    format!("{start}{}", path.display())
-}
-
-/// A table of shards, and what to know about them.
-fn divided(division: &Division) -> String {
-    let head = ["", "own items", "with ancestors", "time", "memory", "artifacts", "time with --cache"];
-    let mut rows = vec![head.map(str::to_owned).to_vec()];
-    let cells = |name: String, own: String, needed: &Cost, left: Option<f64>| {
-        let Cost { items, seconds: time, bytes: size, memory_bytes } = needed;
-        let left = left.map_or_else(String::new, seconds);
-        vec![name, own, items.to_string(), seconds(*time), bytes(*memory_bytes as f64), bytes(*size), left]
-    };
-    let shard = |s: &ShardCost| cells(format!("shard {}", s.shard), s.own.to_string(), &s.needed, Some(s.left.seconds));
-    let common = &division.common_ancestors;
-    rows.push(cells("study".to_owned(), division.study.items.to_string(), &division.study, None));
-    rows.push(cells("common ancestors".to_owned(), String::new(), common, Some(common.seconds)));
-    rows.extend(division.shards.iter().take(PLAN_LINES).map(shard));
-    let mut text = columns(&rows);
-    if division.shards.len() > PLAN_LINES {
-        text.push_str(&format!("\nand {} more (--json lists all)", division.shards.len() - PLAN_LINES));
-    }
-    text.push_str(&format!(
-        "\nall shards together, on one core: {} without a shared cache, {} with one",
-        seconds(division.seconds_without_cache),
-        seconds(division.seconds_with_cache)
-    ));
-    division.advice.iter().for_each(|line| text.push_str(&format!("\n{line}")));
-    text
-}
-
 /// `verify`.
 pub fn verify(args: &Verify, common: &Common) -> Verdict {
     let recompute = args.recompute.as_deref().map(parse_recompute).transpose()?;
@@ -392,24 +315,6 @@ mod tests {
             unusable_input: false,
             skipped_for: skipped_for.map(|cause| ItemRef::new("fit", cause)),
             parameters: None,
-        }
-    }
-
-    /// A bare name looks like a folder; with a work area of its own that is what the study is compared with.
-    #[test]
-    fn val_a_plan_names_what_it_compares_with() {
-        let named = |output: &str, work: Option<&str>| {
-            compared_with(&Place { output: PathBuf::from(output), work: work.map(PathBuf::from) })
-        };
-        for (output, work, expected) in [
-            ("release", None, "./release"),
-            ("./release", None, "./release"),
-            ("out/snow", None, "out/snow"),
-            ("/data/snow", None, "/data/snow"),
-            ("s3://bucket/snow", None, "s3://bucket/snow"),
-            ("release", Some("scratch"), "./scratch"),
-        ] {
-            assert_eq!(named(output, work), expected);
         }
     }
 

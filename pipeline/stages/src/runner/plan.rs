@@ -7,7 +7,14 @@ use serde_json::Value;
 use std::borrow::Cow;
 
 /// The reason of items that were never tried.
-const NEW: &str = "new";
+const NEW: Reason = Reason { text: Cow::Borrowed("new"), kind: "new" };
+
+/// Why an item is stale.
+#[derive(Clone, Debug, PartialEq)]
+struct Reason {
+    text: Cow<'static, str>,
+    kind: &'static str,
+}
 
 /// One item that a run would compute.
 #[derive(Clone, Debug, PartialEq, Serialize)]
@@ -16,6 +23,9 @@ pub struct Stale {
     pub item: String,
     /// Why it is stale.
     pub reason: Cow<'static, str>,
+    /// The reason without names and values, by which the items of a stage can be counted; the first of several.
+    #[serde(skip)]
+    pub kind: &'static str,
     /// Estimated time on one core, s.
     pub seconds: f64,
     /// Estimated size of its files, bytes.
@@ -33,6 +43,9 @@ pub struct PlanSummary {
     pub ready: usize,
     /// Items to compute.
     pub stale: Vec<Stale>,
+    /// Whether the work area has no results at all, also none of another study.
+    #[serde(skip)]
+    pub is_first: bool,
     /// Settings of the study that are allowed but make no sense, one sentence each.
     pub doubts: Vec<String>,
 }
@@ -46,53 +59,59 @@ pub fn plan(graph: &Graph, needed: &[usize], cache: &Cache) -> PlanSummary {
         let reason = match !is_empty && cache.knows(&node.item) {
             true if cache.holds(&node.item, graph.key(position)) => continue,
             true => reason(graph, cache, position),
-            false => NEW.into(),
+            false => NEW,
         };
         let estimate = node.job.estimate();
         let (item, memory_bytes) = (node.item.to_string(), node.job.memory_bytes());
-        stale.push(Stale { item, reason, seconds: estimate.seconds, bytes: estimate.bytes, memory_bytes });
+        let Reason { text, kind } = reason;
+        stale.push(Stale { item, reason: text, kind, seconds: estimate.seconds, bytes: estimate.bytes, memory_bytes });
     }
-    PlanSummary { items: needed.len(), ready: needed.len() - stale.len(), stale, doubts: Vec::new() }
+    let (items, ready) = (needed.len(), needed.len() - stale.len());
+    PlanSummary { items, ready, stale, is_first: is_empty, doubts: Vec::new() }
 }
 
 /// The reason why an item that was tried before has no current result.
-fn reason(graph: &Graph, cache: &Cache, position: usize) -> Cow<'static, str> {
+fn reason(graph: &Graph, cache: &Cache, position: usize) -> Reason {
     let item = &graph.node(position).item;
     if let Some(message) = cache.failure(item, graph.key(position)) {
-        return format!("failed before: {message}").into();
+        return Reason { text: format!("failed before: {message}").into(), kind: "failed before" };
     }
     match cache.earlier(item) {
-        Some(earlier) => difference(&earlier, &graph.ingredients(position)).into(),
-        None => NEW.into(),
+        Some(earlier) => difference(&earlier, &graph.ingredients(position)),
+        None => NEW,
     }
 }
 
 /// Describes the differences between two sets of ingredients.
-fn difference(old: &Ingredients, new: &Ingredients) -> String {
+fn difference(old: &Ingredients, new: &Ingredients) -> Reason {
     let mut reasons = Vec::new();
     if old.recipe != new.recipe {
         let mut changes = Vec::new();
         changed_values("", &old.recipe, &new.recipe, &mut changes);
-        reasons.push(format!("changed: {}", changes.join(", ")));
+        reasons.push(("changed", format!("changed: {}", changes.join(", "))));
     }
     if old.packing != new.packing {
-        reasons.push("repacked: compression or accompanying files changed".to_owned());
+        reasons.push(("repacked", "repacked: compression or accompanying files changed".to_owned()));
     }
     if old.stream != new.stream {
-        reasons.push("the seed or the id changed".to_owned());
+        reasons.push(("seed or id changed", "the seed or the id changed".to_owned()));
     }
     if old.inputs != new.inputs {
-        reasons.push("an input file changed".to_owned());
+        reasons.push(("input file changed", "an input file changed".to_owned()));
     }
     let parents = new.parents.iter().filter(|(name, key)| old.parents.get(*name) != Some(key));
     let parents: Vec<&str> = parents.map(|(name, _)| name.as_str()).collect();
     if !parents.is_empty() {
-        reasons.push(format!("depends on {}, which changed", parents.join(", ")));
+        reasons.push(("depends on changed items", format!("depends on {}, which changed", parents.join(", "))));
     }
     if old.revision != new.revision {
-        reasons.push("the code of this stage changed".to_owned());
+        reasons.push(("code changed", "the code of this stage changed".to_owned()));
     }
-    if reasons.is_empty() { "the result is incomplete".to_owned() } else { reasons.join("; ") }
+    let (kinds, texts): (Vec<&str>, Vec<String>) = reasons.into_iter().unzip();
+    match kinds.first() {
+        Some(&kind) => Reason { text: texts.join("; ").into(), kind },
+        None => Reason { text: "the result is incomplete".into(), kind: "incomplete" },
+    }
 }
 
 /// Paths whose values differ, `path old -> new`.
@@ -137,11 +156,11 @@ mod tests {
     fn val_reasons() {
         let old = ingredients(json!({"params": {"d": 2.3, "m": 16}}));
         let mut new = ingredients(json!({"params": {"d": 2.4, "m": 16}}));
-        assert_eq!(difference(&old, &new), "changed: params.d 2.3 -> 2.4");
+        assert_eq!(difference(&old, &new).text, "changed: params.d 2.3 -> 2.4");
         new.recipe = old.recipe.clone();
         new.parents.insert("dem/a".to_owned(), "k2".to_owned());
         new.revision = "s".to_owned();
-        assert_eq!(difference(&old, &new), "depends on dem/a, which changed; the code of this stage changed");
+        assert_eq!(difference(&old, &new).text, "depends on dem/a, which changed; the code of this stage changed");
         let whole = Ingredients {
             packing: json!("cog"),
             stream: Some("seed/1".to_owned()),
@@ -150,8 +169,12 @@ mod tests {
         };
         let expected =
             "repacked: compression or accompanying files changed; the seed or the id changed; an input file changed";
-        assert_eq!(difference(&old, &whole), expected);
-        assert_eq!(difference(&old, &old), "the result is incomplete");
+        assert_eq!(difference(&old, &whole).text, expected);
+        assert_eq!(difference(&old, &old).text, "the result is incomplete");
+        // Items are counted by the first reason, without its values.
+        let changed = ingredients(json!({"params": {"d": 2.4, "m": 16}}));
+        let kinds = [&changed, &new, &whole, &old].map(|other| difference(&old, other).kind);
+        assert_eq!(kinds, ["changed", "depends on changed items", "repacked", "incomplete"]);
     }
 
     /// Keys that came or went are named like those that changed.
@@ -159,6 +182,6 @@ mod tests {
     fn val_changed_values() {
         let old = ingredients(json!({"kind": "waves", "params": {"d": 2.3, "gone": true}}));
         let new = ingredients(json!({"kind": "waves", "params": {"d": 2.3, "list": [1, 2]}}));
-        assert_eq!(difference(&old, &new), "changed: params.gone true -> null, params.list null -> [1,2]");
+        assert_eq!(difference(&old, &new).text, "changed: params.gone true -> null, params.list null -> [1,2]");
     }
 }
