@@ -26,7 +26,7 @@ use std::time::Instant;
 const MEMORY_GIB: f64 = 4.0;
 /// Maximum number of verdicts on fits printed at the end of a run.
 const VERDICTS_MAX: usize = 5;
-/// Maximum number of other notes printed there.
+/// Maximum number of other notes that differ printed there.
 const NOTES_MAX: usize = 3;
 /// Maximum number of skipped items named there.
 const SKIPPED_MAX: usize = 5;
@@ -204,18 +204,40 @@ fn used(tally: &Tally) -> String {
     text
 }
 
-/// Notes on items: first verdicts on fits, then the other notes if they are few.
+/// Notes on items: first verdicts on fits, then the other notes if they are few; one that several items have counts once.
 fn notes(summary: &RunSummary) -> String {
     let verdicts = summary.verdicts();
     let line = |note: &ItemNote| format!("\n  {}/{}: {}", note.stage, note.item, note.note);
     let mut text: String = verdicts.iter().take(VERDICTS_MAX).map(|note| line(note)).collect();
     let others: Vec<&ItemNote> =
         summary.notes.iter().filter(|note| !verdicts.iter().take(VERDICTS_MAX).any(|v| v == note)).collect();
-    match others.len() {
-        0..=NOTES_MAX => others.iter().for_each(|note| text.push_str(&line(note))),
-        n => text.push_str(&format!("\n  {n} notes on items: see `notes` in manifest.json")),
+    let different = different(&others);
+    if different.len() > NOTES_MAX {
+        text.push_str(&format!("\n  {} notes on items: see `notes` in manifest.json", others.len()));
+        return text;
+    }
+    for (note, count) in different {
+        match count {
+            1 => text.push_str(&line(note)),
+            _ => text.push_str(&format!("\n  {}, {}: {}", note.stage, counted(count, "item"), note.note)),
+        }
     }
     text
+}
+
+/// Notes of a stage that are equal once, with their number; as soon as too many differ, the rest does not matter.
+fn different<'a>(notes: &[&'a ItemNote]) -> Vec<(&'a ItemNote, usize)> {
+    let mut different: Vec<(&'a ItemNote, usize)> = Vec::new();
+    for &note in notes {
+        if different.len() > NOTES_MAX {
+            break;
+        }
+        match different.iter_mut().find(|(first, _)| first.stage == note.stage && first.note == note.note) {
+            Some((_, count)) => *count += 1,
+            None => different.push((note, 1)),
+        }
+    }
+    different
 }
 
 /// `verify`.
@@ -352,7 +374,8 @@ mod tests {
         assert!(told(&summary, "2 s").contains(shared));
     }
 
-    /// Of each fit the verdict, which is its first note, before the other notes; of many fits the first five, and the rest is counted.
+    /// Of each fit the verdict, which is its first note, before the other notes; one that many items have is
+    /// told once. Of many fits the first five, and the rest is counted.
     #[test]
     fn val_a_run_ends_with_the_verdicts_on_its_fits() {
         let note = |stage: &str, item: &str, note: &str| ItemNote {
@@ -385,6 +408,12 @@ mod tests {
             "  fit/bar: 0.2 of the cells are masked",
         ];
         assert_eq!(told(&few, "2 s"), lines.join("\n"));
+        let coarse = |vehicle: &'static str| {
+            (1..=10).map(move |k| note("traverse", &format!("{vehicle}@t{k}"), &format!("coarse for {vehicle}")))
+        };
+        let twenty = told(&summary(coarse("husky").chain(coarse("car")).collect()), "2 s");
+        let lines = "\nnotes:\n  traverse, 10 items: coarse for husky\n  traverse, 10 items: coarse for car";
+        assert!(twenty.ends_with(lines), "{twenty}");
         let many = summary((0..9).map(|k| note("fit", &format!("f{k}"), &format!("verdict {k}"))).collect());
         let shown: String = (0..VERDICTS_MAX).map(|k| format!("\n  fit/f{k}: verdict {k}")).collect();
         let left = 9 - VERDICTS_MAX;
