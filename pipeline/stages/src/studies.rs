@@ -337,7 +337,8 @@ fn write_timings(cache: &Cache, execution: &Execution) -> Result<(), Error> {
 /// ```
 pub fn plan_of(loaded: &Loaded, output: &Path, work: Option<&Path>, part: Option<Part>) -> Result<PlanSummary, Error> {
     let plan = plan(&loaded.graph, &needed(loaded, part), &Cache::look(&work_area(output, work)));
-    Ok(PlanSummary { doubts: loaded.doubts.clone(), ..plan })
+    let assembly_seconds = if part.is_some() { 0.0 } else { plan.assembly_seconds };
+    Ok(PlanSummary { doubts: loaded.doubts.clone(), assembly_seconds, ..plan })
 }
 
 /// Divides a study into `count` shards: what each costs, and what they have in common.

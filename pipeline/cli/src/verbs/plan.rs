@@ -38,11 +38,12 @@ fn planned(plan: &PlanSummary, place: &Place) -> String {
     let total_seconds = plan.stale.iter().fold(0.0, |sum, s| sum + s.seconds);
     let total_bytes = plan.stale.iter().fold(0.0, |sum, s| sum + s.bytes);
     let mut text = format!(
-        "{}, {} ready, {} to compute: about {} on one core, about {} of artifacts",
+        "{}, {} ready, {} to compute: about {} on one core{}, about {} of artifacts",
         counted(plan.items, "item"),
         plan.ready,
         plan.stale.len(),
         seconds(total_seconds),
+        assembly(plan.assembly_seconds),
         bytes(total_bytes)
     );
     if let Some(largest) = plan.stale.iter().max_by_key(|s| s.memory_bytes) {
@@ -56,6 +57,11 @@ fn planned(plan: &PlanSummary, place: &Place) -> String {
         text.push_str(&columns(&by_item(&plan.stale)));
     }
     text
+}
+
+/// The time of what follows on the items; a shard is not assembled.
+fn assembly(time_s: f64) -> String {
+    if time_s > 0.0 { format!(" and {} of assembly and report", seconds(time_s)) } else { String::new() }
 }
 
 fn by_item(stale: &[Stale]) -> Vec<Vec<String>> {
@@ -199,6 +205,12 @@ mod tests {
         items.push(stale("traverse/a", "new", "new"));
         let plan = |stale: &[Stale]| PlanSummary { items: 50, stale: stale.to_vec(), ..PlanSummary::default() };
         let text = planned(&plan(&items), &place("release", None));
+        assert!(text.contains(": about 20.0 s on one core, about 60.0 kB of artifacts"), "{text}");
+        let assembled = planned(&PlanSummary { assembly_seconds: 1.5, ..plan(&items) }, &place("release", None));
+        assert!(
+            assembled.contains(": about 20.0 s on one core and 1.5 s of assembly and report, about"),
+            "{assembled}"
+        );
         assert_eq!(text.lines().count(), 1 + PLAN_LINES);
         assert!(text.ends_with("\n  traverse/a    0.5 s  new"), "{text}");
         items.push(stale("traverse/b", "failed before: no route", "failed before"));

@@ -9,6 +9,10 @@ use std::borrow::Cow;
 /// The reason of items that were never tried.
 const NEW: Reason = Reason { text: Cow::Borrowed("new"), kind: "new" };
 
+/// Processor time of assembly and report, s: of any release, of an item, and of a byte of artifacts as estimated, which is copied and hashed.
+/// Measured 0.1 to 7.3 s on releases of 8 to 1200 items with 3 MB to 0.6 GB; above 0.5 s within a factor of two.
+const ASSEMBLY_S: [f64; 3] = [0.5, 4e-3, 4e-9];
+
 /// Why an item is stale.
 #[derive(Clone, Debug, PartialEq)]
 struct Reason {
@@ -43,6 +47,8 @@ pub struct PlanSummary {
     pub ready: usize,
     /// Items to compute.
     pub stale: Vec<Stale>,
+    /// Estimated time of assembly and report, which follow on the items, s; 0 for a shard.
+    pub assembly_seconds: f64,
     /// Whether the work area has no results at all, also none of another study.
     #[serde(skip)]
     pub is_first: bool,
@@ -52,22 +58,30 @@ pub struct PlanSummary {
 
 /// Compares the items of a graph with a work area; if that is empty, all items are new.
 pub fn plan(graph: &Graph, needed: &[usize], cache: &Cache) -> PlanSummary {
-    let mut stale = Vec::new();
+    let (mut stale, mut all_bytes) = (Vec::new(), 0.0);
     let is_empty = cache.is_empty();
     for &position in needed {
         let node = graph.node(position);
+        let estimate = node.job.estimate();
+        all_bytes += estimate.bytes;
         let reason = match !is_empty && cache.knows(&node.item) {
             true if cache.holds(&node.item, graph.key(position)) => continue,
             true => reason(graph, cache, position),
             false => NEW,
         };
-        let estimate = node.job.estimate();
         let (item, memory_bytes) = (node.item.to_string(), node.job.memory_bytes());
         let Reason { text, kind } = reason;
         stale.push(Stale { item, reason: text, kind, seconds: estimate.seconds, bytes: estimate.bytes, memory_bytes });
     }
     let (items, ready) = (needed.len(), needed.len() - stale.len());
-    PlanSummary { items, ready, stale, is_first: is_empty, doubts: Vec::new() }
+    let assembly_seconds = assembly_seconds(items, all_bytes);
+    PlanSummary { items, ready, stale, assembly_seconds, is_first: is_empty, doubts: Vec::new() }
+}
+
+/// Estimated time of assembly and report of so many items with artifacts of so many bytes, s.
+fn assembly_seconds(items: usize, bytes: f64) -> f64 {
+    let [any, of_item, of_byte] = ASSEMBLY_S;
+    any + of_item * items as f64 + of_byte * bytes
 }
 
 /// The reason why an item that was tried before has no current result.

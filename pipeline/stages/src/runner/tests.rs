@@ -501,9 +501,11 @@ fn val_a_plan_says_why() {
     let fresh = plan(&old, &all(&old), &cache);
     assert_eq!(reasons(&fresh), ["s/a: new", "s/b: new"]);
     assert_eq!((fresh.stale[1].seconds, fresh.stale[1].bytes, fresh.stale[1].memory_bytes), (2.0, 3.0, 7));
+    // Assembly and report follow, on ready items as well.
+    assert!(fresh.assembly_seconds > 0.5 && fresh.assembly_seconds < 0.6, "{}", fresh.assembly_seconds);
     run(&old, &cache, 1);
     let half = plan(&old, &all(&old), &cache);
-    assert_eq!((half.items, half.ready), (2, 1));
+    assert_eq!((half.items, half.ready, half.assembly_seconds), (2, 1, fresh.assembly_seconds));
     assert_eq!(reasons(&half), ["s/b: failed before: the DEM is flat"]);
     // The same recipe, which now works: nothing of the key has changed, so the item is only tried again.
     let mended = chain(1, Ending::Written);
