@@ -18,12 +18,14 @@ const KNOWN_AFTER_S: f64 = 2.0;
 /// Minimum time between two lines of progress without a bar, s.
 const LINE_EVERY_S: f64 = 1.0;
 
+/// Wall time for which the plan is taken to have been right before a run, s: the first items are short, and their times say little of the others.
+const PLAN_TRUSTED_S: f64 = 2.0;
+
 /// Reports the progress of a run.
 pub struct Reporter {
     quiet: bool,
     bar: Option<ProgressBar>,
     state: Mutex<State>,
-    start: Instant,
 }
 
 #[derive(Default)]
@@ -31,13 +33,40 @@ struct State {
     total: usize,
     ended: usize,
     seconds_total: f64,
-    seconds_done: f64,
+    /// Estimated time of the items that ended, s.
+    seconds_ended: f64,
+    running: Vec<Running>,
+    start: Option<Instant>,
     /// Start of the current copy, until its remaining time has been reported.
     copy_start: Option<Instant>,
     last_line: Option<Instant>,
 }
 
+/// An item that runs.
+struct Running {
+    item: ItemRef,
+    start: Instant,
+    /// Estimated time, s.
+    seconds: f64,
+}
+
 impl State {
+    /// Estimated time of what is done, s. Of an item that runs it is the time so far, because one long item would otherwise make all the others look slow.
+    fn seconds_done(&self, now: Instant) -> f64 {
+        let part = |r: &Running| now.saturating_duration_since(r.start).as_secs_f64().min(r.seconds);
+        self.running.iter().fold(self.seconds_ended, |sum, running| sum + part(running))
+    }
+
+    /// The time left as text; nothing at the end.
+    fn remaining(&self, now: Instant) -> String {
+        let Some(start) = self.start.filter(|_| self.ended < self.total && self.seconds_total > 0.0) else {
+            return String::new();
+        };
+        let elapsed_s = now.saturating_duration_since(start).as_secs_f64();
+        let left_s = seconds_left(elapsed_s, self.seconds_done(now), self.seconds_total, rayon::current_num_threads());
+        format!(", about {} left", crate::output::seconds(left_s))
+    }
+
     /// True when the last line is old enough, and at the last item.
     fn is_time(&mut self) -> bool {
         let is_time =
@@ -76,7 +105,7 @@ impl Reporter {
     /// A reporter; `quiet` suppresses everything but failures.
     pub fn new(quiet: bool) -> Self {
         let bar = on_terminal(quiet, "{bar:32} {percent:>3}%  {elapsed} elapsed, {eta} left  {msg}");
-        Self { quiet, bar, state: Mutex::default(), start: Instant::now() }
+        Self { quiet, bar, state: Mutex::default() }
     }
 
     /// Prints a permanent line.
@@ -104,14 +133,16 @@ impl Reporter {
     fn advance(&self, item: &ItemRef, seconds: f64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
         state.ended += 1;
-        state.seconds_done += seconds;
+        state.seconds_ended += seconds;
+        state.running.retain(|running| running.item != *item);
+        let now = Instant::now();
         let counts = format!("{}/{}", state.ended, counted(state.total, "item"));
         match &self.bar {
             Some(bar) => {
-                bar.set_position((state.seconds_done * TICKS_PER_SECOND) as u64);
+                bar.set_position((state.seconds_done(now) * TICKS_PER_SECOND) as u64);
                 bar.set_message(format!("{counts}, {item}"));
             }
-            None if state.is_time() => self.say(&format!("{counts}, {item}{}", self.remaining(&state))),
+            None if state.is_time() => self.say(&format!("{counts}, {item}{}", state.remaining(now))),
             None => {}
         }
     }
@@ -128,16 +159,13 @@ impl Reporter {
             self.say(&line);
         }
     }
+}
 
-    /// Time left, from the share of the estimated work that is done.
-    fn remaining(&self, state: &State) -> String {
-        if state.seconds_done <= 0.0 || state.ended >= state.total {
-            return String::new();
-        }
-        let share = state.seconds_done / state.seconds_total.max(state.seconds_done);
-        let left = self.start.elapsed().as_secs_f64() * (1.0 / share - 1.0);
-        format!(", about {} left", crate::output::seconds(left))
-    }
+/// Time left, s, when of `total_s` estimated seconds on one core `done_s` are done: at the pace so far, and at the beginning at that of the plan on
+/// all threads.
+fn seconds_left(elapsed_s: f64, done_s: f64, total_s: f64, threads: usize) -> f64 {
+    let pace = (elapsed_s + PLAN_TRUSTED_S) / (done_s + PLAN_TRUSTED_S * threads as f64);
+    (total_s - done_s).max(0.0) * pace
 }
 
 /// How much of a copy is done and how long the rest takes at the speed so far; `None` too early to know, and at the end.
@@ -154,12 +182,18 @@ fn rest_of_copy(elapsed_s: f64, done: u64, total: u64) -> Option<String> {
 impl Progress for Reporter {
     fn begin(&self, total: usize, ready: usize, seconds: f64) {
         let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
-        *state = State { total: total - ready, seconds_total: seconds, ..State::default() };
+        let start = Some(Instant::now());
+        *state = State { total: total - ready, seconds_total: seconds, start, ..State::default() };
         drop(state);
         if let Some(bar) = &self.bar {
             bar.set_length((seconds * TICKS_PER_SECOND) as u64);
         }
         self.say(&format!("{}, {ready} already computed", counted(total, "item")));
+    }
+
+    fn started(&self, item: &ItemRef, seconds: f64) {
+        let mut state = self.state.lock().unwrap_or_else(PoisonError::into_inner);
+        state.running.push(Running { item: item.clone(), start: Instant::now(), seconds });
     }
 
     fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {
@@ -208,16 +242,38 @@ mod tests {
         assert!(state.is_time());
     }
 
-    /// Without finished work nothing is known of the rest, and at the end there is none.
+    /// At the end nothing is left.
     #[test]
-    fn val_time_left_is_told_when_known() {
-        let reporter = Reporter::new(true);
-        let state =
-            |ended, seconds_done| State { total: 2, ended, seconds_total: 8.0, seconds_done, ..State::default() };
-        assert_eq!(reporter.remaining(&state(1, 0.0)), "");
-        assert_eq!(reporter.remaining(&state(2, 8.0)), "");
-        let told = reporter.remaining(&state(1, 4.0));
+    fn val_time_left_is_told_until_the_end() {
+        let now = Instant::now();
+        let state = |ended| State { total: 2, ended, seconds_total: 8.0, start: Some(now), ..State::default() };
+        let told = state(1).remaining(now);
         assert!(told.starts_with(", about ") && told.ends_with(" left"), "{told}");
+        assert_eq!(state(2).remaining(now), "");
+        assert_eq!(State::default().remaining(now), "");
+    }
+
+    /// At first the plan decides, divided among the threads, and later the pace of the run.
+    #[test]
+    fn val_the_pace_of_the_run_replaces_that_of_the_plan() {
+        assert_eq!(seconds_left(0.0, 0.0, 8.0, 1), 8.0);
+        assert_eq!(seconds_left(0.0, 0.0, 8.0, 2), 4.0);
+        // The first item, a short one, took five times its estimate: 40 s would be left at its pace.
+        assert!((8.0..9.0).contains(&seconds_left(0.05, 0.01, 8.0, 1)));
+        // Everything takes twice as long as planned.
+        assert!((190.0..200.0).contains(&seconds_left(200.0, 100.0, 200.0, 1)));
+        assert_eq!(seconds_left(9.0, 9.0, 8.0, 1), 0.0);
+    }
+
+    /// A long item counts while it runs, up to its estimate. Without it, six seconds for the others would look like a minute for the rest.
+    #[test]
+    fn val_an_item_counts_while_it_runs() {
+        let start = Instant::now();
+        let item = ItemRef::new("fit", "snow");
+        let running = vec![Running { item, start, seconds: 3.0 }];
+        let state = State { seconds_ended: 1.0, running, ..State::default() };
+        let done = |after_s| state.seconds_done(start + Duration::from_secs(after_s));
+        assert_eq!([0, 2, 3, 6].map(done), [1.0, 3.0, 4.0, 4.0]);
     }
 
     /// At 250 MB/s, after the two seconds from which on a speed can be told.

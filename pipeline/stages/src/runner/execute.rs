@@ -242,6 +242,7 @@ impl Run<'_> {
             });
         }
         let node = self.graph.node(position);
+        self.progress.started(&node.item, node.job.estimate().seconds);
         let key = self.graph.key(position);
         if let Some(record) = self.cache.fetch(&node.item, key) {
             return Ok(Ran { notes: record.notes, is_fetched: true });

@@ -8,7 +8,11 @@ pub trait Progress: Sync {
     fn begin(&self, total: usize, ready: usize, seconds: f64) {
         let _ = (total, ready, seconds);
     }
-    /// An item ended; `seconds` is its share of the estimated time, s.
+    /// An item starts; `seconds` is its share of the estimated time, s.
+    fn started(&self, item: &ItemRef, seconds: f64) {
+        let _ = (item, seconds);
+    }
+    /// An item ended, or is skipped without having started; `seconds` is its share of the estimated time, s.
     fn ended(&self, item: &ItemRef, end: &End, seconds: f64) {
         let _ = (item, end, seconds);
     }

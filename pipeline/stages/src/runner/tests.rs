@@ -297,6 +297,26 @@ impl Progress for Told {
     }
 }
 
+/// Whoever estimates the time left knows which items run: each is told at its start and at its end, and one that is skipped at its end only.
+#[test]
+fn val_the_start_of_an_item_is_told() {
+    #[derive(Default)]
+    struct Both(Mutex<Vec<String>>);
+    impl Progress for Both {
+        fn started(&self, item: &ItemRef, seconds: f64) {
+            self.0.lock().unwrap().push(format!("{item} starts, {seconds} s"));
+        }
+        fn ended(&self, item: &ItemRef, _end: &End, _seconds: f64) {
+            self.0.lock().unwrap().push(format!("{item} ended"));
+        }
+    }
+    let area = Area::new();
+    let graph = graph(vec![node(area.ending("a", Ending::Refused), &[]), node(area.line("b"), &["a"])]);
+    let (cache, told) = (area.cache(), Both::default());
+    execute(&graph, &cache, &all(&graph), limits(1), &told).unwrap();
+    assert_eq!(*told.0.lock().unwrap(), ["s/a starts, 2 s", "s/a ended", "s/b ended"]);
+}
+
 /// Descendants of a failed item are skipped, whatever other parents they have; everything else runs.
 #[test]
 fn val_a_failure_skips_only_descendants() {
