@@ -168,6 +168,23 @@ fn val_trimmed_normal() {
     }
 }
 
+/// Far beyond its values, trimming changes nothing: the products of pairs have the mean rho, and no pair is lost.
+#[test]
+fn val_a_distant_threshold_trims_nothing() {
+    for t in [20.0, 50.0, 1e3, 1e6, 1e12, f64::INFINITY] {
+        let trimmed = TrimmedNormal::new(t);
+        assert!((trimmed.linear_share() - 1.0).abs() < 1e-12, "{t}");
+        for rho in [-1.0, -0.9, 0.0, 0.3, 0.95, 0.96, 1.0 - 1e-9, 1.0] {
+            let (product, pairs) = trimmed.moments(rho);
+            assert!(
+                (product - rho).abs() < 1e-12 && (pairs - 1.0).abs() < 1e-12,
+                "t {t}, rho {rho}: {product} {pairs}"
+            );
+        }
+    }
+    assert!(TrimmedNormal::new(f64::NAN).covariance(0.5).is_nan());
+}
+
 /// Mehler's series (long enough for rho up to 0.95) and the integral agree to 1e-10.
 #[test]
 fn prop_series_equals_integral() {

@@ -23,6 +23,9 @@ use std::f64::consts::PI;
 const SERIES_MAX: f64 = 0.95;
 /// Terms of the series: 0.95^630 is 1e-14.
 const TERMS: usize = 630;
+/// Threshold beyond which nothing is trimmed: in double precision no value of a unit normal lies beyond 30, while the Hermite polynomials
+/// of the series overflow from some 50 on.
+const NOTHING_TRIMMED: f64 = 30.0;
 /// Nodes of the integral over at most acos(0.95) = 0.32 rad.
 const NODES: usize = 20;
 
@@ -39,8 +42,10 @@ pub struct TrimmedNormal {
 }
 
 impl TrimmedNormal {
-    /// Trimming at `t` standard deviations, `t > 0`.
+    /// Trimming at `t` standard deviations, `t > 0`, be it infinite.
     pub fn new(t: f64) -> Self {
+        // `f64::min` would hide a NaN.
+        let t = if t > NOTHING_TRIMMED { NOTHING_TRIMMED } else { t };
         let (density, mass) = (normal::pdf(t), normal::central(t));
         let second_moment = mass - 2.0 * t * density;
         Self { t, density, mass, second_moment, squares: squares(t, density, mass), nodes: gauss_legendre(NODES) }

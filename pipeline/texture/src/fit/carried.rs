@@ -40,6 +40,13 @@ pub fn by_map(case: &Case, estimate: &Estimate) -> (CovarianceMap, Carried) {
     (map, carried)
 }
 
+/// True if every share is a number: there is none of a residual that does not exceed its noise.
+pub fn is_finite(carried: &Carried) -> bool {
+    let Carried { rms_share, variance_share, untrimmed_rms_share, increments } = carried;
+    let all = increments.iter().map(|octave| octave.share).chain([*rms_share, *variance_share, *untrimmed_rms_share]);
+    all.into_iter().all(f64::is_finite)
+}
+
 /// The noise's covariance in the rings after trimming, which keeps about the same share `kept` of texture and noise.
 fn trimmed_noise(case: &Case, noise: &LagField, kept: f64) -> Vec<f64> {
     case.bins.average(|lag| kept * noise.at(lag))

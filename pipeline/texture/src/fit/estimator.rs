@@ -43,12 +43,13 @@ pub struct Likelihood {
 
 impl Estimate {
     /// Akaike's criterion with Hurvich and Tsai's (1989) correction: -2 ln L + 2 k + 2 k (k + 1) / (n - k - 1), up to a constant
-    /// common to all models. `None` without a likelihood, or with too many parameters.
+    /// common to all models. `None` without a finite likelihood, or with too many parameters.
     pub fn aicc(&self) -> Option<f64> {
         let likelihood = self.likelihood.as_ref()?;
         let (n, k) = (likelihood.bins as f64, self.at.len() as f64);
         let correction = 2.0 * k * (k + 1.0) / (n - k - 1.0);
-        (n > k + 1.0).then(|| likelihood.chi2 + likelihood.weights.log_determinant() + 2.0 * k + correction)
+        let aicc = likelihood.chi2 + likelihood.weights.log_determinant() + 2.0 * k + correction;
+        (n > k + 1.0 && aicc.is_finite()).then_some(aicc)
     }
 
     /// Generalised sum of squares per degree of freedom.
@@ -117,6 +118,11 @@ impl<'a> Estimator<'a> {
     /// The model in each bin after detrending and trimming, m2.
     pub fn mean(&self, covariance: &Covariance) -> Vec<f64> {
         self.expectation.mean(covariance, self.case.survey.trim.threshold_m)
+    }
+
+    /// True if the model has a value in each bin, m2.
+    pub fn is_finite(&self, estimate: &Estimate) -> bool {
+        self.mean(&estimate.covariance).iter().all(|m| m.is_finite())
     }
 
     /// Fits every form, starting from the uncorrected exponential fitted to the same data.

@@ -51,7 +51,7 @@ impl Expectation<'_> {
         let measured = self.filter.measured_covariance(model);
         let residual = self.filter.residual_covariance(&measured);
         let partial = self.correction(model, &measured);
-        let complete = residual.at([0, 0]);
+        let complete = not_negative(residual.at([0, 0]));
         // Pairs with partial windows have their own variance and covariance, and trimming removes a different share of them.
         let shares = self.partial.shares();
         let added = |k: usize, bin: usize| if shares[bin] > 0.0 { partial[k] / shares[bin] } else { 0.0 };
@@ -59,11 +59,11 @@ impl Expectation<'_> {
         let mut mean = vec![0.0; self.bins.len()];
         for m in &self.bins.members {
             let (share, covariance) = (shares[m.bin], residual.at(m.lag));
-            let whole = maps[0].moments(covariance / complete);
+            let whole = maps[0].moments(correlation(covariance, complete));
             let mut sums = [(1.0 - share) * complete * whole.0, (1.0 - share) * whole.1];
             if share > 0.0 {
-                let variance = complete + added(0, m.bin);
-                let correlation = (covariance + added(m.bin, m.bin)) / variance;
+                let variance = not_negative(complete + added(0, m.bin));
+                let correlation = correlation(covariance + added(m.bin, m.bin), variance);
                 let [low, high] = [0, 1].map(|k| maps[k].moments(correlation));
                 // The variance lies between those of the two maps: interpolate.
                 let place = shares[0] / share;
@@ -142,7 +142,18 @@ impl Expectation<'_> {
 }
 
 fn trimmed(variance: f64, threshold_m: f64) -> TrimmedNormal {
-    TrimmedNormal::new(threshold_m / variance.sqrt())
+    TrimmedNormal::new(threshold_m / not_negative(variance).sqrt())
+}
+
+/// A variance that rounding may have left below 0, where the window removes the surface.
+fn not_negative(variance: f64) -> f64 {
+    // `f64::max` would hide a NaN.
+    if variance < 0.0 { 0.0 } else { variance }
+}
+
+/// A covariance over the variance; 0 where nothing varies.
+fn correlation(covariance: f64, variance: f64) -> f64 {
+    if variance == 0.0 { 0.0 } else { covariance / variance }
 }
 
 /// Derivatives of a bin's mean with respect to its own untrimmed covariance `c` and to the variance.

@@ -135,8 +135,15 @@ pub fn fit(heights: &dyn Heights, settings: &FitSettings, streams: &Streams) -> 
         Mode::Paper => paper(&case, &naive)?,
         Mode::Corrected => corrected(&case, &naive, streams)?,
     };
-    let fit = FitFile { height_quantiles_m: quantiles_m(&residual.values), statistics, ..fit };
+    let fit = readable(FitFile { height_quantiles_m: quantiles_m(&residual.values), statistics, ..fit })?;
     Ok(FitOutcome { fit, settings: settings.clone(), survey: case.survey, bins: case.bins, cell_m: case.geometry.cell })
+}
+
+/// Refuses a fit whose file could not be read: JSON has no numbers that are not finite.
+fn readable(fit: FitFile) -> Result<FitFile, FitError> {
+    let read = serde_json::to_value(&fit).and_then(serde_json::from_value::<FitFile>);
+    read.map_err(|_| FitError::NoFit { model: fit.model.clone() })?;
+    Ok(fit)
 }
 
 /// The residual of a DEM, heights minus background, as a fit with these settings computes it, before trimming, m; NaN where there is no data,
@@ -208,11 +215,12 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         return Err(FitError::TooFewLags { found: bins.len(), needed });
     }
     let estimator = Estimator::new(case, bins);
-    let estimates = estimator.candidates(naive);
-    let Some(estimate) = best(&estimates) else { return Err(FitError::TooFewLags { found: bins.len(), needed: 3 }) };
-    if estimator.mean(&estimate.covariance).iter().any(|m| !m.is_finite()) {
-        return Err(FitError::NoFit { model: estimate.form.name().to_owned() });
-    }
+    let rough_rings = directional.then(|| Estimator::rough(case, &case.bins));
+    let on_rings = rough_rings.as_ref().unwrap_or(&estimator);
+    let is_finite = |estimate: &Estimate| estimator.is_finite(estimate) && on_rings.is_finite(estimate);
+    let (estimates, without): (Vec<_>, Vec<_>) = estimator.candidates(naive).into_iter().partition(is_finite);
+    let without_values: Vec<String> = without.iter().map(|e| e.form.name().to_owned()).collect();
+    let Some(estimate) = best(&estimates) else { return Err(FitError::NoFit { model: without_values.join(", ") }) };
     refuse_white(case, estimate)?;
 
     let replicates =
@@ -223,8 +231,6 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     let area = Area::new(part.as_ref(), case, &at_scales)?;
     let windows = area.windows(estimate);
     let rough = (!case.heights.are_profiles()).then(|| Estimator::rough(case, &by_direction));
-    let rough_rings = directional.then(|| Estimator::rough(case, &case.bins));
-    let on_rings = rough_rings.as_ref().unwrap_or(&estimator);
     let disagreement = verdicts::window_disagreement(&windows);
     let measured = settings.empirical.then(|| carried::by_map(case, estimate));
     let (map, carried) = measured.map_or_else(|| (None, carried::by_model(on_rings, estimate)), |(m, c)| (Some(m), c));
@@ -237,13 +243,14 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
             .map(|i| resampling::with_profile(i, &estimator, estimate)),
         block_intervals: resampling::intervals(&estimator, estimate, &resampled),
         candidates: verdicts::candidates(&estimates, on_rings),
-        profile: profile::profile(&estimator, estimate),
+        without_values,
+        profile: profile::profile(&estimator, estimate).filter(profile::is_finite),
         disagreement,
         others: windows.others.iter().map(verdicts::other_window).collect(),
         isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),
         misfit_p: verdicts::misfit_p(estimate, replicates.as_ref()),
-        carried: Some(carried),
+        carried: Some(carried).filter(carried::is_finite),
         sill_over_range_spread: windows.sill_over_range_spread(),
         replicates: replicates.as_ref().map_or(0, |r| r.at.len()),
         normality_p: replicates.as_ref().and_then(|r| verdicts::normality_p(case, r)),

@@ -30,6 +30,11 @@ pub fn profile(estimator: &Estimator, estimate: &Estimate) -> Option<Profile> {
     })
 }
 
+/// True if every sum of squares is a number.
+pub fn is_finite(profile: &Profile) -> bool {
+    profile.range_m.iter().chain(&profile.chi2_rise).all(|v| v.is_finite())
+}
+
 /// The fits at both ends of the range's interval, each `None` where it is open; `None` without a likelihood.
 pub fn ends(estimator: &Estimator, estimate: &Estimate) -> Option<[Option<Held>; 2]> {
     let coordinate = estimate.coordinate(Role::Range(0))?;

@@ -36,6 +36,8 @@ pub struct Findings {
     pub intervals: Option<Intervals>,
     pub block_intervals: Option<Intervals>,
     pub candidates: Vec<Candidate>,
+    /// Models that are not among them, because their covariance is not finite where the search ended.
+    pub without_values: Vec<String>,
     pub profile: Option<Profile>,
     /// Largest disagreement of fits at other windows, in standard errors.
     pub disagreement: Option<f64>,
@@ -278,15 +280,10 @@ impl Summary {
 
     fn misfit_warning(&self, case: &Case, estimate: &Estimate, findings: &Findings) -> Option<String> {
         let misfit = self.misfit_m2 / case.bins.covariance_m2[0];
-        let rejected = findings.misfit_p.is_some_and(|p| p <= TEST_LEVEL);
-        let how = findings.misfit_p.map_or_else(String::new, |p| format!(", {}", p_value(p, findings.replicates)));
-        (misfit > MISFIT_MAX || rejected).then(|| {
-            format!(
-                "the {} model does not fit the covariance (RMS misfit {:.1} % of the variance{how}); its parametric intervals are too narrow",
-                estimate.form.name(),
-                100.0 * misfit
-            )
-        })
+        let test = findings.misfit_p.map(|p| (p <= TEST_LEVEL, p_value(p, findings.replicates)));
+        let (how, intervals) = misfit_words(misfit, test)?;
+        let model = estimate.form.name();
+        Some(format!("the {model} model does not fit the covariance ({how}); its parametric intervals {intervals}"))
     }
 
     fn object_warning(&self, case: &Case) -> Option<String> {
@@ -298,6 +295,23 @@ impl Summary {
                 100.0 * objects
             )
         })
+    }
+}
+
+/// Which of the two criteria speaks against a model, the RMS misfit over the variance or the test (whether it rejects the model, and its p-value
+/// in words), and what that means for parametric intervals; `None` if neither does.
+fn misfit_words(misfit: f64, test: Option<(bool, String)>) -> Option<(String, &'static str)> {
+    let share = format!("RMS misfit {:.1} % of the variance", 100.0 * misfit);
+    let too_narrow = "are too narrow";
+    match (misfit > MISFIT_MAX, test) {
+        (true, Some((true, p))) => Some((format!("{share}, {p}"), too_narrow)),
+        (true, None) => Some((share, too_narrow)),
+        (true, Some((false, p))) => {
+            let limit = format!("more than {:.0} %", 100.0 * MISFIT_MAX);
+            Some((format!("{share}, {limit}; the test does not reject it, {p}"), "may be too narrow"))
+        }
+        (false, Some((true, p))) => Some((format!("the test rejects it, {p}; {share}"), too_narrow)),
+        (false, _) => None,
     }
 }
 
@@ -442,11 +456,12 @@ impl ScaleExplicit {
     }
 }
 
-/// Warns of models without a likelihood, which cannot be chosen.
+/// Warns of models without a likelihood or without finite values, which cannot be chosen.
 fn comparison_warning(findings: &Findings) -> Option<String> {
-    let without: Vec<&str> =
-        findings.candidates.iter().filter(|c| c.aicc_above_best.is_none()).map(|c| c.model.as_str()).collect();
-    let all = findings.candidates.len();
+    let Findings { candidates, without_values, .. } = findings;
+    let unlikely = candidates.iter().filter(|c| c.aicc_above_best.is_none()).map(|c| &c.model);
+    let without: Vec<&str> = unlikely.chain(without_values).map(String::as_str).collect();
+    let all = candidates.len() + without_values.len();
     (all > 1 && !without.is_empty())
         .then(|| format!("{} of {all} models could not be compared: {}", without.len(), without.join(", ")))
 }
@@ -567,5 +582,20 @@ mod tests {
         assert_eq!(told(1.0, 0.7, true), format!("{of_rms} 100 % of the residual's RMS{octave}{advice} both."));
         assert_eq!(told(1.0, 1.0, true), format!("{of_rms} 100 % of the residual's RMS."));
         assert_eq!(told(0.87, 0.7, false), format!("{of_rms} 87 % of the residual's RMS{octave}."));
+    }
+
+    /// The warning says which criterion speaks: a misfit of more than 5 % of the variance, the test, or both.
+    #[test]
+    fn val_a_misfit_says_why() {
+        let words = |misfit: f64, p: Option<f64>| misfit_words(misfit, p.map(|p| (p <= TEST_LEVEL, p_value(p, 0))));
+        let of = |misfit, p| words(misfit, p).map(|(how, intervals)| format!("{how}: {intervals}"));
+        let both = "RMS misfit 9.1 % of the variance, p < 0.001: are too narrow";
+        assert_eq!(of(0.091, Some(0.0)).as_deref(), Some(both));
+        let large = "RMS misfit 9.1 % of the variance, more than 5 %; the test does not reject it, p = 0.400: may be too narrow";
+        assert_eq!(of(0.091, Some(0.4)).as_deref(), Some(large));
+        let small = "the test rejects it, p = 0.002; RMS misfit 1.2 % of the variance: are too narrow";
+        assert_eq!(of(0.012, Some(0.002)).as_deref(), Some(small));
+        assert_eq!(of(0.091, None).as_deref(), Some("RMS misfit 9.1 % of the variance: are too narrow"));
+        assert_eq!([of(0.012, Some(0.4)), of(0.012, None)], [None, None]);
     }
 }

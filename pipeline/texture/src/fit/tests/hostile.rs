@@ -1,0 +1,121 @@
+//! Surfaces that no model of the covariance describes: fits end, and their files can be read.
+
+use super::*;
+use sastrugi_schemas::fit::FitFile;
+
+/// Cells of a side, and windows of 17 cells.
+const CELLS: usize = 96;
+const OUTER_SCALE_M: f64 = 1.0;
+
+/// A surface of `height(column, row, noise)` m, of which the noise is standard normal.
+fn surface(height: impl Fn(f64, f64, f64) -> f64) -> Grid {
+    let mut s = Streams::for_seed(5, "hostile").stream("cells");
+    let heights = (0..CELLS * CELLS).map(|k| height((k % CELLS) as f64, (k / CELLS) as f64, s.normal())).collect();
+    Grid::new(Geometry::square(CELLS, CELLS, CELL_M), heights)
+}
+
+/// A surface with an exponential one of this sigma on it.
+fn rough(sigma_m: f64, height: impl Fn(f64, f64) -> f64) -> Grid {
+    let mut dem = field(0.2, CELLS, CELL_M, 7);
+    let heights =
+        dem.values.iter().enumerate().map(|(k, z)| height((k % CELLS) as f64, (k / CELLS) as f64) + sigma_m * z);
+    dem.values = heights.collect();
+    dem
+}
+
+fn few_values() -> Grid {
+    let mut dem = field(0.28, CELLS, CELL_M, 2);
+    let mut s = Streams::for_seed(6, "hostile").stream("cells");
+    dem.values.iter_mut().filter(|_| s.uniform() < 0.45).for_each(|z| *z = f64::NAN);
+    dem
+}
+
+fn anisotropic() -> Grid {
+    let parameters = [("sigma_m", 0.1), ("range_m", 2.0), ("ratio", 0.1), ("azimuth_deg", 30.0)];
+    field_of(&covariance("anisotropic:gaussian", &parameters), CELLS, 3)
+}
+
+/// Slopes, spikes, steps, waves, gaps and grooves.
+fn hostile() -> Vec<(&'static str, Grid)> {
+    let steps = |c: f64, r: f64| (c / 23.0).floor() + 0.3 * ((c + r) / 31.0).floor();
+    let waves = |c: f64, r: f64| libm::sin(0.021 * c + 0.4) + 0.5 * libm::sin(0.017 * r);
+    vec![
+        ("white slope", surface(|c, r, noise| 0.05 * c - 0.02 * r + 1e-3 * noise)),
+        ("slope", rough(1e-3, |c, r| 0.05 * c - 0.02 * r)),
+        ("spike", rough(1e-4, |c, r| if c == 40.0 && r == 50.0 { 1e4 } else { 0.0 })),
+        ("steps", surface(|c, r, _| steps(c, r))),
+        ("one step", surface(|c, _, _| f64::from(u8::from(c > 48.0)))),
+        ("rough steps", surface(|c, r, noise| steps(c, r) + 1e-3 * noise)),
+        ("long waves", surface(|c, r, _| waves(c, r))),
+        ("noisy waves", surface(|c, r, noise| waves(c, r) + 1e-5 * noise)),
+        ("few values", few_values()),
+        ("anisotropic", anisotropic()),
+    ]
+}
+
+fn fitted(dem: &Grid, model: &str, find_objects: bool) -> Result<FitFile, FitError> {
+    let parameters = FitParameters {
+        outer_scale_m: OUTER_SCALE_M,
+        model: model.to_owned(),
+        bootstrap: 0,
+        find_objects,
+        ..FitParameters::default()
+    };
+    fit(dem, &parameters.try_into().unwrap(), &streams()).map(|outcome| outcome.fit)
+}
+
+/// The covariance of a surface of which the window leaves a millionth is as finite as any other, and a fixed share of the variance:
+/// trimming, far beyond such a residual, has no effect on it.
+#[test]
+fn val_a_model_that_the_window_almost_removes_is_finite() {
+    let dem = field(0.28, CELLS, CELL_M, 1);
+    let s = settings(Mode::Corrected, OUTER_SCALE_M, 0.05);
+    let case = Case::new(&dem, &s).unwrap();
+    for bins in [case.bins.clone(), case.bins_of(Layout::DIRECTIONAL)] {
+        let estimator = Estimator::rough(&case, &bins);
+        let share = |sigma_m: f64| -> Vec<f64> {
+            let model = covariance("gaussian", &[("sigma_m", sigma_m), ("range_m", 20.0 * OUTER_SCALE_M)]);
+            estimator.mean(&model).iter().map(|m| m / (sigma_m * sigma_m)).collect()
+        };
+        let expected = share(1.0);
+        assert!(expected[0] > 0.0 && expected[0] < 1e-5, "{expected:?}");
+        for sigma_m in [1e-2, 1e-4, 1e-8] {
+            let found = share(sigma_m);
+            let is_near = |(a, b): (&f64, &f64)| (a - b).abs() <= 1e-6 * expected[0];
+            assert!(found.iter().zip(&expected).all(is_near), "{sigma_m}: {found:?} {expected:?}");
+        }
+    }
+}
+
+/// A fit of a hostile surface is refused, or its file is read back as it was written.
+#[test]
+fn prop_fit_files_of_hostile_surfaces_are_read_back() {
+    // `auto` takes most of the time: it tries nine models.
+    let models = [("gaussian", true), ("exponential,matern,gaussian", false), ("auto", false)];
+    let is_tried =
+        |name: &str, model: &str| model != "auto" || ["one step", "noisy waves", "anisotropic"].contains(&name);
+    let tried = |(name, dem): (&'static str, Grid)| {
+        let models = models.into_iter().filter(move |(model, _)| is_tried(name, model));
+        models.map(move |(model, find_objects)| (name, dem.clone(), model, find_objects))
+    };
+    let cases: Vec<(&str, Grid, &str, bool)> = hostile().into_iter().flat_map(tried).collect();
+    let fitted: Vec<bool> = cases
+        .into_par_iter()
+        .map(|(name, dem, model, find_objects)| {
+            let found = match fitted(&dem, model, find_objects) {
+                Ok(found) => found,
+                Err(refused) => {
+                    println!("{name}, {model}: {refused}");
+                    return false;
+                }
+            };
+            let text = serde_json::to_string(&found).unwrap();
+            let back: FitFile = serde_json::from_str(&text).unwrap_or_else(|e| panic!("{name}, {model}: {e}\n{text}"));
+            assert_eq!(serde_json::to_string(&back).unwrap(), text, "{name}, {model}");
+            true
+        })
+        .collect();
+    let count = fitted.iter().filter(|f| **f).count();
+    println!("{count} of {} surfaces were fitted", fitted.len());
+    assert!(2 * count > fitted.len(), "{count}");
+}
