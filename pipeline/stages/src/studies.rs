@@ -684,9 +684,8 @@ mod tests {
         }
     }
 
-    /// Cells and size of a texture that are not stated follow its base where the defaults do not suit it, and stay the defaults elsewhere. One that
-    /// takes the size of its base is not periodic, unless that is stated or the method cannot do otherwise. What does not cover its base is refused
-    /// before the run; what repeats over it, or is cut to it, is a doubt.
+    /// Cells and size of a texture that are not stated follow its base where the defaults do not suit it, and stay the defaults elsewhere. What
+    /// does not cover its base is refused before the run; what repeats over it, or is cut to it, is a doubt.
     #[test]
     fn val_textures_follow_their_bases() {
         let head = STUDY.split_once("[[terrain]]").unwrap().0;
@@ -704,12 +703,6 @@ mod tests {
             (0.1, "", "size_m", json!([20.0, 20.0])),
             (0.1, "", "cell_m", json!(0.1)),
             (0.1, "periodic = false", "size_px", json!([300, 64])),
-            (0.05, "", "periodic", json!(false)),
-            (0.05, "periodic = true", "periodic", json!(true)),
-            (0.05, "tile = [2, 1]", "periodic", json!(true)),
-            (0.05, "size_m = [15.0, 3.2]", "periodic", json!(true)),
-            (0.1, "", "periodic", json!(true)),
-            (0.05, "method = \"gaussians\"", "size_px", json!([300, 64])),
         ] {
             let loaded = loaded(cell_m, more).unwrap_or_else(|error| panic!("{cell_m} {more}: {error}"));
             assert_eq!(loaded.heightfields["t"].parameters[key], value, "{cell_m} {more}");

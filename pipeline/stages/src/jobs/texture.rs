@@ -449,29 +449,14 @@ fn on_cells_of(dem: &Heightfield, parameters: &mut Value) -> Result<(), String> 
 /// The method for a texture on a base. Cells and size that are not stated are the base's where the defaults do not suit it: other cells, or a
 /// texture that does not repeat and is smaller.
 fn on_base(place: &Geometry, method: &str, own: &mut Value) -> Result<Box<dyn Method>, ParameterError> {
-    let is_sized = states_size(own);
+    let states_size = states_size(own);
     on_base_cells(place, own);
-    let takes_size = !is_sized && states_size(own);
     let made = sastrugi_texture::method(method, own);
     let suits = |made: &dyn Method| made.is_periodic() || uncovered(place, &made.geometry()).is_none();
-    if is_sized || (!takes_size && made.as_ref().is_ok_and(|made| suits(made.as_ref()))) {
+    if states_size || made.as_ref().is_ok_and(|made| suits(made.as_ref())) {
         return made;
     }
     on_base_size(place, own);
-    of_base_size(method, own)
-}
-
-/// The method for a texture of the size of its base, which never repeats there: it is periodic only if the study states that, or if the method
-/// cannot do otherwise (it has no such key, tiles are repeated, the torus would have too many cells).
-fn of_base_size(method: &str, own: &mut Value) -> Result<Box<dyn Method>, ParameterError> {
-    if own["periodic"].is_null() {
-        let mut once = own.clone();
-        once["periodic"] = json!(false);
-        if let Ok(made) = sastrugi_texture::method(method, &once) {
-            *own = once;
-            return Ok(made);
-        }
-    }
     sastrugi_texture::method(method, own)
 }
 

@@ -126,7 +126,7 @@ pub(super) fn without_default(schema: &mut Schema) {
 pub struct FftMaParameters {
     /// `unit` (default, Vecherin et al. 2022, section 3.3) or `gaussian`.
     pub phase: Phase,
-    /// Whether the texture repeats without seams. Default true; in a study, false for a texture that takes the size of its base.
+    /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
     /// `covariance` (default) or `eq10` (the published spectrum of an isotropic exponential, which loses variance).
     pub spectrum: SpectrumOf,
@@ -284,8 +284,8 @@ impl FftMaParameters {
         let cells = aim.map_or(1, Aim::oversampling) as f64 * enough[0] * enough[1];
         if cells > CELLS_MAX as f64 {
             let message = format!(
-                "is false, for which the range of {} m needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}: use larger \
-                 cells, a shorter range or periodic = true",
+                "is false, for which the range of {} m needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}: use larger cells \
+                 or a shorter range",
                 wanted.range_m()
             );
             return Err(ParameterError::new("periodic", message));

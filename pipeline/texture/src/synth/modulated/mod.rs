@@ -115,7 +115,7 @@ const NEGLIGIBLE: f64 = 1e-9;
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct ModulatedParameters {
-    /// Whether the texture repeats without seams. Default true; in a study, false for a texture that takes the size of its base.
+    /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
     /// Variance of the logarithm of the amplitude, in [0, 2]; replaces the fit's.
     #[serde(skip_serializing_if = "Option::is_none")]

@@ -110,7 +110,7 @@ pub struct QuiltingParameters {
     /// been used n more times than those of the site. Default 4.
     #[schemars(transform = limits::within(0.0, 100.0))]
     pub evenness: f64,
-    /// Whether the texture repeats without seams. Default true; in a study, false for a texture that takes the size of its base.
+    /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
     /// Base that the texture is for: with `surface`, for level or synthetic ground, it repeats the residual as it was measured; with `residual`, for a
     /// measured background, wavelengths near the fit's window are amplified, so that background and texture together have the covariance of the site.

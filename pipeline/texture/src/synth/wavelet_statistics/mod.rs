@@ -102,7 +102,7 @@ const BYTES_PER_CELL: [u64; 2] = [92, 20];
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields, default)]
 pub struct WaveletStatisticsParameters {
-    /// Whether the texture repeats without seams. Default true; in a study, false for a texture that takes the size of its base.
+    /// Whether the texture repeats without seams. Default true.
     pub periodic: bool,
     /// Number of rounds, 1 to 200. Default 10.
     #[schemars(range(min = 1, max = ROUNDS_MAX))]
