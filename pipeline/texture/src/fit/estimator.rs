@@ -6,6 +6,7 @@ use super::least_squares::{self, Cholesky, Chord, Minimum, curvature, minimise, 
 use crate::covariance::filtered::DetrendFilter;
 use crate::covariance::form::Role;
 use crate::covariance::lag::{lag_m, length_m};
+use crate::covariance::models::exponential::Exponential;
 use crate::covariance::partial::{PAIRS_FINE, PAIRS_ROUGH, PartialWindows};
 use crate::covariance::{Covariance, Form, LagBins};
 
@@ -15,6 +16,9 @@ const WEIGHTING_ROUNDS: usize = 4;
 const RIDGES: [f64; 5] = [0.0, 1e-6, 1e-5, 1e-4, 1e-3];
 /// Reweighting ends when no coordinate moves by more than this.
 const CONVERGED: f64 = 1e-6;
+/// Reweighting has settled if the weights of its result give a sum of squares that differs at most by this factor from the one under the
+/// weights that led to it.
+const SETTLED: f64 = 2.0;
 
 /// Fitted parameters and their likelihood.
 #[derive(Clone)]
@@ -140,28 +144,64 @@ impl<'a> Estimator<'a> {
     fn fit_here(&self, form: &Form, sigma_m: f64, range_m: f64) -> Estimate {
         let coordinates = self.case.coordinates(form);
         let ends = coordinates.starts(sigma_m, range_m).into_iter().map(|start| self.search(form, &start, None));
-        let mut end = least(ends);
-        let mut steps = end.steps;
-        let mut weights = None;
-        for _ in 0..WEIGHTING_ROUNDS {
-            weights = self.weights(&coordinates.decode(&end.at));
-            if weights.is_none() {
-                break;
-            }
-            let next = self.search(form, &end.at, weights.as_ref());
-            steps += next.steps;
-            // Weights of a misfitting model can drive the range towards zero.
+        let ordinary = least(ends);
+        let own = self.weights(&coordinates.decode(&ordinary.at));
+        let settled = own.clone().and_then(|weights| self.reweighted(form, &ordinary, weights));
+        // The bins of a smooth surface hardly scatter among themselves. Weights of a smooth fit that misses the data lead away from it;
+        // those of the exponential at the start may lead to a rougher one.
+        let settled = settled.or_else(|| self.reweighted(form, &ordinary, self.exponential_weights(sigma_m, range_m)?));
+        let (end, weights) = match settled {
+            Some((end, weights)) => (end, Some(weights)),
+            None => (self.judged(form, ordinary, own.as_ref()), own),
+        };
+        let steps = end.steps;
+        let likelihood = weights.map(|weights| self.likelihood(form, &end, weights));
+        Estimate { form: form.clone(), covariance: coordinates.decode(&end.at), at: end.at, steps, likelihood }
+    }
+
+    /// Searches again and again with the weights of the last result, beginning with `weights`; returns the result and its weights. `None`
+    /// if that does not settle: what a model far from the data says about the scatter of the bins can drive its range towards zero, or its
+    /// variance up and down.
+    fn reweighted(&self, form: &Form, from: &Minimum, mut weights: Cholesky) -> Option<(Minimum, Cholesky)> {
+        let coordinates = self.case.coordinates(form);
+        let mut end = from.clone();
+        for round in 1..=WEIGHTING_ROUNDS {
+            let next = self.search(form, &end.at, Some(&weights));
             if self.is_white(&coordinates.decode(&next.at)) && !self.is_white(&coordinates.decode(&end.at)) {
-                break;
+                return None;
             }
             let moved = difference(&next.at, &end.at).iter().fold(0.0, |m, d| f64::max(m, d.abs()));
-            end = next;
+            end = Minimum { steps: end.steps + next.steps, ..next };
             if moved < CONVERGED {
                 break;
             }
+            let own = self.weights(&coordinates.decode(&end.at))?;
+            if round == WEIGHTING_ROUNDS {
+                let after = self.judged(form, end.clone(), Some(&own)).value;
+                return self.have_settled(end.value, after).then_some((end, weights));
+            }
+            weights = own;
         }
-        let likelihood = weights.map(|weights| self.likelihood(form, &end, weights));
-        Estimate { form: form.clone(), covariance: coordinates.decode(&end.at), at: end.at, steps, likelihood }
+        Some((end, weights))
+    }
+
+    /// True if two sums of squares of one fit, under the weights that led to it and under its own, are alike.
+    fn have_settled(&self, before: f64, after: f64) -> bool {
+        // Below the number of bins a sum of squares is a good one, whatever its factor. A comparison with NaN is false.
+        let least = self.bins.len() as f64;
+        let is_alike = |a: f64, b: f64| a <= SETTLED * b.max(least);
+        is_alike(before, after) && is_alike(after, before)
+    }
+
+    /// A search result with its sum of squares under other weights.
+    fn judged(&self, form: &Form, end: Minimum, weights: Option<&Cholesky>) -> Minimum {
+        let misfit = self.misfit(form, &end.at, weights, &self.bins.covariance_m2);
+        Minimum { value: misfit.iter().map(|r| r * r).sum(), ..end }
+    }
+
+    /// The weights of an exponential.
+    fn exponential_weights(&self, sigma_m: f64, range_m: f64) -> Option<Cholesky> {
+        self.weights(&Covariance::new(&Exponential, sigma_m, range_m).ok()?)
     }
 
     /// True if the model's range is at most one cell although neighbouring cells of the data are correlated.

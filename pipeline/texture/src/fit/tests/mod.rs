@@ -532,6 +532,35 @@ fn val_models_are_recovered() {
     }
 }
 
+/// A Gaussian does not fit an exponential surface, and its bins would hardly scatter: no weights lead to a fit. Its sum of squares is still that of
+/// the bins under its own weights, as for any other model, so that the exponential is chosen. The weights of the exponential lead the Matern model
+/// to the same fit.
+#[test]
+fn val_a_smooth_model_that_misses_the_data_is_not_chosen() {
+    let truth = covariance("exponential", &[("sigma_m", 0.1), ("range_m", 0.28)]);
+    let s = with_bootstrap("exponential,gaussian,matern", 0);
+    for seed in [2, 3] {
+        let dem = field_of(&truth, 200, seed);
+        let case = Case::new(&dem, &s).unwrap();
+        let estimator = Estimator::rough(&case, &case.bins);
+        let found = estimator.candidates(&ordinary(&case, &Form::parse("exponential").unwrap()));
+        for estimate in &found {
+            let likelihood = estimate.likelihood.as_ref().unwrap();
+            let misfit = estimator::difference(&estimator.mean(&estimate.covariance), &case.bins.covariance_m2);
+            let chi2: f64 = likelihood.weights.whiten(&misfit).iter().map(|r| r * r).sum();
+            assert!(
+                (likelihood.chi2 / chi2 - 1.0).abs() < 1e-6,
+                "{}: {} {chi2}",
+                estimate.form.name(),
+                likelihood.chi2
+            );
+        }
+        let [exponential, gaussian, matern] = [0, 1, 2].map(|k| found[k].aicc().unwrap());
+        assert!(gaussian > exponential + 100.0, "{seed}: {exponential} {gaussian}");
+        assert!((matern - exponential).abs() < 10.0, "{seed}: {exponential} {matern}");
+    }
+}
+
 /// The complete file with intervals, on a field of the fitted model.
 #[test]
 fn val_a_full_fit_has_intervals_and_verdicts() {
