@@ -575,6 +575,21 @@ impl<'a> Builder<'a> {
         let ids = self.families.get(id).filter(is_there);
         ids.cloned().ok_or_else(|| unknown_id(entry, key, id, self.families.keys()))
     }
+
+    /// The ids that the references of a key `terrains` expand to.
+    ///
+    /// # Errors
+    /// No reference, or an id that is not an earlier item.
+    pub fn families(&self, entry: &Entry<'_>, named: &[String]) -> Result<BTreeSet<String>, StudyError> {
+        if named.is_empty() {
+            return Err(entry.error("terrains", "`terrains` is empty; name at least one terrain"));
+        }
+        let mut ids = BTreeSet::new();
+        for (k, id) in named.iter().enumerate() {
+            ids.extend(self.family(entry, &format!("terrains.{k}"), id)?);
+        }
+        Ok(ids)
+    }
 }
 
 /// True if two errors refuse the same key, or one a key within that of the other.

@@ -849,10 +849,13 @@ mod tests {
             on_hills(&format!("{forest}{table}"))
         };
         let (_, said) = only_refusal(missions("hills", ""));
-        assert_eq!(said, "missions \"m\": \"hills\" has no trail; name a terrain of kind `compose` with a trail");
-        for name in ["trail-2", "trail-1", "path"] {
+        assert_eq!(
+            said,
+            "missions \"m\": on \"hills\": there is no trail; name a terrain of kind `compose` with a trail"
+        );
+        for name in ["trail-2", "trail-1", "trail-01", "trail-+2", "path"] {
             let (key, said) = only_refusal(missions("forest", &format!("trail = \"{name}\"")));
-            let words = format!("missions \"m\": `trail` is \"{name}\", but \"forest\" has 1 trail");
+            let words = format!("missions \"m\": on \"forest\": there is no \"{name}\", only 1 trail");
             assert_eq!((key.as_str(), said), ("trail", words));
         }
         assert!(missions("forest", "backwards = true").is_ok());
@@ -880,8 +883,8 @@ mod tests {
         }
     }
 
-    /// A formation larger than its terrain is a doubt, as the team runs all the same: a column of four is three times its spacing deep, a line of four as
-    /// wide, and a custom formation as large as its slots. The terrain's diagonal is 56.6 m.
+    /// A formation larger than its terrain is a doubt, as the team runs all the same: a column of four is three times its spacing long, a line of four as
+    /// wide, and the last two of a wedge of four are 2 and 1 spacings behind it and 3 apart sideways. The terrain's diagonal is 56.6 m.
     #[test]
     fn val_formations_larger_than_their_terrain_are_told() {
         let doubts = |more: &str| {
@@ -889,22 +892,21 @@ mod tests {
             let loaded = on_hills(&format!("{route}[[navigate]]\nid = \"team\"\nroute = \"way\"\n{more}\n"));
             loaded.unwrap_or_else(|error| panic!("{more}: {error}")).doubts
         };
-        for (more, sizes) in [
-            ("spacing_m = 60.0", &["180.0 m deep and 0.0 m wide"][..]),
-            (
-                "spacing_m = 20.0\nsweep.formation = [\"column\", \"line\", \"wedge\"]",
-                &["60.0 m deep and 0.0 m wide", "0.0 m deep and 60.0 m wide", "40.0 m deep and 60.0 m wide"],
-            ),
+        for (more, sizes_m) in [
+            ("spacing_m = 60.0", &["180.0"][..]),
+            ("spacing_m = 20.0\nsweep.formation = [\"column\", \"line\", \"wedge\"]", &["60.0", "60.0", "63.2"]),
             (
                 "formation = \"custom\"\nslots = [{ id = 1 }, { id = 2, predecessor = 1, depth_m = 50.0, width_m = 30.0 }]",
-                &["50.0 m deep and 30.0 m wide"],
+                &["58.3"],
             ),
             ("spacing_m = 18.0", &[]),
         ] {
             let found = doubts(more);
-            assert_eq!(found.len(), sizes.len(), "{found:?}");
-            for (doubt, size) in found.iter().zip(sizes) {
-                let words = format!("navigate \"team\" on \"hills\": the formation, {size}, has no room");
+            assert_eq!(found.len(), sizes_m.len(), "{found:?}");
+            for (doubt, size_m) in found.iter().zip(sizes_m) {
+                let words = format!(
+                    "navigate \"team\" on \"hills\": two members of the formation are {size_m} m apart, but the diagonal of"
+                );
                 assert!(doubt.starts_with(&words), "{doubt}");
             }
         }

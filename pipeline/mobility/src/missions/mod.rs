@@ -170,6 +170,18 @@ pub enum MissionError {
     },
 }
 
+impl MissionError {
+    /// The parameter that asks for too much.
+    pub fn key(&self) -> &'static str {
+        match self {
+            Self::LongerThanTerrain { inside_x_m, inside_y_m, .. } if inside_x_m.min(*inside_y_m) <= 0.0 => "border_m",
+            Self::LongerThanTerrain { .. } => "length_m",
+            Self::NoEligibleStart { .. } => "border_m",
+            Self::DrawsExhausted { .. } => "max_draws",
+        }
+    }
+}
+
 /// Which cells starts are drawn from. Either way, starts are uniform over the low-roughness cells.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, serde::Serialize)]
 #[serde(rename_all = "snake_case")]

@@ -204,6 +204,16 @@ impl Formation {
         self.slots.iter().position(|slot| slot.member == member)
     }
 
+    /// Largest distance between two slots, m.
+    pub fn diameter_m(&self) -> f64 {
+        let apart_m = |a: &Slot, b: &Slot| {
+            let [behind_m, aside_m] = [0, 1].map(|axis| a.from_leader_m[axis] - b.from_leader_m[axis]);
+            (behind_m * behind_m + aside_m * aside_m).sqrt()
+        };
+        let pairs = self.slots.iter().enumerate().flat_map(|(k, a)| self.slots[..k].iter().map(move |b| apart_m(a, b)));
+        pairs.fold(0.0, f64::max)
+    }
+
     /// Extent to the sides and to the rear, m: `[leftmost, rightmost, rearmost]` from the leader.
     pub fn extent_m(&self) -> [f64; 3] {
         let fold = |axis: usize, from: f64, end: fn(f64, f64) -> f64| {

@@ -125,7 +125,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let vehicle = vehicle.transpose().map_err(|e| entry.refuse(e))?;
     let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
     let searches = expanded.iter().map(|one| parameters_of(entry, &envelope, one)).collect::<Result<Vec<_>, _>>()?;
-    let terrains = terrains(builder, entry, &envelope.terrains)?;
+    let terrains = builder.families(entry, &envelope.terrains)?;
     for search in &searches {
         let has_room = |field: &Heightfield, terrain: &Geometry| check_room(field, terrain, search, vehicle.as_ref());
         room::check(builder, entry, &terrains, has_room)?;
@@ -183,18 +183,6 @@ fn check_room(
         Pairs::Given(ends_m) => cells_of_ends(&cells, *ends_m).map(drop).map_err(|why| Lack::new("", why)),
         Pairs::Drawn { rules, .. } => check_size(&cells, rules).map_err(|e| Lack::new(e.key(), format!("cannot {e}"))),
     }
-}
-
-/// Ids of the terrains that a key `terrains` names.
-fn terrains(builder: &Builder<'_>, entry: &Entry<'_>, named: &[String]) -> Result<BTreeSet<String>, StudyError> {
-    if named.is_empty() {
-        return Err(entry.error("terrains", "`terrains` is empty; name the terrains to plan on"));
-    }
-    let mut ids = BTreeSet::new();
-    for (k, id) in named.iter().enumerate() {
-        ids.extend(builder.family(entry, &format!("terrains.{k}"), id)?);
-    }
-    Ok(ids)
 }
 
 fn pairs(entry: &Entry<'_>, envelope: &RouteItem, rules: PairParameters) -> Result<Pairs, StudyError> {

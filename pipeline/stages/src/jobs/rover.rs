@@ -24,7 +24,7 @@ use sastrugi_schemas::{Kind, ParameterError, counted};
 use sastrugi_store::digest;
 use sastrugi_store::mcap::{RoverMcap, TerrainView, bag_metadata, write_rover};
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Name of the stage.
@@ -217,7 +217,7 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     };
     let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
     let trials = expanded.iter().map(prepared).collect::<Result<Vec<_>, _>>()?;
-    let terrains = terrains(builder, entry, &envelope.terrains)?;
+    let terrains = builder.families(entry, &envelope.terrains)?;
     for (_, parameters) in &trials {
         room::check(builder, entry, &terrains, rovers::room_for(parameters))?;
     }
@@ -234,17 +234,6 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
 fn unknown(entry: &Entry<'_>, kind: &str) -> StudyError {
     let known: Vec<String> = kinds().iter().map(|k| format!("`{}`", k.kind)).collect();
     entry.error("kind", format!("`{kind}` is not a navigator; known navigators: {}", known.join(", ")))
-}
-
-fn terrains(builder: &Builder<'_>, entry: &Entry<'_>, named: &[String]) -> Result<BTreeSet<String>, StudyError> {
-    if named.is_empty() {
-        return Err(entry.error("terrains", "`terrains` is empty; name the terrains to drive on"));
-    }
-    let mut ids = BTreeSet::new();
-    for (k, id) in named.iter().enumerate() {
-        ids.extend(builder.family(entry, &format!("terrains.{k}"), id)?);
-    }
-    Ok(ids)
 }
 
 /// Adds the rovers on one terrain.

@@ -152,10 +152,11 @@ fn fitted(form: &str, estimator: &Estimator, estimates: &[Estimate]) -> Option<E
     Some(estimator.fit(&form, from.sigma_m(), from.range_m()))
 }
 
-/// A model with one scale that describes the surface better than a self-affine one, and the same at every window. If it was a candidate, it
-/// has already been judged.
+/// A model with one scale that describes the surface better than a self-affine one, and the same at every window, where only plain models
+/// of other shapes were tried. If it was a candidate, it has already been judged, and it has no axis or nugget that a candidate needed.
 fn single_scale(estimator: &Estimator, estimates: &[Estimate], affine: &Estimate, area: &Area) -> Option<&'static str> {
-    if estimates.iter().any(|e| e.form.name() == SINGLE_SCALE) {
+    let is_plain = |form: &Form| form.terms().len() == 1 && !form.has_nugget() && !form.is_anisotropic();
+    if estimates.iter().any(|e| e.form.name() == SINGLE_SCALE || !is_plain(&e.form)) {
         return None;
     }
     let single = fitted(SINGLE_SCALE, estimator, estimates)?;
@@ -163,7 +164,9 @@ fn single_scale(estimator: &Estimator, estimates: &[Estimate], affine: &Estimate
     let are_comparable = single.likelihood.as_ref()?.bins == affine.likelihood.as_ref()?.bins;
     let is_better = are_comparable && single.aicc()? < affine.aicc()? - AICC_WORTH;
     let has_scale = is_better && is_range_identified(area.whole, &single);
-    (has_scale && !no_scale_separation(window_disagreement(&area.windows(&single)))).then_some(SINGLE_SCALE)
+    // Where no window could be compared, agreement is not known.
+    let agree = || window_disagreement(&area.windows(&single)).is_some_and(|z| z <= WINDOWS_Z);
+    (has_scale && agree()).then_some(SINGLE_SCALE)
 }
 
 /// Largest disagreement between fits at neighbouring windows, in standard errors: over sigma, b (or the shape) and sigma^2 / b.

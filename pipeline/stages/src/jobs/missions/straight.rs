@@ -20,7 +20,7 @@ use sastrugi_schemas::kind::{read_parameters, schema_of};
 use sastrugi_schemas::study::MissionsItem;
 use sastrugi_store::dem;
 use serde_json::{Value, json};
-use std::collections::{BTreeMap, BTreeSet};
+use std::collections::BTreeMap;
 use std::sync::Arc;
 
 /// Description of this kind of missions.
@@ -83,19 +83,13 @@ pub fn add(
     entry.check_keys::<MissionsItem>(params, &schema_of::<MissionParameters>())?;
     let raw: MissionParameters = read_parameters(params).map_err(|e| entry.refuse(e))?;
     let settings = MissionSettings::try_from(raw).map_err(|e| entry.refuse(e))?;
-    if envelope.terrains.is_empty() {
-        return Err(entry.error("terrains", "`terrains` is empty; name the heightfields to drive on").into());
-    }
-    let mut heightfields = BTreeSet::new();
-    for (k, id) in envelope.terrains.iter().enumerate() {
-        heightfields.extend(builder.family(entry, &format!("terrains.{k}"), id)?);
-    }
+    let heightfields = builder.families(entry, &envelope.terrains)?;
     let rules = Arc::new(json!(settings));
     let of = |id: String| Arc::new(lines(builder, &envelope.id, &rules, id));
     let lines: Vec<Arc<Lines>> = heightfields.into_iter().map(of).collect();
     check_geometry(builder, entry, &lines)?;
     room::check(builder, entry, lines.iter().map(|one| &one.heightfield), |_, terrain| {
-        check_size(terrain, &settings).map_err(|e| Lack::new("length_m", format!("cannot {e}")))
+        check_size(terrain, &settings).map_err(|e| Lack::new(e.key(), format!("cannot {e}")))
     })?;
     for one in &lines {
         let words = format!("{}@{}", envelope.id, one.word);

@@ -1,10 +1,11 @@
 //! Missions along the trail of a terrain.
 
 use super::{MISSIONS, STAGE};
-use crate::builder::{BuildError, Builder};
+use crate::builder::{BuildError, Builder, Heightfield};
 use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
 use crate::jobs::terrain;
 use crate::operations::drawn::{Drawn, Lines};
+use crate::operations::room::{self, Lack};
 use crate::revision::Room;
 use crate::runner::graph::Node;
 use crate::study::Entry;
@@ -15,7 +16,6 @@ use sastrugi_schemas::{Kind, ParameterError, counted};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use serde_json::{Value, json};
-use std::collections::BTreeSet;
 use std::sync::Arc;
 
 /// Assumed length of a trail before it is known, m.
@@ -70,27 +70,8 @@ pub fn add(
     }
     entry.check_keys::<MissionsItem>(params, &schema_of::<TrailParameters>())?;
     let parameters: TrailParameters = read_parameters(params).map_err(|e: ParameterError| entry.refuse(e))?;
-    if envelope.terrains.is_empty() {
-        return Err(entry.error("terrains", "`terrains` is empty; name the terrains whose trails to follow").into());
-    }
-    let mut ids = BTreeSet::new();
-    for (k, id) in envelope.terrains.iter().enumerate() {
-        let key = format!("terrains.{k}");
-        for one in builder.family(entry, &key, id)? {
-            let made = builder.heightfields.get(&one).filter(|field| field.item.stage == terrain::STAGE);
-            let count = made.map_or(0, |field| trails(&field.parameters));
-            if count == 0 {
-                return Err(entry
-                    .error(&key, format!("\"{one}\" has no trail; name a terrain of kind `compose` with a trail"))
-                    .into());
-            }
-            if number(&parameters.trail).is_none_or(|number| number > count) {
-                let (trail, has) = (&parameters.trail, counted(count, "trail"));
-                return Err(entry.error("trail", format!("`trail` is \"{trail}\", but \"{one}\" has {has}")).into());
-            }
-            ids.insert(one);
-        }
-    }
+    let ids = builder.families(entry, &envelope.terrains)?;
+    room::check(builder, entry, &ids, |field, _| check_trail(field, &parameters.trail))?;
     let (mut lines, rules) = (Vec::new(), Arc::new(json!(parameters)));
     for heightfield in ids {
         let item = ItemRef::new(STAGE, &format!("{}@{heightfield}", envelope.id));
@@ -111,7 +92,19 @@ pub fn add(
     Ok(())
 }
 
-/// Number of trails that a terrain may have: those that the parameters of its kind name at any depth, since trails of operands are kept.
+/// Checks that a surface has a trail of this name.
+fn check_trail(field: &Heightfield, trail: &str) -> Result<(), Lack> {
+    let count = if field.item.stage == terrain::STAGE { trails(&field.parameters) } else { 0 };
+    if count == 0 {
+        return Err(Lack::new("terrains", "there is no trail; name a terrain of kind `compose` with a trail"));
+    }
+    if number(trail).is_none_or(|number| number > count) {
+        return Err(Lack::new("trail", format!("there is no \"{trail}\", only {}", counted(count, "trail"))));
+    }
+    Ok(())
+}
+
+/// Number of trails that a terrain may have: those that the parameters of its kind name at any depth, since trails of most operands are kept.
 fn trails(parameters: &Value) -> usize {
     match parameters {
         Value::Object(map) => {
@@ -127,7 +120,9 @@ fn trails(parameters: &Value) -> usize {
 fn number(name: &str) -> Option<usize> {
     match name.strip_prefix("trail")? {
         "" => Some(1),
-        rest => rest.strip_prefix('-')?.parse::<usize>().ok().filter(|number| *number > 1),
+        rest => {
+            rest.strip_prefix('-')?.parse::<usize>().ok().filter(|number| *number > 1 && rest == format!("-{number}"))
+        }
     }
 }
 

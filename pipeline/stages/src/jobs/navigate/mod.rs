@@ -118,16 +118,15 @@ fn parameters_of(entry: &Entry<'_>, one: &Expanded) -> Result<TeamParameters, Bu
 
 /// Checks that a terrain has room for the formation of a team in some direction. Without it the team runs all the same, but never in formation.
 fn check_room(team: &TeamParameters, terrain: &Geometry) -> Result<(), Lack> {
-    let [leftmost_m, rightmost_m, depth_m] = team.formation()?.extent_m();
-    let width_m = rightmost_m - leftmost_m;
-    let diagonal_m = |[x_m, y_m]: [f64; 2]| (x_m * x_m + y_m * y_m).sqrt();
-    let terrain_m = diagonal_m(terrain.size());
-    if diagonal_m([width_m, depth_m]) <= terrain_m {
+    let formation_m = team.formation()?.diameter_m();
+    let [width_m, height_m] = terrain.size();
+    let terrain_m = (width_m * width_m + height_m * height_m).sqrt();
+    if formation_m <= terrain_m {
         return Ok(());
     }
     let why = format!(
-        "the formation, {depth_m:.1} m deep and {width_m:.1} m wide, has no room on the terrain, whose diagonal is {terrain_m:.1} m; it will be \
-         compressed everywhere: use a smaller spacing, fewer members or a larger terrain"
+        "two members of the formation are {formation_m:.1} m apart, but the diagonal of the terrain is {terrain_m:.1} m, so it is compressed \
+         everywhere: use a smaller spacing, fewer members or a larger terrain"
     );
     Err(Lack::new("spacing_m", why))
 }
