@@ -645,11 +645,11 @@ fn val_settings_of_point_clouds_are_refused_elsewhere() {
 #[test]
 fn val_a_failed_item_costs_itself_only() {
     let folder = area();
-    write(folder.path(), "study.toml", &small_study().replace("length_m = 5.0", "length_m = 50.0"));
+    write(folder.path(), "study.toml", &small_study().replace("length_m = 5.0", "length_m = 17.6"));
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 3, "{}", call.stderr);
     assert!(
-        call.stderr.contains("missions/short@rough-0001 failed") && call.stderr.contains("50 m"),
+        call.stderr.contains("missions/short@rough-0001 failed") && call.stderr.contains("17.6 m away"),
         "{}",
         call.stderr
     );
@@ -657,7 +657,7 @@ fn val_a_failed_item_costs_itself_only() {
     let manifest: serde_json::Value = serde_json::from_str(&manifest).unwrap();
     let failed = manifest["failed"].as_array().unwrap();
     assert_eq!(failed.len(), 6);
-    assert!(failed.iter().any(|f| f["parameters"]["missions"]["length_m"] == 50.0));
+    assert!(failed.iter().any(|f| f["parameters"]["missions"]["length_m"] == 17.6));
     let verify = sastrugi_in(folder.path(), &["verify", "release", "--quiet"]);
     assert_eq!(verify.code, 0, "{}{}", verify.stdout, verify.stderr);
 }

@@ -295,5 +295,5 @@ timeout_s = 120.0
     write(folder.path(), "study.toml", &wrong);
     let call = sastrugi_in(folder.path(), &["run", "study.toml", "-o", "wrong", "--quiet"]);
     let told: String = call.stderr.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
-    assert!(call.code == 2 && told.contains("`trail` is \"trail-2\", but \"forest\" has 1 trail"), "{told}");
+    assert!(call.code == 2 && told.contains("on \"forest\": there is no \"trail-2\", only 1 trail"), "{told}");
 }

@@ -317,7 +317,12 @@ fn val_traverse_states_why_it_refuses() {
         assert!(code == 65 && said.lines().last().unwrap().contains(words), "{code} {said}");
         assert!(!folder.path().join("drive").exists());
     };
-    refused(&ascii(0.1, |_, _| 0.0), &[], "the terrain is 9.60 x 9.60 m, including a border of 5 m");
+    // Known before the heights are read.
+    let dem = write(folder.path(), "dem.asc", &ascii(0.1, |_, _| 0.0));
+    let (code, said) = drive(folder.path(), &dem, &[]);
+    let said: String = said.split_whitespace().filter(|word| *word != "│").collect::<Vec<_>>().join(" ");
+    assert!(code == 2 && said.contains("the terrain is 9.60 x 9.60 m, including a border of 5 m"), "{code} {said}");
+    assert!(!folder.path().join("drive").exists());
     let steep = "from the edge; every cell is steeper than [roughness] low_max: use a smoother terrain (a texture of smaller `amplitude`), larger cells";
     refused(&ascii(0.1, |row, col| f64::from((row + col) % 2)), &short, steep);
     // Spikes 0.8 m apart, between which no disc of the closing fits.

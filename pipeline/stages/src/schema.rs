@@ -276,7 +276,7 @@ mod tests {
         ("traverse", "id = \"d\"\nmissions = \"m\""),
         ("route", "id = \"r\"\nterrains = [\"t\"]"),
         ("navigate", "id = \"n\"\nroute = \"r\""),
-        ("rover", "id = \"v\"\nterrains = [\"t\"]"),
+        ("rover", "id = \"v\"\nterrains = [\"t\"]\ncentre_m = [50.0, 50.0]"),
         ("roughness", ""),
     ];
 

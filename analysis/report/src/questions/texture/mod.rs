@@ -304,6 +304,10 @@ fn structures(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
 
 /// Profile spectra along both axes, of the two residuals; `None` without that of the texture.
 fn profiles(data: &Data, texture: &TerrainRow, fit: &str) -> Option<Figure> {
+    // A texture with a stated covariance has no residual.
+    if fit.is_empty() {
+        return None;
+    }
     let residual = figures::residual_id(texture);
     let surfaces = [("measured", fit, MEASURED.paint), (SYNTHETIC, residual.as_str(), RESIDUAL.paint)];
     let axes = [("x", "east-west", ""), ("y", "north-south", "5 3")];

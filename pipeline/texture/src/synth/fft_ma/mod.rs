@@ -283,12 +283,16 @@ impl FftMaParameters {
         });
         let cells = aim.map_or(1, Aim::oversampling) as f64 * enough[0] * enough[1];
         if cells > CELLS_MAX as f64 {
-            let message = format!(
-                "is false, for which the range of {} m needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}: use larger cells \
-                 or a shorter range",
-                wanted.range_m()
-            );
-            return Err(ParameterError::new("periodic", message));
+            let (whose, advice) = match aim {
+                // The range of a fit may be the bound of its search.
+                None => (
+                    format!("for which the range of {:.4} m", wanted.range_m()),
+                    "use larger cells, a shorter range or, with a fit, `covariance = \"residual\"`, whose waves end at its window",
+                ),
+                Some(_) => ("which".to_owned(), "use larger cells or a smaller texture"),
+            };
+            let needed = format!("needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}");
+            return Err(ParameterError::new("periodic", format!("is false, {whose} {needed}: {advice}")));
         }
         Ok(enough.map(|n| if self.periodic { n as usize } else { smooth_length(n as usize) }))
     }
