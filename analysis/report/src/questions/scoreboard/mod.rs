@@ -114,7 +114,7 @@ fn targets(curves: &[Curve<'_>]) -> String {
     let each: Vec<String> = curves.iter().map(|one| format!("{} {}", one.0.method, target(one))).collect();
     format!(
         " The methods have different targets ({} at lag 0), because those that repeat a site aim at the covariance of its residual, others at \
-         that of the fit: errors and figures can be compared only where the target is the same.",
+         that of the fit: errors and curves can be compared only where the target is the same.",
         each.join(", ")
     )
 }
@@ -273,7 +273,7 @@ mod tests {
         let apart = said(&[("fft_ma", 0.0, 0.9), ("gaussians", 0.187, 0.5)]);
         assert!(
             apart.contains("gaussians 19 % of the variance. The methods have different targets")
-                && apart.ends_with("errors and figures can be compared only where the target is the same.")
+                && apart.ends_with("errors and curves can be compared only where the target is the same.")
                 && !apart.contains("closest"),
             "{apart}"
         );
