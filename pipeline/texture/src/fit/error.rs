@@ -57,10 +57,12 @@ pub enum FitError {
         cells: usize,
     },
     /// No residual above rounding error.
-    #[error("the DEM is flat or a plane: its residual is below rounding error")]
+    #[error("{}", constant(*.objects))]
     Constant {
         /// A height of the DEM, m.
         height_m: f64,
+        /// Cells taken as objects and left out.
+        objects: usize,
     },
     /// Data is too sparse for the window.
     #[error(
@@ -98,6 +100,15 @@ pub enum FitError {
         /// Bins needed.
         needed: usize,
     },
+}
+
+/// What a DEM without residual is, apart from the cells taken as objects: the rim of a single step is one.
+fn constant(objects: usize) -> String {
+    const FLAT: &str = "the DEM is flat or a plane: its residual is below rounding error";
+    if objects == 0 {
+        return FLAT.to_owned();
+    }
+    format!("apart from {} taken as objects, {FLAT}; find_objects = false keeps them", counted(objects, "cell"))
 }
 
 /// Length rounded to a micrometre, so that 96 cells of 0.1 m are 9.6 m.

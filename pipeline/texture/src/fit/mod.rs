@@ -114,7 +114,7 @@ impl FitOutcome {
 /// let settings: FitSettings = FitParameters { outer_scale_m: 1.0, ..FitParameters::default() }.try_into().unwrap();
 /// let level = Grid::filled(Geometry::square(60, 60, 0.1), 1234.0);
 /// let refused = fit(&level, &settings, &Streams::for_seed(1, "fit")).err().unwrap();
-/// assert_eq!(refused, FitError::Constant { height_m: 1234.0 });
+/// assert_eq!(refused, FitError::Constant { height_m: 1234.0, objects: 0 });
 /// // Six metres are less than three windows of 2.5 m.
 /// let wide: FitSettings = FitParameters { outer_scale_m: 2.5, ..FitParameters::default() }.try_into().unwrap();
 /// assert!(matches!(fit(&level, &wide, &Streams::for_seed(1, "fit")).err(), Some(FitError::OuterScaleTooLarge { .. })));

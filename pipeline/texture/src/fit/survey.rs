@@ -141,7 +141,7 @@ impl Survey {
         let step = if heights.are_profiles() { 1 } else { even_step(geometry.rows, most, max_lag[0]) };
         let reading = Reading { heights, settings, geometry, window, step };
         let (trusted, measured, lowest_m) = reading.trusted()?;
-        let (used, partial, trim) = reading.threshold(&trusted, lowest_m)?;
+        let (used, partial, trim) = reading.threshold(&trusted, measured, lowest_m)?;
         let places = block_places(&geometry, window, heights.are_profiles());
         let mut blocks = vec![Squares::default(); places.len()];
         let (covariance, kept) = reading.pairs(&trusted, &trim, max_lag, |row, residual| {
@@ -300,7 +300,7 @@ impl Reading<'_> {
     }
 
     /// Cells with a residual, how many of them have an incomplete window, and the trimming threshold.
-    fn threshold(&self, trusted: &Bitmap, lowest_m: f64) -> Result<(Bitmap, usize, Trim), FitError> {
+    fn threshold(&self, trusted: &Bitmap, measured: usize, lowest_m: f64) -> Result<(Bitmap, usize, Trim), FitError> {
         let cols = self.geometry.cols;
         let mut used = Bitmap::with_capacity(self.geometry.len());
         let (mut sizes, mut moments) = (Sizes::new(), Moments::default());
@@ -320,7 +320,7 @@ impl Reading<'_> {
         }
         // Rounding errors of the running sums are far below 1e-11 of the heights.
         if windows.largest_m <= 1e-11 * windows.highest_m {
-            return Err(FitError::Constant { height_m: lowest_m });
+            return Err(FitError::Constant { height_m: lowest_m, objects: measured - trusted.count() });
         }
         let trim = Trim::of(&sizes, self.settings);
         let trim = if self.settings.mode() == Mode::Paper { self.paper_trim(trusted, trim, &moments)? } else { trim };

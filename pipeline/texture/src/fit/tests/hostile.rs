@@ -87,6 +87,17 @@ fn val_a_model_that_the_window_almost_removes_is_finite() {
     }
 }
 
+/// A step whose rim is taken as objects is flat on both sides: the refusal names the cells that were left out, and how to keep them.
+#[test]
+fn val_cells_left_out_of_a_flat_surface_are_named() {
+    let step = surface(|c, _, _| f64::from(u8::from(c > 48.0)));
+    let refused = fitted(&step, "exponential", true).err().unwrap();
+    assert!(matches!(refused, FitError::Constant { objects: 1.., .. }), "{refused}");
+    let told = refused.to_string();
+    assert!(told.starts_with("apart from ") && told.ends_with("find_objects = false keeps them"), "{told}");
+    assert!(fitted(&step, "exponential", false).is_ok());
+}
+
 /// Fits each surface with a model, with or without the search for objects: the fit is refused, or its file is read back as it was written.
 fn check_files(cases: Vec<(&'static str, Grid, &str, bool)>) {
     let is_fitted = |(name, dem, model, find_objects): (&str, Grid, &str, bool)| {

@@ -256,7 +256,7 @@ fn val_what_cannot_be_fitted_is_refused() {
     assert!(matches!(refused(&flat(50, 80, 0.0), scale(2.0)), FitError::OuterScaleTooLarge { .. }));
     assert!(matches!(refused(&flat(80, 80, 0.0), scale(0.2)), FitError::OuterScaleTooSmall { .. }));
     assert_eq!(refused(&flat(80, 80, f64::NAN), scale(1.0)), FitError::NoData { cells: 6400 });
-    assert_eq!(refused(&flat(80, 80, 1234.1), scale(1.0)), FitError::Constant { height_m: 1234.1 });
+    assert_eq!(refused(&flat(80, 80, 1234.1), scale(1.0)), FitError::Constant { height_m: 1234.1, objects: 0 });
     let mut white = flat(100, 100, 0.0);
     let mut s = Streams::for_seed(1, "fit-test").stream("white");
     white.values.iter_mut().for_each(|z| *z = s.normal());
