@@ -126,16 +126,15 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
     let searches = expanded.iter().map(|one| parameters_of(entry, &envelope, one)).collect::<Result<Vec<_>, _>>()?;
     let terrains = builder.families(entry, &envelope.terrains)?;
-    for search in &searches {
-        let has_room = |field: &Heightfield, terrain: &Geometry| check_room(field, terrain, search, vehicle.as_ref());
-        room::check(builder, entry, &terrains, has_room)?;
-    }
     let cost_raster = envelope.cost_raster.as_deref().map(|id| builder.surface(entry, "cost_raster", id));
     let cost_raster = cost_raster.transpose()?.map(Raster::from);
     let obstacles = mask::add_obstacles(builder, entry, &envelope)?;
     let mut family = Vec::new();
-    for (one, (parameters, pairs)) in expanded.into_iter().zip(searches) {
+    for (one, search) in expanded.into_iter().zip(searches) {
         builder.claim(entry, STAGE, &one.id)?;
+        let has_room = |field: &Heightfield, terrain: &Geometry| check_room(field, terrain, &search, vehicle.as_ref());
+        room::check(builder, entry, &terrains, has_room)?;
+        let (parameters, pairs) = search;
         let search = RouteSearch {
             id: one.id.clone(),
             variant: one.sweep,

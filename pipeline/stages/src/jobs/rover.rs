@@ -218,11 +218,9 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
     let expanded = entry.expand(&envelope.id, None, &envelope.sweep, &params)?;
     let trials = expanded.iter().map(prepared).collect::<Result<Vec<_>, _>>()?;
     let terrains = builder.families(entry, &envelope.terrains)?;
-    for (_, parameters) in &trials {
-        room::check(builder, entry, &terrains, rovers::room_for(parameters))?;
-    }
     for (one, (navigator, parameters)) in expanded.into_iter().zip(trials) {
         builder.claim(entry, STAGE, &one.id)?;
+        room::check(builder, entry, &terrains, rovers::room_for(&parameters))?;
         rover_designs::add(builder, entry, &envelope, &one, &terrains)?;
         let (id, variant, head) = (one.id, one.sweep, builder.study.head.clone());
         let trial = Arc::new(Trial { id, variant, navigator, parameters, sample_m, record, head });

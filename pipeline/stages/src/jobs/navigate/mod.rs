@@ -95,12 +95,10 @@ fn add_table(builder: &mut Builder<'_>, entry: &Entry<'_>) -> Result<(), BuildEr
         return Err(unknown_id(entry, "route", &envelope.route, builder.routes.keys()).into());
     };
     one_search(entry, &routes)?;
-    for team in &teams {
-        let terrains = routes.iter().map(|one| &one.terrain);
-        room::doubt(builder, entry, terrains, |_, terrain| check_room(team, terrain));
-    }
     for (one, parameters) in expanded.into_iter().zip(teams) {
         builder.claim(entry, STAGE, &one.id)?;
+        let terrains = routes.iter().map(|one| &one.terrain);
+        room::doubt(builder, entry, terrains, |_, terrain| check_room(&parameters, terrain));
         let lead =
             Arc::new(Lead { id: one.id, variant: one.sweep, parameters, count, head: builder.study.head.clone() });
         routes.iter().try_for_each(|routes| add_one(builder, &envelope, &lead, routes))?;
