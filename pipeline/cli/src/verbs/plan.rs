@@ -112,13 +112,13 @@ fn reasons(items: &[&Stale]) -> String {
     told.join(", ")
 }
 
-/// What a plan compares the study with: the results of a release, or of another work area, if there are any.
+/// The work area that a plan compares the study with, if it has results.
 fn compared_with(is_first: bool, place: &Place) -> String {
-    let Place { output, work } = place;
-    if is_first {
-        return format!("no results in {} yet: all items are new", shown(&work_area(output, work.as_deref())));
+    let work = work_area(&place.output, place.work.as_deref());
+    match is_first {
+        true => format!("no results in {} yet: all items are new", shown(&work)),
+        false => format!("compared with the results in {}", shown(&work)),
     }
-    format!("compared with {}", shown(work.as_ref().unwrap_or(output)))
 }
 
 /// A path; a bare name does not look like a folder.
@@ -169,31 +169,19 @@ mod tests {
         Place { output: PathBuf::from(output), work: work.map(PathBuf::from) }
     }
 
-    /// A bare name looks like a folder; with a work area of its own that is what the study is compared with.
+    /// The work area is named, whether it has results or not; a bare name looks like a folder.
     #[test]
     fn val_a_plan_names_what_it_compares_with() {
         for (output, work, expected) in [
-            ("release", None, "./release"),
-            ("./release", None, "./release"),
-            ("out/snow", None, "out/snow"),
-            ("/data/snow", None, "/data/snow"),
-            ("s3://bucket/snow", None, "s3://bucket/snow"),
-            ("release", Some("scratch"), "./scratch"),
-        ] {
-            assert_eq!(compared_with(false, &place(output, work)), format!("compared with {expected}"));
-        }
-    }
-
-    /// Before the first run there is nothing to compare with.
-    #[test]
-    fn val_a_first_plan_says_that_all_is_new() {
-        for (output, work, expected) in [
             ("release", None, "./release.work"),
+            ("./release", None, "./release.work"),
             ("out/snow", None, "out/snow.work"),
+            ("/data/snow", None, "/data/snow.work"),
             ("release", Some("scratch"), "./scratch"),
         ] {
-            let told = format!("no results in {expected} yet: all items are new");
-            assert_eq!(compared_with(true, &place(output, work)), told);
+            let place = place(output, work);
+            assert_eq!(compared_with(false, &place), format!("compared with the results in {expected}"));
+            assert_eq!(compared_with(true, &place), format!("no results in {expected} yet: all items are new"));
         }
     }
 
