@@ -152,7 +152,7 @@ pub const EXAMPLES: [(&str, &str); 153] = [
     ("record", "1"),
     ("rover: rovers", "5"),
     ("rover: parameters", r#"["turn_deg", "step_m"]"#),
-    ("sensor", r#""schoppers_like""#),
+    ("sensor", r#""rectangles""#),
     ("traverse", r#""husky""#),
     ("margin", "5.0"),
     ("family", r#""roughness""#),

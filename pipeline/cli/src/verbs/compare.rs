@@ -87,7 +87,7 @@ fn text_of_releases(comparison: &releases::Comparison) -> String {
 fn text_of_files(files: &Files) -> String {
     let mut text = format!("files: {} identical\n", files.equal);
     let kinds = [
-        ("with the same content but other compression", &files.packaging),
+        ("with the same content, packaged differently", &files.packaging),
         ("different", &files.different),
         ("only in A", &files.only_a),
         ("only in B", &files.only_b),
@@ -166,8 +166,8 @@ fn text_of_copies(blocks: &BlockEvidence) -> String {
     };
     let copies = &blocks.copies;
     format!(
-        "verbatim copies of {COPY_SIDE} x {COPY_SIDE} cells: in the texture from the site {}, from elsewhere in itself {}; in one half of the \
-         site from the other {}",
+        "verbatim copies of {COPY_SIDE} x {COPY_SIDE} cells: from the site into the texture {}, within the texture {}, from one half of the \
+         site into the other {}",
         found(&copies.of_site),
         found(&copies.of_itself),
         found(&copies.between_halves)

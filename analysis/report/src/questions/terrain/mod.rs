@@ -160,9 +160,9 @@ fn introduction(groups: &[Group<TerrainRow>]) -> String {
     let border = borders(&groups.iter().flat_map(|g| &g.rows).copied().collect::<Vec<_>>());
     format!(
         "The release has {} in {}: {}{more}. The roughness class of a cell follows from its largest gradient to its eight neighbours; \
-         shares leave out {border} and are computed before the class map is closed. Reliefs are lit from the north-west; their colours \
-         end at the 1st and 99th percentile of the heights, or at the lowest and highest height where these lie far beyond; below level \
-         ground with a few cells that stand on it, they begin lower, so that the ground is not the darkest.",
+         shares leave out {border} and are computed before the class map is closed. Reliefs are lit from the north-west. Their colours \
+         end at the 1st and 99th percentile of the heights, or at the lowest and highest height where these lie far beyond. On level \
+         ground with a few cells that rise above it, the colours begin below the ground, so that it is not the darkest.",
         set::counted(n, "terrain"),
         set::counted(groups.len(), "group"),
         names.join(", ")
