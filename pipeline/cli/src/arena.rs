@@ -1,8 +1,8 @@
 //! One arena of the C library for all threads, where memory is limited.
 //!
-//! glibc gives each thread an arena, which keeps what the thread has freed for its next allocation, in pieces of up to 32 MiB. Threads that compute items
-//! one after the other therefore hold more than the items that are being computed, which is what `--memory` limits. The number of arenas is read from
-//! the environment when a program starts.
+//! glibc gives each thread an arena, which keeps what the thread has freed for its next allocation, in pieces of up to 32 MiB. Threads that compute one
+//! item after another therefore hold more memory than the items in progress need, and only the latter is what `--memory` counts. The number of arenas
+//! is read from the environment when a program starts.
 
 use std::env;
 use std::ffi::OsStr;

@@ -1,8 +1,8 @@
 //! The footer and the page headers of a Parquet file: structures of the Thrift compact protocol, checked before the crate `parquet` reads them.
 //!
-//! The crate skips fields that it does not know by taking a step for each claimed element, also of lists of booleans, whose elements take no
-//! bytes there, and it reads known fields whatever type they have. So a few damaged bytes can hold it up for hours. A structure that passes
-//! this check has known fields of the right types alone: nothing is skipped but values that are there. One pass over the bytes of each.
+//! The crate skips unknown fields element by element, as many as are claimed; elements of lists of booleans take no bytes there. It also reads known
+//! fields of any type. A few damaged bytes can therefore hold it up for hours. A structure that passes this check has only known fields of the
+//! right types, so that only values that are there are skipped. Cost: one pass over the bytes of each structure.
 
 use bytes::Bytes;
 use parquet::errors::Result as ParquetResult;

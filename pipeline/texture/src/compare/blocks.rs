@@ -18,7 +18,7 @@
 //! splits say little about it, so the error rate is then approximate, and for ground beyond the site it holds only as far as the halves are
 //! typical: compare the distance with `site` of the quantity, and judge another part of the site in the texture's place.
 //!
-//! Intervals, bounds and answers are those of the room ([`super`]). `cannot tell` comes from few blocks, a site whose parts differ as much as the
+//! Intervals, bounds and answers are those of all comparisons ([`super`]). `cannot tell` comes from few blocks, a site whose parts differ as much as the
 //! texture does, or a bound that is narrower than its blocks can resolve.
 //!
 //! # Cost

@@ -12,7 +12,7 @@
 //! direction.
 //!
 //! s and u are the cost of the best form relative to an exponential ([`relative_cost`]). Of several forms it is not known before the fit which
-//! one is best. The costliest, `anisotropic:matern`, was it in five of ten fits of `auto` to three DEMs, so s and u are the mean of the
+//! one is best. The costliest, `anisotropic:matern`, was the best in five of ten fits of `auto` to three DEMs, so s and u are the mean of the
 //! costliest and of the average form.
 //!
 //! The constants were calibrated on surfaces of 90 000 to 1.4 million cells, windows of 20 to 120 cells, complete and with 44 % of holes, on

@@ -24,8 +24,8 @@
 //! * Ashikhmin 2001, Synthesizing natural textures, I3D, 217, doi:10.1145/364338.364405: places that continue a neighbour.
 //!
 //! Departures: details instead of heights; grids instead of a random path, so that cells of one pass may be computed on any number of threads;
-//! places at random are compared instead of all, by transforms, for each cell; the single best of them is taken, where Gravey and Mariethoz draw
-//! one of the k best.
+//! for each cell, random places are compared instead of all places by transforms; the single best of them is taken, where Gravey and Mariethoz
+//! draw one of the k best.
 //!
 //! # Limits
 //! * Features wider than a few spacings are not seen as a whole. [`super::quilting`] keeps them up to the width of a patch.
@@ -42,7 +42,7 @@
 //!
 //! # Cost
 //! For each cell of the texture `neighbours` places that continue a neighbour, and with the default `scan` at most 55 at random (23 for first cells
-//! 8 apart), each compared at `neighbours` cells: places at random are not in the processor's cache, so 1024 x 1024 cells from as large a site
+//! 8 apart), each compared at `neighbours` cells: random places are not in the processor's cache, so 1024 x 1024 cells from as large a site
 //! take 20 to 40 s (estimated from a sixteenth of them). Memory: 20 bytes per cell of the site, 48 per cell of the texture (14, and up to 32 for the
 //! offsets at which the widest grid seeks its neighbours).
 

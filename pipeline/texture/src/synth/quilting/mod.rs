@@ -35,7 +35,7 @@
 //! # Source
 //! Efros and Freeman 2001, Image quilting for texture synthesis and transfer, SIGGRAPH, 341-346, doi:10.1145/383259.383296, section 2.
 //! Departures: a choice among all places by transforms (Kwatra et al. 2003, Graphcut textures, section 3.3, doi:10.1145/882262.882264), in parts of
-//! large sites; differences relative to the squares; a cost of use (as in Kaspar et al. 2015, Self tuning texture optimization, Computer Graphics
+//! large sites; differences relative to the squares; a cost of reuse (as in Kaspar et al. 2015, Self tuning texture optimization, Computer Graphics
 //! Forum 34, 349, doi:10.1111/cgf.12565); masks; the blend; cuts on four sides, hence tori. Patches keep their orientation and height:
 //! anisotropy and skewness stay.
 //!

@@ -23,7 +23,7 @@
 //! then compared exactly, at every cell of their blocks.
 //!
 //! Blocks cannot be wider than a third of the overlap, nor so wide that the exact comparison outweighs the transforms. Where they leave too
-//! many, each patch is sought in a part of the site only, the surroundings of a place at random. For patches of 18 cells on a site of 1024 x 1024
+//! many, each patch is sought in a part of the site only, the surroundings of a random place. For patches of 18 cells on a site of 1024 x 1024
 //! the least root mean square difference in such a part, 101 x 101 cells, is 1.15 (exponential covariance) to 1.26 times (Gaussian) that in all of the site
 //! (simulated), as much as a tolerance of 0.15 to 0.26 would give.
 
