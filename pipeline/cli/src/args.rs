@@ -496,7 +496,7 @@ pub struct Fit {
     /// Window of the moving average that separates background from residual, m (2).
     #[arg(long, value_name = "M", allow_negative_numbers = true)]
     pub outer_scale: Option<f64>,
-    /// `corrected` for the effects of detrending and trimming, or as published in the `paper` (`corrected`).
+    /// `corrected` for detrending and trimming (default), or `paper`: the published procedure.
     #[arg(long, value_name = "corrected|paper")]
     pub mode: Option<String>,
     /// Share of residuals to trim, both tails together (0.05).
@@ -609,7 +609,7 @@ pub struct ExemplarMasks {
     /// With `--exemplar`: the `--mask` files of the fit, all of them and in the same order.
     #[arg(long, value_name = "FILE", requires = "exemplar")]
     pub mask: Vec<PathBuf>,
-    /// With `--exemplar`: the `--exclude` files of the fit, likewise.
+    /// With `--exemplar`: the `--exclude` files of the fit, all of them and in the same order.
     #[arg(long, value_name = "FILE", requires = "exemplar")]
     pub exclude: Vec<PathBuf>,
 }
@@ -1035,7 +1035,7 @@ pub struct Compare {
     /// Part of A, x0,y0,x1,y1 in its own coordinates.
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
     pub window_a: Option<String>,
-    /// Part of B, likewise.
+    /// Part of B, x0,y0,x1,y1 in its own coordinates.
     #[arg(long, value_name = "X0,Y0,X1,Y1", allow_hyphen_values = true)]
     pub window_b: Option<String>,
     /// Cell size for files that state none, m: one number, or east-west,north-south.
