@@ -40,6 +40,7 @@
 //! anisotropy and skewness stay.
 //!
 //! # Limits
+//! * Patches have one size, and are laid once: no passes from wide to narrow patches, as in the texture transfer of the source (section 3).
 //! * Features wider than a patch are lost; a single striking feature (a boulder, a rut) comes back as often as its patch is chosen.
 //! * On a site that is not stationary (half gullies, half plain) gullies start and end at cuts: cut the site to one kind of ground.
 //! * A texture of few patches is a small sample: with 36 of them the standard deviation spreads by 4 to 6 % between textures, and the flatness of
