@@ -61,8 +61,9 @@ def roughness(
     dem: Any,
     *,
     cell: float | Sequence[float] | None = None,
-    vehicle: str | None = None,
+    vehicle: str | os.PathLike[str] | None = None,
     band: Sequence[float] | None = None,
+    allow_coarse: bool = False,
     **settings: Any,
 ) -> dict[str, Any]:
     """Measures a surface, as `sastrugi roughness --json` prints it: heights, slopes, classes, areal parameters, spectra.
@@ -70,6 +71,7 @@ def roughness(
     dem: a file, a Heightfield, or an array with `cell`.
     vehicle: name of a vehicle, "wb=WHEELBASE,r=TYRE_RADIUS" in m, or a vehicle file: adds the key `ride`, roughness in its band.
     band: shortest and longest wavelength, m; instead of a vehicle.
+    allow_coarse: accept cells larger than half the shortest wavelength.
     settings: those of `[roughness]` in a study: low_max, semi_max, border_m, band_window_m.
 
     A value that does not exist is None. Notes on how a file was read are issued as warnings.
@@ -80,7 +82,9 @@ def roughness(
     True
     """
     limits = numbers("band", band, 2)
-    described: dict[str, Any] = json.loads(_native.roughness(heights_of(dem, cell), to_json(settings), vehicle, limits))
+    name = None if vehicle is None else os.fspath(vehicle)
+    found = _native.roughness(heights_of(dem, cell), to_json(settings), name, limits, allow_coarse)
+    described: dict[str, Any] = json.loads(found)
     return described
 
 

@@ -8,10 +8,12 @@ use sastrugi_stages::Error;
 import_exception!(sastrugi._errors, SastrugiError);
 
 /// Options in the sentences of the program, and the arguments that take their place here.
-const ARGUMENTS: [(&str, &str); 9] = [
+const ARGUMENTS: [(&str, &str); 11] = [
     ("use --replace to", "use `replace=True` to"),
     ("with --statistics", "with `statistics=True`"),
     ("with --exemplar", "as `exemplar`"),
+    ("with `--allow-coarse`", "with `allow_coarse=True`"),
+    ("`--rate ", "`rate_hz "),
     ("with --work", "as `work`"),
     ("another --work", "another `work`"),
     ("with `-o DIR`", "as `output`"),

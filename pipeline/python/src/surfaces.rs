@@ -148,6 +148,7 @@ pub fn roughness(
     parameters: &str,
     vehicle: Option<String>,
     band: Option<[f64; 2]>,
+    allow_coarse: bool,
 ) -> PyResult<String> {
     let (heights, parameters) = (raster(heights)?, value(parameters)?);
     let band = band.map(|[min, max]| format!("{min}:{max}"));
@@ -161,7 +162,7 @@ pub fn roughness(
         let ride = bumps.map(|bumps| RideRequest {
             bumps,
             detrender: Detrender::Band,
-            allow_coarse: false,
+            allow_coarse,
             map: None,
             predicted: None,
         });

@@ -65,6 +65,7 @@ def test_wrong_values_are_named():
         (lambda: Fit({"model": 3, "parameters": {}}), "not a fit: `model` must be text in quotes, got 3"),
         (lambda: snow().texture(4.0, "fine"), "`cell_m` must be a number, or two numbers: east-west and north-south, m"),
         (lambda: sastrugi.analyze(["a.mcap"], rate_hz="fast"), '`rate_hz` must be a number, got "fast"'),
+        (lambda: sastrugi.analyze(["a.mcap"], rate_hz=5000), "`rate_hz 5000`: must be between 1 and 1000 Hz"),
         (lambda: sastrugi.analyze(["a.mcap"], differentiator="best"), "`differentiator` has the unknown value `best`; known: "),
         (lambda: sastrugi.roughness(snow().texture(4.0, 0.1), band=(5.0, 1.0)), "`band 5:1`: "),
     ]:

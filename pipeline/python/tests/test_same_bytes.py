@@ -109,6 +109,22 @@ def test_roughness_and_coregistration(sastrugi_program, tmp_path):
     assert (tmp_path / "module.tif").read_bytes() == (tmp_path / "program.tif").read_bytes()
 
 
+def test_roughness_that_a_vehicle_feels(sastrugi_program, tmp_path):
+    """A vehicle by its name, its file and its lengths; and cells that are too large for a band, unless they are accepted."""
+    rough = sastrugi.terrain("multifractal", seed=7, size_px=[200, 160])
+    rough.save(tmp_path / "rough.tif")
+    (tmp_path / "mine.toml").write_text('base = "husky_a200"\n')
+    for vehicle in ["husky_a200", tmp_path / "mine.toml", "wb=0.5,r=0.2"]:
+        described = json.loads(sastrugi_program("roughness", "rough.tif", "--vehicle", vehicle, "--json"))
+        assert described["ride"]["rms_m"] > 0.0
+        assert sastrugi.roughness(tmp_path / "rough.tif", vehicle=vehicle) == described
+    with pytest.raises(sastrugi.SastrugiError, match=r"\(override with `allow_coarse=True`\)$") as refused:
+        sastrugi.roughness(rough, band=(0.06, 1.0))
+    assert refused.value.code == 65
+    described = json.loads(sastrugi_program("roughness", "rough.tif", "--band", "0.06:1", "--allow-coarse", "--json"))
+    assert sastrugi.roughness(tmp_path / "rough.tif", band=(0.06, 1.0), allow_coarse=True) == described
+
+
 def test_studies(study, release, sastrugi_program, tmp_path):
     sastrugi_program("run", study, "-o", "program", "--quiet")
     assert sums(release.path) == sums(tmp_path / "program")
