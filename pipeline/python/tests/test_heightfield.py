@@ -46,10 +46,20 @@ def test_copies_and_pickles(tmp_path):
 
 
 def test_arrays_of_any_layout(tmp_path):
-    """Transposed, sliced and integer arrays are taken by their elements."""
-    values = np.arange(12).reshape(3, 4)
-    for name, array in {"turned": values.T, "thinned": values[:, ::2], "fortran": np.asfortranarray(values)}.items():
-        Heightfield(array, cell=1.0).save(tmp_path / f"{name}.npy")
+    """Transposed, sliced, flipped and integer arrays are taken by their elements."""
+    values = np.arange(12.0).reshape(3, 4)
+    layouts = {
+        "turned": values.T,
+        "thinned": values[:, ::2],
+        "fortran": np.asfortranarray(values),
+        "flipped": values[::-1],
+        "mirrored": values[:, ::-1],
+    }
+    for name, array in {**layouts, "integers": values.astype(int)}.items():
+        dem = Heightfield(array, cell=1.0)
+        # Nothing lays these out anew before they are read.
+        assert (dem.values is array) == (name in layouts), name
+        dem.save(tmp_path / f"{name}.npy")
         assert np.array_equal(np.load(tmp_path / f"{name}.npy"), array), name
 
 
