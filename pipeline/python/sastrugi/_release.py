@@ -18,7 +18,7 @@ from . import _native
 from ._errors import SastrugiError
 from ._heightfield import Heightfield
 from ._kept import Kept
-from ._values import INPUT, USAGE, counted, number, pair
+from ._values import INPUT, USAGE, counted, number, optional, pair
 
 MANIFEST = "manifest.json"
 # The last is for missions on terrains in none of the others; their column `split` is null.
@@ -49,6 +49,8 @@ class Table:
         pyarrow.table(table)
         polars.DataFrame(table)
         duckdb.sql("select outcome, count(*) from table group by outcome")
+
+    pandas does not ask for it in its constructor: `table.to_pandas()` is the `DataFrame`.
 
     `table[column]` is a NumPy array: float64 with NaN for null, int64, bool, or objects (text, lists, integers and booleans with nulls). `len(table)` is
     the number of rows; as in pandas, iteration gives the names of the columns, and `in` looks for one.
@@ -91,9 +93,17 @@ class Table:
     def __contains__(self, column: object) -> bool:
         return any(known.name == column for known in self.columns)
 
+    def __array__(self, dtype: npt.DTypeLike | None = None, copy: bool | None = None) -> npt.NDArray[Any]:
+        # Without this method, NumPy and pandas would take the table for a list of the names of its columns.
+        raise TypeError("a table is not one array: use table[column], to_numpy() or to_pandas()")
+
     def to_numpy(self) -> dict[str, npt.NDArray[Any]]:
         """All columns by name."""
         return {name: self[name] for name in self}
+
+    def to_pandas(self) -> Any:
+        """A pandas DataFrame. Needs pandas."""
+        return optional("pandas", "pandas", "to_pandas").DataFrame(self.to_numpy())
 
     def to_rows(self) -> list[dict[str, Any]]:
         """The rows as dicts of Python values, with lists as lists. A float that is null is NaN."""

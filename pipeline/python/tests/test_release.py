@@ -35,6 +35,19 @@ def test_tables_in_other_libraries(release):
     assert duckdb.sql("select count(*), sum(time_s) from missions").fetchall()[0] == (len(missions), pytest.approx(missions["time_s"].sum()))
 
 
+def test_tables_in_pandas(release):
+    """Its constructor would make a frame of the names of the columns; it is told what to call instead."""
+    pandas = pytest.importorskip("pandas")
+    missions = release.table("missions")
+    frame = missions.to_pandas()
+    assert len(frame) == len(missions) and list(frame.columns) == list(missions)
+    assert np.array_equal(frame["time_s"].to_numpy(), missions["time_s"], equal_nan=True)
+    assert frame["outcome"].tolist() == missions["outcome"].tolist()
+    for take in [pandas.DataFrame, np.asarray]:
+        with pytest.raises(TypeError, match=r"a table is not one array: use table\[column\], to_numpy\(\) or to_pandas\(\)"):
+            take(missions)
+
+
 def test_tables_in_numpy(release):
     parquet = pytest.importorskip("pyarrow.parquet")
     mission = release.missions()[1]
