@@ -202,6 +202,9 @@ def fit(
     Notes on how a file was read, such as a cell size that was assumed, are issued as warnings. The file that `save` writes is that of the program
     for the same file and parameters. Ctrl-C returns within two seconds; the fit then ends in the background without effect.
 
+    Raises SastrugiError: 2 for an unknown parameter or one that is out of range, 65 for a file that cannot be read or heights that cannot be
+    fitted, 75 for an array that needs more memory than there is.
+
     >>> site = Fit({"model": "exponential", "parameters": {"sigma_m": 0.05, "range_m": 0.2}}).texture(
     ...     16.0, 0.1, seed=1, phase="gaussian", periodic=False)
     >>> found = fit(site, outer_scale=1.0, model="exponential", bootstrap=0)

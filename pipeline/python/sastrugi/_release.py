@@ -303,6 +303,17 @@ class Release:
     summary: items, computed, failures and notes of the run that wrote it; empty for a release that was opened.
 
     Raises SastrugiError (65) for a folder that is not a release.
+
+    >>> import tempfile
+    >>> from sastrugi import terrain, traverse
+    >>> ground = terrain("multifractal", seed=3, size_px=[320, 300])
+    >>> folder = Path(tempfile.mkdtemp()) / "drive"
+    >>> release = traverse(ground, folder, missions=2, seed=9, rules={"length_m": 5.0, "border_m": 1.5})
+    >>> mission = release.missions()[0]
+    >>> release.height_patch(mission, time=0.0, size=4.0, cell=0.1).shape
+    (40, 40)
+    >>> len(release.samples(mission)) == mission["samples"]
+    True
     """
 
     def __init__(self, path: str | os.PathLike[str], *, summary: dict[str, Any] | None = None) -> None:

@@ -91,6 +91,8 @@ def traverse(
     roughness: keys of `[roughness]`, which decides where missions may start and end.
     parameters: keys of `[[traverse]]`.
 
+    Raises SastrugiError: 2 for an unknown key, 65 for a DEM that cannot be used, 75 for a busy work area.
+
     >>> from sastrugi import terrain
     >>> ground = terrain("multifractal", seed=3, size_px=[320, 300])
     >>> driven = traverse(ground, Path(tempfile.mkdtemp()) / "drive", missions=2, seed=9, rules={"length_m": 5.0, "border_m": 1.5})

@@ -46,6 +46,8 @@ def elaborate(dem: Any, seed: int = 0, **parameters: Any) -> Heightfield:
 
     Notes on how a file was read are issued as warnings.
 
+    Raises SastrugiError: 2 for an unknown parameter or one that is out of range, 65 for a file that cannot be read.
+
     >>> from sastrugi import Fit
     >>> hills = Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(120.0, 2.0, seed=2)
     >>> fine = elaborate(
@@ -75,6 +77,8 @@ def roughness(
     settings: those of `[roughness]` in a study: low_max, semi_max, border_m, band_window_m.
 
     A value that does not exist is None. Notes on how a file was read are issued as warnings.
+
+    Raises SastrugiError: 2 for an unknown setting or vehicle, 65 for a file that cannot be read, or a surface too small or coarse for the band.
 
     >>> rough = terrain("multifractal", seed=7, size_px=[90, 70])
     >>> measured = roughness(rough)
@@ -122,6 +126,8 @@ def coregister(a: Any, b: Any) -> Coregistration:
 
     a, b: files or heightfields, in metres and the same coordinate system. A file in degrees is refused: converted to metres, DEMs lose their place
     to each other, and so have heightfields that were read from such files.
+
+    Raises SastrugiError (65) for DEMs that cannot be read, or that cannot be laid onto each other.
 
     >>> from sastrugi import Fit
     >>> hills = Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(96.0, 1.0, seed=2)

@@ -1,9 +1,10 @@
-"""The same input gives the same bytes through the module and through the program."""
+"""The same input gives the same bytes through the module and through the program, and the same sentence if it is refused."""
 
 import json
+import subprocess
 
 import pytest
-from conftest import DEMS, sums
+from conftest import DEMS, program, sums
 
 import sastrugi
 
@@ -165,3 +166,24 @@ def test_logs(release, sastrugi_program, tmp_path):
     rows = sastrugi.analyze(logs, output=tmp_path / "module.parquet")
     assert rows == [{**one["log"], "notes": one["notes"]} for one in printed]
     assert (tmp_path / "module.parquet").read_bytes() == (tmp_path / "program.parquet").read_bytes()
+
+
+def test_errors(tmp_path, monkeypatch):
+    """The exception has the sentence that the program prints, and its exit code."""
+    monkeypatch.chdir(tmp_path)
+    flat = "ncols 60\nnrows 60\nxllcorner 500000\nyllcorner 4000000\ncellsize 1\n" + ("1 " * 60 + "\n") * 60
+    (tmp_path / "flat.asc").write_text(flat)
+    ends = ["--start", "1,1", "--goal", "2,2"]
+    for arguments, call, code in [
+        (["terrain", "multifractal", "--set", "size_pxx=[90, 70]", "-o", "a.tif"], lambda: sastrugi.terrain("multifractal", size_pxx=[90, 70]), 2),
+        (["fit", "flat.asc", "--outer-scale", "0", "-o", "a.json"], lambda: sastrugi.fit("flat.asc", outer_scale=0.0), 2),
+        (["fit", "none.tif", "--outer-scale", "9", "-o", "a.json"], lambda: sastrugi.fit("none.tif", outer_scale=9), 65),
+        (["fit", "flat.asc", "--outer-scale", "9", "-o", "a.json"], lambda: sastrugi.fit("flat.asc", outer_scale=9), 65),
+        (["navigate", "none.tif", *ends, "-o", "a.geojson"], lambda: sastrugi.navigate("none.tif", (1, 1), (2, 2)), 65),
+        (["traverse", "none.tif", "-o", "a"], lambda: sastrugi.traverse("none.tif", "a"), 65),
+    ]:
+        done = subprocess.run([program(), *arguments], capture_output=True, text=True)
+        with pytest.raises(sastrugi.SastrugiError) as refused:
+            call()
+        assert done.stderr.endswith(f"sastrugi: {refused.value}\n"), arguments
+        assert refused.value.code == done.returncode == code, arguments

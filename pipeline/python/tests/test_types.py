@@ -1,9 +1,10 @@
-"""The stub of the Rust side is true: the same names, and the same parameters."""
+"""The stub of the Rust side is true: the same names, and the same parameters. Docstrings have what the manual promises."""
 
 import ast
 import inspect
 from importlib.resources import files
 
+import sastrugi
 from sastrugi import _native
 
 STUB = ast.parse(files("sastrugi").joinpath("_native.pyi").read_text(encoding="utf-8"))
@@ -37,6 +38,17 @@ def test_parameters():
                 member = getattr(members, method.name)
                 if not method.decorator_list:
                     assert parameters(method) == list(inspect.signature(member).parameters), f"{node.name}.{method.name}"
+
+
+def test_docstrings():
+    """Every function has an example, which doctest runs, and says what it raises; checkers are told that there are types."""
+    functions = [name for name in sastrugi.__all__ if inspect.isfunction(getattr(sastrugi, name))]
+    assert {"analyze", "fit", "run", "terrain", "traverse"} < set(functions)
+    for name in functions:
+        stated = getattr(sastrugi, name).__doc__
+        assert "    >>> " in stated and "    Raises SastrugiError" in stated, name
+    assert ">>> " in sastrugi.Fit.__doc__ and ">>> " in sastrugi.Release.__doc__
+    assert files("sastrugi").joinpath("py.typed").is_file()
 
 
 def test_syntax():
