@@ -143,6 +143,45 @@ fn val_an_interrupted_upload_is_no_release() {
     succeeds(&server.call(path, &["verify", "s3://terrains/a/small", "--quiet"]));
 }
 
+/// A terrain above 16 MiB, which is uploaded in parts.
+const LARGE: &str = r#"
+[study]
+name = "large"
+seed = 7
+date = "2026-01-01"
+
+[[terrain]]
+id = "wide"
+kind = "weierstrass_mandelbrot"
+size_px = [4000, 4000]
+"#;
+
+/// Files that are uploaded in parts arrive whole, in a release and in a cache, also if a killed upload left the release without its manifest.
+#[test]
+#[ignore = "slow: needs an S3 server"]
+fn val_large_files_are_uploaded_in_parts() {
+    let Some(server) = Server::start() else { return };
+    let folder = area();
+    let path = folder.path();
+    let whole = run_study(path, LARGE, &[]);
+    let run = |work: &str| {
+        let cache = ["--cache", "s3://terrains/cache", "--work", work, "--json", "--quiet"];
+        let call = server.call(path, &[&["run", "study.toml", "-o", "s3://terrains/large"][..], &cache].concat());
+        succeeds(&call);
+        serde_json::from_str::<serde_json::Value>(&call.stdout).unwrap()
+    };
+    run("first.work");
+    let is_large = |name: &String| fs::metadata(server.object("large").join(name)).unwrap().len() > 16 << 20;
+    let large = whole.keys().find(|name| is_large(name)).unwrap();
+    assert_eq!(differing(&whole, &sums(&server.object("large"))), [""; 0]);
+    succeeds(&server.call(path, &["verify", "s3://terrains/large", "--quiet"]));
+    fs::remove_file(server.object("large/manifest.json")).unwrap();
+    fs::remove_file(server.object("large").join(large)).unwrap();
+    let again = run("second.work");
+    assert_eq!((again["computed"].as_u64(), &again["cache"]["damaged"]), (Some(0), &serde_json::json!([])), "{again}");
+    succeeds(&server.call(path, &["verify", "s3://terrains/large", "--quiet"]));
+}
+
 /// Two runs share a cache in a bucket; a bucket that does not exist is a failure (1), and a server that has gone is worth a retry (75).
 #[test]
 #[ignore = "slow: needs an S3 server"]

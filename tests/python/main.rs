@@ -11,6 +11,7 @@ use std::ffi::OsString;
 use std::fs;
 use std::path::{Path, PathBuf};
 use std::process::Command;
+use std::time::Instant;
 
 fn python() -> Option<PathBuf> {
     sastrugi_tests::python("python", "./test")
@@ -208,8 +209,17 @@ fn val_the_wheel_runs_in_an_empty_environment() {
         command.env("PYTHONDONTWRITEBYTECODE", "1");
         command
     };
+    // Runs a command that must succeed, and prints its time and what it says.
+    let shown = |what: &str, command: &mut Command| {
+        let start = Instant::now();
+        let call = called(command);
+        check(&call);
+        println!("{what}, {:.0} s: {}", start.elapsed().as_secs_f64(), call.stdout.trim().replace('\n', "; "));
+        call
+    };
     let mut pytest = inside(&["-m", "pytest", "-q", "-p", "no:cacheprovider"]);
-    check(&called(pytest.arg(sources().join("tests"))));
+    let call = shown("tests", pytest.arg(sources().join("tests")));
+    assert!(call.stdout.contains(" passed") && !call.stdout.contains("skipped"), "{}", call.stdout);
     let mut run = inside(&[]);
-    check(&called(run.arg(root().join("tests/python/run_notebooks.py")).args(notebooks())));
+    shown("notebooks", run.arg(root().join("tests/python/run_notebooks.py")).args(notebooks()));
 }
