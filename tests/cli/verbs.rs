@@ -64,6 +64,9 @@ fn val_kinds_and_schemas_are_complete() {
     for word in ["complete -F", "photoclinometry", "--outer-scale", "--set-missions"] {
         assert!(completions.contains(word), "{word} is not completed");
     }
+    let notices = std::fs::read_to_string(sastrugi_fixtures::workspace_root().join("THIRD-PARTY.md")).unwrap();
+    assert_eq!(ok(folder.path(), &["licences"]).trim_end(), notices.trim_end());
+    assert_eq!(ok_json(folder.path(), &["licences"])["notices"], notices);
 }
 
 /// A verb with `--seed` gives the bytes of a study's item with that explicit seed.

@@ -244,6 +244,9 @@ pub enum Verb {
         after_help = "Example:\n  sastrugi completions bash > ~/.local/share/bash-completion/completions/sastrugi"
     )]
     Completions(Completions),
+    /// Print the licence of the program and those of everything that it contains.
+    #[command(after_help = "Example:\n  sastrugi licences | less")]
+    Licences,
     /// Serve worlds and releases over HTTP: patches of terrain anywhere at any resolution, map tiles, and a map page.
     #[command(
         after_help = "A WORLD.toml has the format of a `terrain` specification, kind planetary or elaborate. A\n\

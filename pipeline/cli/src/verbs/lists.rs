@@ -1,4 +1,4 @@
-//! Verbs that list kinds, schemas and completions.
+//! Verbs that list kinds, schemas, completions and licences.
 
 use crate::Verdict;
 use crate::args::{Arguments, Common, Completions, Kinds, Schema};
@@ -182,5 +182,14 @@ pub fn completions(args: &Completions, common: &Common) -> Verdict {
     clap_complete::generate(args.shell, &mut Arguments::command(), "sastrugi", &mut script);
     let script = String::from_utf8(script).map_err(Failure::failed)?;
     print(common.json, &json!({ "shell": args.shell.to_string(), "script": script }), &script)?;
+    Ok(Code::Done)
+}
+
+/// The licence of the program, and those of the linked crates and of the packages in the server's page: they go with every copy.
+const THIRD_PARTY: &str = include_str!("../../../../THIRD-PARTY.md");
+
+/// `licences`.
+pub fn licences(common: &Common) -> Verdict {
+    print(common.json, &json!({ "licence": env!("CARGO_PKG_LICENSE"), "notices": THIRD_PARTY }), THIRD_PARTY)?;
     Ok(Code::Done)
 }

@@ -64,6 +64,7 @@ pub fn dispatch(arguments: &Arguments) -> Verdict {
         Verb::Schema(args) => lists::schema(args, common),
         Verb::Serve(args) => serve::serve(args, common),
         Verb::Completions(args) => lists::completions(args, &arguments.common),
+        Verb::Licences => lists::licences(&arguments.common),
     }
 }
 
