@@ -198,7 +198,8 @@ window = [-84.40, 36.46, -84.20, 36.66]
 [[fit]]
 id = "fit"
 dem = "site"
-outer_scale_m = 4000.0
+outer_scale_m = 1000.0
+bootstrap = 39
 
 [[fit]]
 id = "naive"
