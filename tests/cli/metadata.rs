@@ -116,8 +116,8 @@ fn val_the_crate_tells_what_was_given_from_what_was_made() {
     let folder = area();
     write(folder.path(), "plot.geojson", PLOT);
     let masked = study("creators = [\"J. Doe\", \"J- Doe\"]\n", "").replacen(
-        "outer_scale_m = 4000.0\n",
-        "outer_scale_m = 4000.0\nmask = \"plot.geojson\"\n",
+        "bootstrap = 39\n",
+        "bootstrap = 39\nmask = \"plot.geojson\"\n",
         1,
     );
     write(folder.path(), "study.toml", &masked);

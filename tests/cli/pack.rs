@@ -10,7 +10,8 @@ use std::time::{Duration, SystemTime};
 
 /// A sealed release of a few terrains, driven on one of them.
 fn release(folder: &Path) {
-    let study = small_study().replace("[[fit]]\nid = \"fit\"\ndem = \"site\"\nouter_scale_m = 4000.0\n", "");
+    let study =
+        small_study().replace("[[fit]]\nid = \"fit\"\ndem = \"site\"\nouter_scale_m = 1000.0\nbootstrap = 39\n", "");
     write(folder, "study.toml", &study);
     let call = sastrugi_in(folder, &["run", "study.toml", "-o", "release", "--quiet"]);
     assert_eq!(call.code, 0, "{}", call.stderr);
