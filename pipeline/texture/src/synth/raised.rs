@@ -21,11 +21,16 @@
 //! | 1 | 0.908 | 0.990 | 0.176 | 0.021 | 0.070 | 0.000 |
 //! | 3 | 0.934 | 0.983 | 0.128 | 0.034 | 0.082 | 0.001 |
 //!
+//! Textures made of copied cells wander: of long waves they have more than their site, up to 3 times the power at D = 0.7 and 20 times at 0.9 (`exemplar`;
+//! `quilting` 5 times at 0.9). Amplified, this would be 1.7 times the variance that is wanted. Where a class of responses, 0.1 wide and from 0.3 on, has more
+//! than twice the power of the residual ([`EXCESS`]), its waves are brought down to it. Textures without wander keep theirs, except some of those at 0.9 and
+//! above, of which a residual has next to nothing.
+//!
 //! Source: ours. It is a linear filter after the synthesis, the same for all methods. Shapes, increments and curvatures at wavelengths much shorter
 //! than the window do not change. Where D is negative (wavelengths of 0.5 to 1 windows) the filter attenuates, by a fifth at most. Heights become
 //! slightly more normal.
 //!
-//! Cost: two transforms of the texture. Memory: 24 bytes per cell. A texture that is not periodic is synthesised one window wider on each side,
+//! Cost: four transforms of the texture. Memory: 24 bytes per cell. A texture that is not periodic is synthesised one window wider on each side,
 //! because the transform wraps around; the margin is cut off.
 
 use super::residual::ResidualKernel;
@@ -42,6 +47,13 @@ use sastrugi_schemas::statistics::LagCovariances;
 
 /// Largest gain of a wave.
 pub const GAIN_MAX: f64 = 3.0;
+/// Power of a class of long waves, over that of the residual, from which on it counts as wander of the copies. Of 36 waves or more, as many as a class has
+/// on 40 m with cells of 0.1 m, twice the mean is beyond six standard deviations.
+pub const EXCESS: f64 = 2.0;
+/// Response from which on waves are long, and width and number of their classes.
+const LONG_FROM: f64 = 0.3;
+const CLASS_WIDTH: f64 = 0.1;
+const CLASSES: usize = 7;
 /// Bytes per cell at the peak: heights before and after, and their spectrum.
 const BYTES_PER_CELL: u64 = 24;
 
@@ -50,6 +62,12 @@ pub fn gain(response: f64) -> f64 {
     let (power, kept) = (1.0 + response, 1.0 - response);
     // No division before the comparison: `kept` may be 0.
     if power >= GAIN_MAX * GAIN_MAX * kept { GAIN_MAX } else { (power / kept).sqrt() }
+}
+
+/// The class of a long wave by its response; `None` for shorter ones.
+fn class(response: f64) -> Option<usize> {
+    let at = ((response - LONG_FROM) / CLASS_WIDTH).floor();
+    (at >= 0.0).then_some((at as usize).min(CLASSES - 1))
 }
 
 /// The filter that amplifies wavelengths near the window.
@@ -94,28 +112,70 @@ impl Raised {
         let cells = widened.geometry.len() as u64;
         Cost {
             memory_bytes: made.memory_bytes.max(BYTES_PER_CELL * cells),
-            operations: made.operations + cells as f64 * (5.0 * libm::log2(cells as f64) + PER_CELL),
+            operations: made.operations + cells as f64 * (10.0 * libm::log2(cells as f64) + PER_CELL),
         }
     }
 
-    /// A texture from the kernel of the widened tile: its heights, row-major, m, and notes on it.
+    /// A texture from the kernel of the widened tile, which repeats a residual of these covariances: its heights, row-major, m, and notes on it.
     ///
     /// # Errors
     /// As the kernel's.
     pub fn make(
         &self,
         kernel: &impl ResidualKernel,
+        residual: &LagCovariances,
         [tile, widened]: [&Tile; 2],
         streams: &Streams,
     ) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
         let (heights_m, notes) = kernel.make(streams)?;
         let (shape, whole) = (tile.geometry, widened.geometry);
-        let heights_m = self.filtered(heights_m, [whole.rows, whole.cols], gain);
+        let torus = [whole.rows, whole.cols];
+        let kept = self.without_wander(&heights_m, residual, torus);
+        let heights_m = self.filtered(heights_m, torus, |d| gain(d) * class(d).map_or(1.0, |k| kept[k]));
         if tile.periodic {
             return Ok((heights_m, notes));
         }
         let [row, col] = [(whole.rows - shape.rows) / 2, (whole.cols - shape.cols) / 2];
         Ok((Grid::new(whole, heights_m).window(row, col, shape.rows, shape.cols).values, notes))
+    }
+
+    /// By class of long waves, the factor that brings those of a texture down to their power in the residual where they exceed it [`EXCESS`] times, or 1.
+    fn without_wander(&self, heights_m: &[f64], residual: &LagCovariances, torus: [usize; 2]) -> [f64; CLASSES] {
+        let cells = heights_m.len() as f64;
+        let own = self.power_by_class(heights_m, torus, |v| v.re * v.re + v.im * v.im);
+        // The expected square of a mode is the transform of the covariance, once for each cell.
+        let wanted = self.power_by_class(&lags::on_torus(residual, torus, lags::flat), torus, |v| cells * v.re);
+        std::array::from_fn(|k| {
+            let wanted = wanted[k].max(0.0);
+            if own[k] > EXCESS * wanted { (wanted / own[k]).sqrt() } else { 1.0 }
+        })
+    }
+
+    /// Sums over the waves of a field by class of the background's response, without its mean.
+    fn power_by_class(
+        &self,
+        field: &[f64],
+        [rows, cols]: [usize; 2],
+        power: impl Fn(&Complex64) -> f64,
+    ) -> [f64; CLASSES] {
+        let [southwards, eastwards] = self.responses([rows, cols]);
+        let spectrum = RealFft2::new(rows, cols).forward(field);
+        let mut sums = [0.0; CLASSES];
+        for (column, (modes, east)) in spectrum.values.chunks(rows).zip(&eastwards).enumerate() {
+            for (row, (mode, south)) in modes.iter().zip(&southwards).enumerate() {
+                if let Some(k) = class(south * east).filter(|_| [row, column] != [0, 0]) {
+                    sums[k] += power(mode);
+                }
+            }
+        }
+        sums
+    }
+
+    /// Responses of the background by mode, southwards and eastwards.
+    fn responses(&self, [rows, cols]: [usize; 2]) -> [Vec<f64>; 2] {
+        let [down, across] = self.window.cells();
+        let southwards = (0..rows).map(|k| mean_of_cosine(down, k, rows)).collect();
+        [southwards, (0..=cols / 2).map(|k| mean_of_cosine(across, k, cols)).collect()]
     }
 
     /// Covariance of the amplified texture at lags of 0, 1, 2 ... cells along rows, m2, as far as the residual's is known, and at most `most`.
@@ -129,9 +189,7 @@ impl Raised {
 
     /// A field on a torus of `[rows, cols]` without its mean, each wave multiplied by a function of the background's response.
     fn filtered(&self, field: Vec<f64>, [rows, cols]: [usize; 2], factor: impl Fn(f64) -> f64 + Sync) -> Vec<f64> {
-        let [down, across] = self.window.cells();
-        let southwards: Vec<f64> = (0..rows).map(|k| mean_of_cosine(down, k, rows)).collect();
-        let eastwards: Vec<f64> = (0..=cols / 2).map(|k| mean_of_cosine(across, k, cols)).collect();
+        let [southwards, eastwards] = self.responses([rows, cols]);
         let fft = RealFft2::new(rows, cols);
         let mut spectrum = fft.forward(&field);
         drop(field);
@@ -145,6 +203,7 @@ impl Raised {
 
 #[cfg(test)]
 mod tests {
+    use super::super::residual::Source;
     use super::*;
     use crate::covariance::masked_covariance;
     use crate::{FitParameters, FitSettings, Measured, fit, prepare, prepare_from};
@@ -172,6 +231,51 @@ mod tests {
             assert!((gain(response) - expected).abs() < 1e-12, "{response}: {}", gain(response));
         }
         assert_eq!(gain(1.0 + 1e-15), GAIN_MAX);
+    }
+
+    /// By hand: classes begin at 0.3, and the last holds also a response of 1.
+    #[test]
+    fn val_classes_by_hand() {
+        for (response, expected) in
+            [(-0.2, None), (0.29, None), (0.31, Some(0)), (0.45, Some(1)), (0.95, Some(6)), (1.0, Some(6))]
+        {
+            assert_eq!(class(response), expected, "{response}");
+        }
+    }
+
+    /// A long wave on a normal texture, with 40 times the power that the residual has in its class, is brought down so that the class has the residual's
+    /// power; no other class is changed.
+    #[test]
+    fn val_wander_is_brought_down_to_the_residual() {
+        let (z, fit) = site(1.0, 2);
+        let measured = Arc::new(Measured::of_fit(&z, &fit).unwrap());
+        let residual = measured.covariances_m2();
+        let parameters = json!({ "size_px": [400, 400], "cell_m": CELL_M, "periodic": true });
+        let texture = prepare_from("modulated", &parameters, &fit, Some(&measured)).unwrap();
+        let mut heights_m = texture.generate(&Streams::for_seed(4, "raised-test")).unwrap().grid.values;
+        let torus = [400; 2];
+        // Of the longest waves the residual has next to nothing, and the edges of the site count as them.
+        let kept = raised().without_wander(&heights_m, &residual, torus);
+        assert!(kept[..CLASSES - 1] == [1.0; CLASSES - 1] && kept[CLASSES - 1] > 0.5, "{kept:?}");
+        // Eight waves along 40 m, 50 cells each.
+        let k = class(mean_of_cosine(21, 8, 400)).unwrap();
+        let covariances_m2 = lags::on_torus(&residual, torus, lags::flat);
+        let wanted = raised().power_by_class(&covariances_m2, torus, |v| heights_m.len() as f64 * v.re)[k];
+        let size_m = (40.0 * wanted).sqrt() * 2.0 / heights_m.len() as f64;
+        heights_m
+            .iter_mut()
+            .enumerate()
+            .for_each(|(i, h)| *h += size_m * libm::cos(TAU * 8.0 * (i % 400) as f64 / 400.0));
+        let kept = raised().without_wander(&heights_m, &residual, torus);
+        for (at, factor) in kept.into_iter().enumerate() {
+            match at == k {
+                true => assert!(factor > 0.1 && factor < 0.2, "{kept:?}"),
+                false => assert!(factor == 1.0 || at == CLASSES - 1, "{kept:?}"),
+            }
+        }
+        let brought_down = raised().filtered(heights_m, torus, |d| class(d).map_or(1.0, |at| kept[at]));
+        let found = raised().power_by_class(&brought_down, torus, |v| v.re * v.re + v.im * v.im)[k];
+        assert!((found / wanted - 1.0).abs() < 1e-9, "{found} {wanted}");
     }
 
     /// Two waves eastwards over 60 cells, and three southwards over 50, are multiplied by the gain of their responses; the mean is removed.

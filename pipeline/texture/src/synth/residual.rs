@@ -323,6 +323,8 @@ impl<P: ResidualParameters> Method for Checked<P> {
         self.check_cells(source.cell_m())?;
         let raised = self.raised(fit.window_m)?;
         let kernel = self.own.kernel(raised.as_ref().map_or(&self.tile, |(_, widened)| widened), &source)?;
+        let raised =
+            raised.map(|(filter, widened)| ForBackground { filter, widened, residual: source.covariances_m2() });
         let window = fit.window_m.map(|[x, y]| {
             let window_m = super::to_micrometres(0.5 * (x + y));
             match &raised {
@@ -372,10 +374,18 @@ struct Repeated<S, K> {
     tile: Tile,
     parameters: Value,
     source: Arc<S>,
-    /// What raises its waves, and the tile that the kernel makes for that.
-    raised: Option<(Raised, Tile)>,
+    raised: Option<ForBackground>,
     kernel: K,
     notes: Vec<String>,
+}
+
+/// What makes a texture for the background of a fit.
+struct ForBackground {
+    filter: Raised,
+    /// The tile that the kernel makes for it.
+    widened: Tile,
+    /// Covariances of the residual, m2.
+    residual: LagCovariances,
 }
 
 impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
@@ -391,7 +401,7 @@ impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
         let cost = self.kernel.cost();
         self.tile.repeated_cost(match &self.raised {
             None => cost,
-            Some((_, widened)) => Raised::cost(cost, widened),
+            Some(raised) => Raised::cost(cost, &raised.widened),
         })
     }
 
@@ -409,7 +419,7 @@ impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
         };
         let wanted_m2 = match &self.raised {
             None => self.source.along_rows_m2(most),
-            Some((raised, _)) => raised.along_rows_m2(&self.source.covariances_m2(), most),
+            Some(raised) => raised.filter.along_rows_m2(&raised.residual, most),
         };
         wanted_m2.into_iter().enumerate().map(at).collect()
     }
@@ -425,7 +435,9 @@ impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
     fn generate(&self, streams: &Streams) -> Result<TextureOutcome, SynthesisError> {
         let (heights_m, notes) = match &self.raised {
             None => self.kernel.make(streams)?,
-            Some((raised, widened)) => raised.make(&self.kernel, [&self.tile, widened], streams)?,
+            Some(ForBackground { filter, widened, residual }) => {
+                filter.make(&self.kernel, residual, [&self.tile, widened], streams)?
+            }
         };
         Ok(TextureOutcome {
             grid: self.tile.repeated(Grid::new(self.tile.geometry, heights_m)),
