@@ -72,7 +72,8 @@ impl Pattern {
     /// assert_eq!(place(3), (4, Some(2), 2.0, -2.0));
     /// ```
     pub fn slots(self, members: u32, spacing_m: f64) -> Vec<SlotParameters> {
-        let slot = |id: u32| {
+        let leader = SlotParameters { id: 1, predecessor: None, depth_m: 0.0, width_m: 0.0, team: Vec::new() };
+        let follower = |id: u32| {
             // Slot 2 is to the left and 3 to the right; each later one follows the one two before.
             let (predecessor, side) = match self {
                 Self::Column => (id - 1, 0.0),
@@ -81,16 +82,9 @@ impl Pattern {
                 Self::Line | Self::Wedge => (id - 2, if id.is_multiple_of(2) { -1.0 } else { 1.0 }),
             };
             let depth_m = if self == Self::Line { 0.0 } else { spacing_m };
-            let first = id == 1;
-            SlotParameters {
-                id,
-                predecessor: (!first).then_some(predecessor),
-                depth_m: if first { 0.0 } else { depth_m },
-                width_m: if first { 0.0 } else { side * spacing_m },
-                team: Vec::new(),
-            }
+            SlotParameters { id, predecessor: Some(predecessor), depth_m, width_m: side * spacing_m, team: Vec::new() }
         };
-        (1..=members).map(slot).collect()
+        std::iter::once(leader).chain((2..=members).map(follower)).collect()
     }
 }
 
