@@ -108,7 +108,10 @@ fn constant(objects: usize) -> String {
     if objects == 0 {
         return FLAT.to_owned();
     }
-    format!("apart from {} taken as objects, {FLAT}; find_objects = false keeps them", counted(objects, "cell"))
+    format!(
+        "apart from {} taken as objects, {FLAT}; to keep these cells, set find_objects = false",
+        counted(objects, "cell")
+    )
 }
 
 /// Length rounded to a micrometre, so that 96 cells of 0.1 m are 9.6 m.

@@ -21,10 +21,9 @@
 //! | 1 | 0.908 | 0.990 | 0.176 | 0.021 | 0.070 | 0.000 |
 //! | 3 | 0.934 | 0.983 | 0.128 | 0.034 | 0.082 | 0.001 |
 //!
-//! Textures made of copied cells wander: of long waves they have more than their site, up to 3 times the power at D = 0.7 and 20 times at 0.9 (`exemplar`;
-//! `quilting` 5 times at 0.9). Amplified, this would be 1.7 times the variance that is wanted. Where a class of responses, 0.1 wide and from 0.3 on, has more
-//! than twice the power of the residual ([`EXCESS`]), its waves are brought down to it. Textures without wander keep theirs, except some of those at 0.9 and
-//! above, of which a residual has next to nothing.
+//! Textures made of copied cells wander: their long waves have more power than the residual's, up to 3 times at D = 0.7 and 20 times at 0.9 (`exemplar`, range
+//! 1 m; `quilting` 5 times at 0.9). Amplified, this gave 1.7 times the intended variance. In each class of responses, 0.1 wide and from 0.3 on, their waves
+//! are first reduced to the power of the residual, if they have more than chance allows ([`CHANCE`]). The other methods do not wander.
 //!
 //! Source: ours. It is a linear filter after the synthesis, the same for all methods. Shapes, increments and curvatures at wavelengths much shorter
 //! than the window do not change. Where D is negative (wavelengths of 0.5 to 1 windows) the filter attenuates, by a fifth at most. Heights become
@@ -47,14 +46,14 @@ use sastrugi_schemas::statistics::LagCovariances;
 
 /// Largest gain of a wave.
 pub const GAIN_MAX: f64 = 3.0;
-/// Power of a class of long waves, over that of the residual, from which on it counts as wander of the copies. Of 36 waves or more, as many as a class has
-/// on 40 m with cells of 0.1 m, twice the mean is beyond six standard deviations.
-pub const EXCESS: f64 = 2.0;
+/// Standard deviations by which the mean power of a class of long waves may exceed the residual's. With `n` waves it has one of `1 / sqrt(n)`; a normal
+/// texture exceeds six of them with a probability of 3e-4 at two waves, and less at more.
+const CHANCE: f64 = 6.0;
 /// Response from which on waves are long, and width and number of their classes.
 const LONG_FROM: f64 = 0.3;
 const CLASS_WIDTH: f64 = 0.1;
 const CLASSES: usize = 7;
-/// Bytes per cell at the peak: heights before and after, and their spectrum.
+/// Bytes per cell at the peak: heights, the covariance of the residual on their torus, and its spectrum.
 const BYTES_PER_CELL: u64 = 24;
 
 /// The gain of a wave at which the response of the moving average is `response`, from about -0.22 to 1.
@@ -116,21 +115,22 @@ impl Raised {
         }
     }
 
-    /// A texture from the kernel of the widened tile, which repeats a residual of these covariances: its heights, row-major, m, and notes on it.
+    /// A texture from the kernel of the widened tile: its heights, row-major, m, and notes on it. If it is made of copies, `copied` has the covariances of
+    /// the residual.
     ///
     /// # Errors
     /// As the kernel's.
     pub fn make(
         &self,
         kernel: &impl ResidualKernel,
-        residual: &LagCovariances,
+        copied: Option<&LagCovariances>,
         [tile, widened]: [&Tile; 2],
         streams: &Streams,
     ) -> Result<(Vec<f64>, Vec<String>), SynthesisError> {
         let (heights_m, notes) = kernel.make(streams)?;
         let (shape, whole) = (tile.geometry, widened.geometry);
         let torus = [whole.rows, whole.cols];
-        let kept = self.without_wander(&heights_m, residual, torus);
+        let kept = copied.map_or([1.0; CLASSES], |residual| self.without_wander(&heights_m, residual, torus));
         let heights_m = self.filtered(heights_m, torus, |d| gain(d) * class(d).map_or(1.0, |k| kept[k]));
         if tile.periodic {
             return Ok((heights_m, notes));
@@ -139,32 +139,36 @@ impl Raised {
         Ok((Grid::new(whole, heights_m).window(row, col, shape.rows, shape.cols).values, notes))
     }
 
-    /// By class of long waves, the factor that brings those of a texture down to their power in the residual where they exceed it [`EXCESS`] times, or 1.
+    /// By class of long waves, the factor that reduces those of a texture to their power in the residual where they exceed it by more than chance, or 1.
     fn without_wander(&self, heights_m: &[f64], residual: &LagCovariances, torus: [usize; 2]) -> [f64; CLASSES] {
         let cells = heights_m.len() as f64;
-        let own = self.power_by_class(heights_m, torus, |v| v.re * v.re + v.im * v.im);
-        // The expected square of a mode is the transform of the covariance, once for each cell.
-        let wanted = self.power_by_class(&lags::on_torus(residual, torus, lags::flat), torus, |v| cells * v.re);
+        let own = self.by_class(heights_m, torus, |v| v.re * v.re + v.im * v.im);
+        // The expected square of a mode is the transform of the covariance, once for each cell. That of a measured covariance may be negative.
+        let wanted = self.by_class(&lags::on_torus(residual, torus, lags::flat), torus, |v| cells * v.re.max(0.0));
         std::array::from_fn(|k| {
-            let wanted = wanted[k].max(0.0);
-            if own[k] > EXCESS * wanted { (wanted / own[k]).sqrt() } else { 1.0 }
+            let [[own, modes], [wanted, _]] = [own[k], wanted[k]];
+            // Every wave has two modes.
+            let most = 1.0 + CHANCE / (0.5 * modes).sqrt();
+            if wanted > 0.0 && own > most * wanted { (wanted / own).sqrt() } else { 1.0 }
         })
     }
 
-    /// Sums over the waves of a field by class of the background's response, without its mean.
-    fn power_by_class(
+    /// Sum over the modes of a field by class of the background's response, and their number, without the mean.
+    fn by_class(
         &self,
         field: &[f64],
         [rows, cols]: [usize; 2],
         power: impl Fn(&Complex64) -> f64,
-    ) -> [f64; CLASSES] {
+    ) -> [[f64; 2]; CLASSES] {
         let [southwards, eastwards] = self.responses([rows, cols]);
         let spectrum = RealFft2::new(rows, cols).forward(field);
-        let mut sums = [0.0; CLASSES];
+        let mut sums = [[0.0; 2]; CLASSES];
         for (column, (modes, east)) in spectrum.values.chunks(rows).zip(&eastwards).enumerate() {
+            let count = spectrum.multiplicity(column);
             for (row, (mode, south)) in modes.iter().zip(&southwards).enumerate() {
                 if let Some(k) = class(south * east).filter(|_| [row, column] != [0, 0]) {
-                    sums[k] += power(mode);
+                    sums[k][0] += count * power(mode);
+                    sums[k][1] += count;
                 }
             }
         }
@@ -243,39 +247,41 @@ mod tests {
         }
     }
 
-    /// A long wave on a normal texture, with 40 times the power that the residual has in its class, is brought down so that the class has the residual's
-    /// power; no other class is changed.
+    /// A long wave on a normal texture, eastwards or southwards, with 40 times the power that the residual has in its class, is reduced so that the class has
+    /// the residual's power, by a sum over all cells too; other classes are not changed, except the longest waves, of which the residual has next to nothing.
     #[test]
-    fn val_wander_is_brought_down_to_the_residual() {
+    fn val_wander_is_reduced_to_the_residual() {
         let (z, fit) = site(1.0, 2);
         let measured = Arc::new(Measured::of_fit(&z, &fit).unwrap());
         let residual = measured.covariances_m2();
         let parameters = json!({ "size_px": [400, 400], "cell_m": CELL_M, "periodic": true });
         let texture = prepare_from("modulated", &parameters, &fit, Some(&measured)).unwrap();
-        let mut heights_m = texture.generate(&Streams::for_seed(4, "raised-test")).unwrap().grid.values;
+        let heights_m = texture.generate(&Streams::for_seed(4, "raised-test")).unwrap().grid.values;
         let torus = [400; 2];
-        // Of the longest waves the residual has next to nothing, and the edges of the site count as them.
-        let kept = raised().without_wander(&heights_m, &residual, torus);
-        assert!(kept[..CLASSES - 1] == [1.0; CLASSES - 1] && kept[CLASSES - 1] > 0.5, "{kept:?}");
         // Eight waves along 40 m, 50 cells each.
         let k = class(mean_of_cosine(21, 8, 400)).unwrap();
-        let covariances_m2 = lags::on_torus(&residual, torus, lags::flat);
-        let wanted = raised().power_by_class(&covariances_m2, torus, |v| heights_m.len() as f64 * v.re)[k];
-        let size_m = (40.0 * wanted).sqrt() * 2.0 / heights_m.len() as f64;
-        heights_m
-            .iter_mut()
-            .enumerate()
-            .for_each(|(i, h)| *h += size_m * libm::cos(TAU * 8.0 * (i % 400) as f64 / 400.0));
+        assert!(k < CLASSES - 1);
         let kept = raised().without_wander(&heights_m, &residual, torus);
-        for (at, factor) in kept.into_iter().enumerate() {
-            match at == k {
-                true => assert!(factor > 0.1 && factor < 0.2, "{kept:?}"),
-                false => assert!(factor == 1.0 || at == CLASSES - 1, "{kept:?}"),
-            }
+        assert!(kept[..CLASSES - 1] == [1.0; CLASSES - 1] && kept[CLASSES - 1] > 0.5, "{kept:?}");
+        let cells = heights_m.len() as f64;
+        let on_torus = lags::on_torus(&residual, torus, lags::flat);
+        let [wanted, _] = raised().by_class(&on_torus, torus, |v| cells * v.re.max(0.0))[k];
+        // A cosine of amplitude a has two modes of (a / 2)^2 times the squared number of cells.
+        let size_m = (2.0 * 40.0 * wanted).sqrt() / cells;
+        for turned in [false, true] {
+            let at = |i: usize| if turned { i / 400 } else { i % 400 };
+            let wave = |i: usize| size_m * libm::cos(TAU * 8.0 * at(i) as f64 / 400.0);
+            let wandering: Vec<f64> = heights_m.iter().enumerate().map(|(i, h)| h + wave(i)).collect();
+            let kept = raised().without_wander(&wandering, &residual, torus);
+            assert!(kept[k] > 0.1 && kept[k] < 0.2, "{kept:?}");
+            assert!(kept.iter().enumerate().all(|(c, f)| *f == 1.0 || c == k || c == CLASSES - 1), "{kept:?}");
+            let only = |chosen: usize| move |d: f64| if class(d) == Some(chosen) { 1.0 } else { 0.0 };
+            let squares = |field: Vec<f64>| field.iter().map(|h| h * h).sum::<f64>();
+            let reduced = raised().filtered(wandering, torus, |d| class(d).map_or(1.0, |c| kept[c]));
+            // By Parseval's theorem.
+            let found = cells * squares(raised().filtered(reduced, torus, only(k)));
+            assert!((found / wanted - 1.0).abs() < 1e-9, "{found} {wanted}");
         }
-        let brought_down = raised().filtered(heights_m, torus, |d| class(d).map_or(1.0, |at| kept[at]));
-        let found = raised().power_by_class(&brought_down, torus, |v| v.re * v.re + v.im * v.im)[k];
-        assert!((found / wanted - 1.0).abs() < 1e-9, "{found} {wanted}");
     }
 
     /// Two waves eastwards over 60 cells, and three southwards over 50, are multiplied by the gain of their responses; the mean is removed.

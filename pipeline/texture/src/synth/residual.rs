@@ -436,7 +436,8 @@ impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
         let (heights_m, notes) = match &self.raised {
             None => self.kernel.make(streams)?,
             Some(ForBackground { filter, widened, residual }) => {
-                filter.make(&self.kernel, residual, [&self.tile, widened], streams)?
+                let copied = (S::NEEDS == Needs::Residual).then_some(residual);
+                filter.make(&self.kernel, copied, [&self.tile, widened], streams)?
             }
         };
         Ok(TextureOutcome {

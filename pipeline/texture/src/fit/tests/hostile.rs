@@ -94,7 +94,7 @@ fn val_cells_left_out_of_a_flat_surface_are_named() {
     let refused = fitted(&step, "exponential", true).err().unwrap();
     assert!(matches!(refused, FitError::Constant { objects: 1.., .. }), "{refused}");
     let told = refused.to_string();
-    assert!(told.starts_with("apart from ") && told.ends_with("find_objects = false keeps them"), "{told}");
+    assert!(told.starts_with("apart from ") && told.ends_with("set find_objects = false"), "{told}");
     assert!(fitted(&step, "exponential", false).is_ok());
 }
 
