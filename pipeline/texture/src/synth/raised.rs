@@ -47,7 +47,8 @@ use sastrugi_schemas::statistics::LagCovariances;
 /// Largest gain of a wave.
 pub const GAIN_MAX: f64 = 3.0;
 /// Standard deviations by which the mean power of a class of long waves may exceed the residual's. With `n` waves it has one of `1 / sqrt(n)`; a normal
-/// texture exceeds six of them with a probability of 3e-4 at two waves, and less at more.
+/// texture with the residual's spectrum exceeds six of them with a probability of 3e-4 at two waves, and less at more. Of the longest waves the residual
+/// has next to nothing, so that the edges of a texture may exceed it too.
 const CHANCE: f64 = 6.0;
 /// Response from which on waves are long, and width and number of their classes.
 const LONG_FROM: f64 = 0.3;
