@@ -36,7 +36,7 @@ fn abort_where_zlib_lacks_memory() {
         let message = info.payload().downcast_ref::<String>().map_or("", String::as_str);
         if place.contains("zlib-rs") && message.contains("MemError") {
             warn(
-                "sastrugi: not enough memory to compress the output; every output file is complete or absent; free some memory and rerun",
+                "sastrugi: not enough memory to compress the output; no output file is left incomplete; free some memory and rerun",
             );
             std::process::abort();
         }
@@ -49,7 +49,7 @@ fn interrupted() {
     match serve::interrupted() {
         Some(Interrupt::First) => return,
         Some(Interrupt::Again) => warn("\nsastrugi: stopped immediately; open requests were cut off"),
-        None => warn("\nsastrugi: interrupted; every output file is complete or absent; rerun to resume"),
+        None => warn("\nsastrugi: interrupted; no output file is left incomplete; rerun to resume"),
     }
     std::process::exit(i32::from(Code::Retry as u8));
 }

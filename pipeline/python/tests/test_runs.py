@@ -105,7 +105,7 @@ def test_ctrl_c_ends_the_console_script(tmp_path):
     process.send_signal(signal.SIGINT)
     _, errors = process.communicate(timeout=60)
     assert process.returncode == 75
-    assert errors.endswith("sastrugi: interrupted; every output file is complete or absent; rerun to resume\n")
+    assert errors.endswith("sastrugi: interrupted; no output file is left incomplete; rerun to resume\n")
 
 
 def test_the_console_script_is_the_program(tmp_path):
