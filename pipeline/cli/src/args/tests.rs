@@ -7,7 +7,7 @@ fn examples(help: &str) -> Vec<Vec<String>> {
     joined.lines().filter(|line| line.starts_with("  sastrugi ")).map(words).collect()
 }
 
-/// The words of a line as a shell hands them to the program: quotes group, and a redirection is not an argument.
+/// The words of a line as a shell hands them to the program: quotes group, and neither a redirection nor a pipe is an argument.
 fn words(line: &str) -> Vec<String> {
     let (mut words, mut word, mut quote) = (Vec::new(), None::<String>, None::<char>);
     for c in line.chars() {
@@ -24,7 +24,7 @@ fn words(line: &str) -> Vec<String> {
     }
     assert!(quote.is_none(), "a quote is not closed: {line}");
     words.extend(word);
-    let end = words.iter().position(|word| word == ">").unwrap_or(words.len());
+    let end = words.iter().position(|word| word == ">" || word == "|").unwrap_or(words.len());
     words.truncate(end);
     words
 }
