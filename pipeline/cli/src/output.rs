@@ -110,8 +110,10 @@ fn last_line(text: &str) -> &str {
 pub fn columns(rows: &[Vec<String>]) -> String {
     let width = |column: usize| rows.iter().filter_map(|r| r.get(column)).map(|c| c.chars().count()).max().unwrap_or(0);
     let widths: Vec<usize> = (0..rows.iter().map(Vec::len).max().unwrap_or(0)).map(width).collect();
+    // Not by a width in the format, which may be 65 535 at most.
+    let padded = |(cell, width): (&String, &usize)| cell.to_owned() + &" ".repeat(width - cell.chars().count());
     let line = |row: &Vec<String>| {
-        let cells: Vec<String> = row.iter().zip(&widths).map(|(c, w)| format!("{c:<w$}")).collect();
+        let cells: Vec<String> = row.iter().zip(&widths).map(padded).collect();
         cells.join("  ").trim_end().to_owned()
     };
     rows.iter().map(line).collect::<Vec<_>>().join("\n")
@@ -142,6 +144,15 @@ pub fn significant(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn val_columns_may_be_wide() {
+        let wide = "y".repeat(70_000);
+        let rows = [vec!["a".to_owned(), wide.clone()], vec!["bcd".to_owned(), "é".to_owned()]];
+        assert_eq!(columns(&rows), format!("a    {wide}\nbcd  é"));
+        let rows = [vec![wide.clone(), "z".to_owned()], vec!["é".to_owned(), "z".to_owned()]];
+        assert_eq!(columns(&rows), format!("{wide}  z\né{}  z", " ".repeat(69_999)));
+    }
 
     #[test]
     fn val_only_short_lines_are_drawn() {
