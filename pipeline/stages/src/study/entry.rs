@@ -217,6 +217,10 @@ impl<'a> Entry<'a> {
     }
 
     fn sweep(&self, items: Vec<Expanded>, parameter: &str, values: &[Value]) -> Result<Vec<Expanded>, StudyError> {
+        if is_too_deep(parameter) {
+            let message = format!("a swept key lies more than {TABLES_MAX} tables deep; no parameter does");
+            return Err(self.error("sweep", message));
+        }
         if values.is_empty() {
             return Err(self.error("sweep", format!("the sweep of `{parameter}` has no values")));
         }
@@ -360,6 +364,14 @@ fn id_word(value: &Value) -> Option<String> {
     Some(text.chars().map(plain).collect())
 }
 
+/// Most tables that a dotted name may reach through: it becomes that many nested values, which end recursively.
+pub const TABLES_MAX: usize = 100;
+
+/// Whether a dotted name reaches through too many tables.
+pub fn is_too_deep(dotted: &str) -> bool {
+    dotted.matches('.').count() > TABLES_MAX
+}
+
 /// Sets a dotted parameter; false if it is set already or its parent is not a table.
 fn set_at(params: &mut Value, dotted: &str, value: Value) -> bool {
     let mut at = params;
@@ -391,6 +403,15 @@ mod tests {
             let (item, params): (TerrainItem, _) = entry.read()?;
             Ok(entry.expand(&item.id, item.count, &item.sweep, &params)?)
         })
+    }
+
+    /// A hundred thousand dots would be as many nested values, and overflow the stack.
+    #[test]
+    fn val_deeply_nested_sweeps_are_refused() {
+        let deep = format!("[[terrain]]\nid = \"a\"\nkind = \"k\"\nsweep.\"{}x\" = [1]\n", "a.".repeat(100_000));
+        let Refusals(errors) = expand(&deep).unwrap_err();
+        assert_eq!(errors.len(), 1);
+        assert!(errors[0].message.contains("more than 100 tables deep"), "{:.200}", errors[0].message);
     }
 
     #[test]

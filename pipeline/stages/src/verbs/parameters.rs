@@ -1,6 +1,7 @@
 //! Converts parameters from a command line or a small TOML file to the form they have in a study.
 
 use crate::error::Error;
+use crate::study::entry::{TABLES_MAX, is_too_deep};
 use crate::study::keys;
 use crate::study::text::{StudyText, value_to_json};
 use sastrugi_mobility::registry::{CUSTOM, doubt_of_speed, doubts, vehicle};
@@ -123,6 +124,9 @@ fn parse_value(pair: &str, text: &str) -> Result<Value, Error> {
 }
 
 fn place(params: &mut Value, dotted: &str, value: Value) -> Result<(), Error> {
+    if is_too_deep(dotted) {
+        return Err(Error::Usage(format!("a key lies more than {TABLES_MAX} tables deep; no parameter does")));
+    }
     let mut at = params;
     for word in dotted.split('.') {
         let map = at.as_object_mut().ok_or_else(|| Error::Usage(format!("`{dotted}`: its parent is not a table")))?;
@@ -212,6 +216,7 @@ mod tests {
             ("x=nan", "`--set x=nan`: the number is not finite"),
             ("x=2026-01-01", "dates must be written as text"),
             ("a.b=1", "`a.b`: its parent is not a table"),
+            (&format!("{}x=1", "d.".repeat(100_000)), "a key lies more than 100 tables deep"),
         ] {
             let error = assign(&mut params, &[pair.to_owned()]).unwrap_err();
             assert!(matches!(&error, Error::Usage(message) if message.contains(words)), "{pair}: {error}");
