@@ -43,6 +43,14 @@ fn gold_threads_change_nothing() {
     }
 }
 
+/// More teams and rovers than are run at once on one thread, and fewer than on 48.
+#[test]
+fn gold_teams_and_rovers_that_run_one_after_another_change_nothing() {
+    let study = include_str!("many_runs.toml");
+    let one = run_fresh(study, &["--threads", "1"]);
+    assert_same(&one, &run_fresh(study, &["--threads", "48"]), "48 threads");
+}
+
 /// Textures that repeat a site: from stored statistics and from the DEM.
 #[test]
 fn gold_threads_and_shards_change_no_texture_of_a_site() {

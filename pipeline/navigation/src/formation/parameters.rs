@@ -167,6 +167,11 @@ impl Default for TeamParameters {
     }
 }
 
+/// Default time limit, as a multiple of the time for the route at mean speed.
+const TIME_FACTOR: f64 = 10.0;
+/// Time added to the default time limit, s.
+const TIME_MORE_S: f64 = 600.0;
+
 /// Members of a built-in formation if the study states none: four, as in the thesis.
 const MEMBERS: u32 = 4;
 
@@ -299,6 +304,11 @@ impl TeamParameters {
             1.0 / self.step_s
         );
         Err(ParameterError::new("sample_rate_hz", message))
+    }
+
+    /// Time limit of a run along a route of this length, m, in s.
+    pub fn time_limit_s(&self, route_m: f64) -> f64 {
+        self.time_max_s.unwrap_or_else(|| TIME_FACTOR * route_m / self.speed_m_s + TIME_MORE_S)
     }
 
     /// Largest distance between waypoints, m.

@@ -15,10 +15,6 @@ mod tests;
 
 /// An event of the same kind and member within this time of the previous one is not recorded, s.
 const EVENT_GAP_S: f64 = 1.0;
-/// Default time limit, as a multiple of the time for the route at mean speed.
-const TIME_FACTOR: f64 = 10.0;
-/// Time added to the default time limit, s.
-const TIME_MORE_S: f64 = 600.0;
 /// Largest distance in cells within which a free start is searched for a member.
 const SEARCH_CELLS: f64 = 100.0;
 
@@ -218,7 +214,6 @@ impl<'a> Team<'a> {
         let targets_m = (0..members).map(|slot| targets(&placements, slot)).collect();
         let mut losses = parameters.losses.clone();
         losses.sort_by(|a, b| b.time_s.total_cmp(&a.time_s));
-        let limit_s = TIME_FACTOR * route_length_m / parameters.speed_m_s + TIME_MORE_S;
         let (speed_m_s, obstacles) = (parameters.speed_m_s, parameters.obstacles.clone());
         let mut team = Self {
             crowd: Crowd::new(footing, parameters.crowd(), &starts_m, targets_m, speed_m_s, obstacles),
@@ -234,7 +229,7 @@ impl<'a> Team<'a> {
             events: Vec::new(),
             boxes: Vec::new(),
             seen_s: vec![[f64::NEG_INFINITY; 2]; members],
-            time_max_s: parameters.time_max_s.unwrap_or(limit_s),
+            time_max_s: parameters.time_limit_s(route_length_m),
             parameters: parameters.clone(),
             outcome: None,
         };

@@ -2,7 +2,7 @@
 
 use super::rover_designs;
 use crate::builder::{BuildError, Builder, HEIGHTS, Heightfield, common};
-use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, RowWriter, Work};
 use crate::operations::planner;
 use crate::operations::room;
 use crate::operations::rovers::{self, Grounds, Oracle};
@@ -33,6 +33,10 @@ pub const STAGE: &str = "rover";
 const SAMPLE_M: f64 = 0.5;
 /// Default number of rovers recorded on each terrain.
 const RECORD: u32 = 1;
+/// Rovers that are driven before their samples are written: the samples of so many are in memory at once.
+const ROVERS_AT_ONCE: usize = 32;
+/// Memory of a sample, bytes.
+const BYTES_PER_SAMPLE: f64 = 400.0;
 /// Memory of a recorded cycle including its messages, bytes.
 const BYTES_PER_RECORDED_CYCLE: u64 = 6000;
 /// Steering rules of the two reactive navigators, which the planner does not have.
@@ -423,8 +427,13 @@ impl RoverJob {
     }
 }
 
+/// Rovers that are driven at once, at least one for each thread.
+fn at_once() -> usize {
+    ROVERS_AT_ONCE.max(rayon::current_num_threads())
+}
+
 /// Notes on rovers that did not reach their goal.
-fn notes(rows: &[Driven]) -> Vec<String> {
+fn notes(rows: &[RoverRow]) -> Vec<String> {
     let endings = [
         ("lost", "stopped at a place wrongly taken for the goal"),
         ("no_way", "found no way forward"),
@@ -433,7 +442,7 @@ fn notes(rows: &[Driven]) -> Vec<String> {
         ("off_ground", "reached the edge of the known ground"),
     ];
     let note = |(name, words): (&str, &str)| {
-        let count = rows.iter().filter(|d| d.row.outcome == name).count();
+        let count = rows.iter().filter(|row| row.outcome == name).count();
         (count > 0).then(|| format!("{count} of {} {words}", counted(rows.len(), "rover")))
     };
     endings.into_iter().filter_map(note).collect()
@@ -466,13 +475,16 @@ impl Job for RoverJob {
 
     fn memory_bytes(&self) -> u64 {
         let task = self.trial.navigator.task(&self.trial.parameters);
-        let at_once = self.trial.record.min(rayon::current_num_threads()) as u64;
-        let recordings = at_once * u64::from(task.cycle_limit) * BYTES_PER_RECORDED_CYCLE;
+        let recorded_at_once = self.trial.record.min(rayon::current_num_threads()) as u64;
+        let recordings = recorded_at_once * u64::from(task.cycle_limit) * BYTES_PER_RECORDED_CYCLE;
         let maps = match self.trial.navigator {
             Navigator::Planner(_) => rayon::current_num_threads() as u64 * planner::memory_bytes(),
             _ => 0,
         };
-        Grounds::memory_bytes(&self.field) + recordings + maps
+        // Without a spacing every cycle is a sample.
+        let samples_each = (task.distance_limit_m / self.trial.sample_m).min(f64::from(task.cycle_limit));
+        let samples = at_once().min(self.trial.parameters.rovers as usize) as f64 * samples_each * BYTES_PER_SAMPLE;
+        (Grounds::memory_bytes(&self.field) + recordings + maps).saturating_add(samples as u64)
     }
 
     fn estimate(&self) -> Estimate {
@@ -494,13 +506,21 @@ impl Job for RoverJob {
             Grounds::World(world) => self.drive(work, &world.view(), k, (start, oracles[k]), noise),
             Grounds::Grid(grid) => self.drive(work, grid, k, (start, oracles[k]), noise),
         };
-        let driven: Result<Vec<Driven>, JobError> = starts.par_iter().enumerate().map(one).collect();
-        let mut driven = driven?;
-        let products = driven.iter_mut().flat_map(|d| std::mem::take(&mut d.products)).collect();
-        let mut outcome = Outcome { products, notes: notes(&driven) };
+        let numbered: Vec<(usize, &Start)> = starts.iter().enumerate().collect();
+        let mut samples = RowWriter::new(work);
+        let (mut products, mut rows) = (Vec::new(), Vec::with_capacity(starts.len()));
+        for numbered in numbered.chunks(at_once()) {
+            let driven: Result<Vec<Driven>, JobError> = numbered.par_iter().copied().map(one).collect();
+            for driven in driven? {
+                products.extend(driven.products);
+                samples.push(driven.samples)?;
+                rows.push(driven.row);
+            }
+        }
+        let mut outcome = Outcome { products, notes: notes(&rows) };
         outcome.notes.extend(rovers::redrawn(parameters, &self.streams, &starts));
-        outcome.write_rows(work, driven.iter_mut().flat_map(|d| std::mem::take(&mut d.samples)))?;
-        outcome.write_rows(work, driven.into_iter().map(|d| d.row))?;
+        samples.finish(&mut outcome)?;
+        outcome.write_rows(work, rows)?;
         Ok(outcome)
     }
 }

@@ -465,12 +465,14 @@ impl Job for TraverseJob {
 
     fn memory_bytes(&self) -> u64 {
         // Heights, ground with its bound and classes once; rasters of the surface; the samples of the missions that are driven at once, about
-        // 1000 bytes each including the wheels; the rows of the starts.
+        // 1000 bytes each including the wheels, if all of them take ten times as long as planned, or run out of time; the rows of the starts.
         let Drive { count, seconds_each, starts, settings, rasters, .. } = &*self.drive;
         let rasters: u64 = rasters.iter().flatten().map(|raster| raster.bytes).sum();
         let rows = (count * starts.count()) as u64;
-        let samples =
-            (*count).min(MISSIONS_AT_ONCE) as f64 * seconds_each * f64::from(settings.parameters().sample_rate_hz);
+        let parameters = settings.parameters();
+        let samples = (*count).min(MISSIONS_AT_ONCE) as f64
+            * parameters.timeout_s.min(10.0 * seconds_each)
+            * f64::from(parameters.sample_rate_hz);
         ((64 << 20) + 48 * self.cells + rasters).saturating_add((1000.0 * samples) as u64).saturating_add(400 * rows)
     }
 

@@ -225,7 +225,8 @@ impl Run<'_> {
     }
 
     fn first_that_fits(&self, state: &State) -> Option<usize> {
-        let free = |position| state.memory_bytes + self.memory_bytes(position) <= self.limits.memory_bytes;
+        let free =
+            |position| state.memory_bytes.saturating_add(self.memory_bytes(position)) <= self.limits.memory_bytes;
         state.ready.first_that_fits(|position| state.running == 0 || free(position))
     }
 

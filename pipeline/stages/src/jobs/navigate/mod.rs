@@ -4,7 +4,7 @@ mod recorded;
 
 use super::route::{self, PlannedRoute, PlannedRoutes};
 use crate::builder::{BuildError, Builder, Heightfield, common, unknown_id};
-use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, Work};
+use crate::job::{Estimate, ItemRef, Job, JobError, Outcome, Product, RowWriter, Work};
 use crate::operations::dem::input_error;
 use crate::operations::drawn::Routes;
 use crate::operations::place::{PLACE, Place};
@@ -37,6 +37,10 @@ use std::sync::Arc;
 pub const STAGE: &str = "navigate";
 /// Maximum number of roadmap vertices in a recording; of more, only every second, third, ... is recorded.
 const VERTICES_MAX: usize = 5000;
+/// Runs that are led before their samples are written: the samples of so many are in memory at once.
+const RUNS_AT_ONCE: usize = 8;
+/// Memory of a sample of one member: its state, its row, and the message being written, bytes.
+const BYTES_PER_SAMPLE: f64 = 600.0;
 
 /// The formations.
 pub fn kinds() -> Vec<Kind> {
@@ -368,6 +372,20 @@ fn seconds(cells: f64, runs: f64, members: f64, senses: bool) -> f64 {
     0.01 + 2.5e-7 * cells + along * cells.sqrt() * runs
 }
 
+impl NavigateJob {
+    /// Number of samples of a run, of all members together. Stuck teams stop long before their time limit, so that three diagonals of the terrain and ten
+    /// minutes are hardly exceeded.
+    fn samples_each(&self) -> f64 {
+        let Lead { parameters, .. } = &*self.lead;
+        let [width_m, height_m] =
+            self.field.expected.map_or([(self.field.cells as f64).sqrt(); 2], |place| place.size());
+        let diagonal_m = (width_m * width_m + height_m * height_m).sqrt();
+        let driven_s = 3.0 * diagonal_m / parameters.speed_m_s + 600.0;
+        let members = parameters.formation().map_or(0, |formation| formation.slots().len());
+        parameters.time_limit_s(diagonal_m).min(driven_s) * parameters.sample_rate_hz * members as f64
+    }
+}
+
 impl Job for NavigateJob {
     fn recipe(&self) -> Value {
         let head = &self.lead.head;
@@ -389,9 +407,11 @@ impl Job for NavigateJob {
     }
 
     fn memory_bytes(&self) -> u64 {
-        // Heights, steps, components and the search for a detour; samples of the current runs; the cells seen by each run, and its search.
+        // Heights, steps, components and the search for a detour; the cells seen by each run, and its search; samples of the current runs.
         let seen = self.lead.parameters.sensing_radius_m.map_or(0, |_| 60 * rayon::current_num_threads() as u64);
-        (256 << 20) + (60 + seen) * self.field.cells
+        let runs = self.routes.count.saturating_mul(self.lead.count as usize);
+        let samples = at_once().min(runs) as f64 * self.samples_each() * BYTES_PER_SAMPLE;
+        ((128 << 20) + (60 + seen) * self.field.cells).saturating_add(samples as u64)
     }
 
     fn estimate(&self) -> Estimate {
@@ -421,27 +441,40 @@ impl Job for NavigateJob {
             place: Place::read(&work.parent(&self.field.item, PLACE)?, &copy.geometry)?,
         };
         let found = planned.routes.iter().filter(|route| route.points_m.len() > 1);
-        let runs: Vec<(&PlannedRoute, u32)> =
+        let mut runs: Vec<(&PlannedRoute, u32)> =
             found.flat_map(|route| (0..self.lead.count).map(move |run| (route, run))).collect();
-        let led: Result<Vec<Led>, JobError> =
-            runs.into_par_iter().map(|(route, run)| self.lead(work, &site, route, run)).collect();
-        let mut led = led?;
         // Ids sort as text: -100 comes before -99.
-        led.sort_by(|a, b| a.row.run_id.cmp(&b.row.run_id));
-        let products = led.iter_mut().flat_map(|led| std::mem::take(&mut led.products)).collect();
-        let mut outcome = Outcome { products, notes: notes(&led, &planned) };
-        outcome.write_rows(work, led.iter_mut().flat_map(|led| std::mem::take(&mut led.samples)))?;
-        outcome.write_rows(work, led.iter_mut().flat_map(|led| std::mem::take(&mut led.events)))?;
-        outcome.write_rows(work, led.into_iter().map(|led| led.row))?;
+        runs.sort_by_cached_key(|(route, run)| self.run_id(route.index, *run));
+        let (mut samples, mut events) = (RowWriter::new(work), RowWriter::new(work));
+        let (mut products, mut rows) = (Vec::new(), Vec::with_capacity(runs.len()));
+        for runs in runs.chunks(at_once()) {
+            let led: Result<Vec<Led>, JobError> =
+                runs.par_iter().map(|&(route, run)| self.lead(work, &site, route, run)).collect();
+            for led in led? {
+                products.extend(led.products);
+                samples.push(led.samples)?;
+                events.push(led.events)?;
+                rows.push(led.row);
+            }
+        }
+        let mut outcome = Outcome { products, notes: notes(&rows, &planned) };
+        samples.finish(&mut outcome)?;
+        events.finish(&mut outcome)?;
+        outcome.write_rows(work, rows)?;
         Ok(outcome)
     }
 }
 
+/// Runs that are led at once, at least one for each thread.
+fn at_once() -> usize {
+    RUNS_AT_ONCE.max(rayon::current_num_threads())
+}
+
 /// Notes on runs that did not arrive, and on pairs without a route.
-fn notes(led: &[Led], planned: &PlannedRoutes) -> Vec<String> {
+fn notes(rows: &[FormationRow], planned: &PlannedRoutes) -> Vec<String> {
     let missing = planned.routes.iter().filter(|route| route.points_m.is_empty()).count();
-    let count = |outcome: &str| led.iter().filter(|led| led.row.outcome == outcome).count();
-    let (pairs, teams) = (counted(planned.routes.len(), "start-goal pair"), counted(led.len(), "team"));
+    let count = |outcome: &str| rows.iter().filter(|row| row.outcome == outcome).count();
+    let (pairs, teams) = (counted(planned.routes.len(), "start-goal pair"), counted(rows.len(), "team"));
     let notes = [
         (missing, format!("{missing} of {pairs} had no route for a team to follow")),
         (count("stuck"), format!("{} of {teams} got stuck", count("stuck"))),
