@@ -169,6 +169,30 @@ fn val_pipes_and_devices_are_refused_as_input() {
     }
 }
 
+/// An output takes the place of the file that has its name. A pipe, a device or a link stays, and is refused before any work.
+#[cfg(unix)]
+#[test]
+fn val_pipes_devices_and_links_are_not_replaced() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    assert!(Command::new("mkfifo").arg(path.join("pipe.tif")).status().unwrap().success());
+    fs::write(path.join("kept.tif"), b"kept").unwrap();
+    std::os::unix::fs::symlink("kept.tif", path.join("link.tif")).unwrap();
+    std::os::unix::fs::symlink("/dev/null", path.join("device.tif")).unwrap();
+    for (output, kind) in
+        [("pipe.tif", "pipe or device"), ("link.tif", "symbolic link"), ("device.tif", "symbolic link")]
+    {
+        for arguments in [vec!["terrain", "gap", "-o", output], vec!["convert", "d.asc", output]] {
+            let call = sastrugi_in(path, &arguments);
+            let words = format!("{output}: is a {kind}, which the output would replace");
+            assert!(call.code == 2 && call.stderr.contains(&words), "{arguments:?}: {} {}", call.code, call.stderr);
+            assert!(!fs::symlink_metadata(path.join(output)).unwrap().is_file(), "{output}");
+        }
+    }
+    assert_eq!(fs::read(path.join("kept.tif")).unwrap(), b"kept");
+}
+
 /// A folder in place of a DEM is called a folder, on the command line and in a study.
 #[test]
 fn val_folders_are_refused_as_input() {

@@ -40,10 +40,10 @@ pub fn check_place(place: &Path) -> Result<(), Error> {
     }
 }
 
-/// Refuses an output that is not a path on this machine.
+/// Refuses an output that is not a path on this machine, or that is a link, a pipe or a device.
 ///
 /// # Errors
-/// An address or an empty path.
+/// An address, an empty path, or the name of something other than a file or a folder.
 pub fn check_local(output: &Path) -> Result<(), Error> {
     if output.as_os_str().is_empty() {
         return Err(Error::Usage("the path is empty; name a file or folder".to_owned()));
@@ -52,7 +52,10 @@ pub fn check_local(output: &Path) -> Result<(), Error> {
         let advice = "this output must be a path on this machine (only the program's `run` and `merge` write to an object store, s3://bucket/prefix)";
         return Err(Error::Usage(format!("{}: {advice}", output.display())));
     }
-    Ok(())
+    if output.is_dir() {
+        return Ok(());
+    }
+    sastrugi_store::atomic::check_replaced(output).map_err(|e| Error::Usage(format!("{}: {e}", output.display())))
 }
 
 /// Makes a release: in its folder, or in the work area and then in an object store. `make` gets the folder, the work area, and whether to

@@ -176,6 +176,20 @@ impl Drop for AtomicFile {
     }
 }
 
+/// Refuses an output whose name a link, a pipe or a device has: [`AtomicFile`] would put a file in its place, even in that of `/dev/stdout`.
+///
+/// # Errors
+/// One of kind `InvalidInput`.
+pub fn check_replaced(path: &Path) -> io::Result<()> {
+    let Ok(found) = fs::symlink_metadata(path) else { return Ok(()) };
+    if found.is_file() || found.is_dir() {
+        return Ok(());
+    }
+    let kind = if found.is_symlink() { "symbolic link" } else { "pipe or device" };
+    let message = format!("is a {kind}, which the output would replace; remove it or choose another name");
+    Err(io::Error::new(io::ErrorKind::InvalidInput, message))
+}
+
 /// A complete file on disk that has no name yet. Dropped without [`FinishedFile::put_in_place`], it leaves nothing behind.
 #[derive(Debug)]
 pub struct FinishedFile {
@@ -344,6 +358,29 @@ mod tests {
         write(&path, b"again").unwrap();
         assert_eq!(fs::read(&path).unwrap(), b"again");
         assert_eq!(fs::read_dir(folder.path().join("a")).unwrap().count(), 1);
+    }
+
+    /// Links, pipes and devices are not to be replaced.
+    #[cfg(unix)]
+    #[test]
+    fn val_only_files_may_be_replaced() {
+        use std::os::unix::{fs::symlink, net::UnixListener};
+        let folder = tempfile::tempdir().unwrap();
+        let path = |name: &str| folder.path().join(name);
+        fs::write(path("file"), b"first").unwrap();
+        symlink(path("file"), path("link")).unwrap();
+        symlink(path("nothing"), path("dangling")).unwrap();
+        let _listens = UnixListener::bind(path("socket")).unwrap();
+        for (name, kind) in [("link", "symbolic link"), ("dangling", "symbolic link"), ("socket", "pipe or device")] {
+            let refused = check_replaced(&path(name)).unwrap_err();
+            assert_eq!(
+                refused.to_string(),
+                format!("is a {kind}, which the output would replace; remove it or choose another name")
+            );
+        }
+        for name in ["file", "nothing", "."] {
+            check_replaced(&path(name)).unwrap();
+        }
     }
 
     /// A file that is finished but not put in place leaves the one of that name alone, and nothing behind.
