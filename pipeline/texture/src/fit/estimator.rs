@@ -251,8 +251,11 @@ impl<'a> Estimator<'a> {
     /// Fits to other data in the same bins, starting from an estimate and with its weights; for resampling.
     pub fn refits<'e>(&'e self, estimate: &'e Estimate) -> Refits<'e> {
         let weights = estimate.likelihood.as_ref().map(|l| &l.weights);
-        let slopes = slopes(&estimate.at, |p| self.misfit(&estimate.form, p, weights, &self.bins.covariance_m2));
-        Refits { estimator: self, estimate, chord: Chord::new(slopes) }
+        let start = self.mean(&self.case.coordinates(&estimate.form).decode(&estimate.at));
+        let data = &self.bins.covariance_m2;
+        let here = self.whitened(&start, weights, data);
+        let slopes = slopes(&estimate.at, &here, |p| self.misfit(&estimate.form, p, weights, data));
+        Refits { estimator: self, estimate, start, chord: Chord::new(slopes) }
     }
 
     /// One of [`Self::refits`].
@@ -291,17 +294,23 @@ impl<'a> Estimator<'a> {
 pub struct Refits<'e> {
     estimator: &'e Estimator<'e>,
     estimate: &'e Estimate,
+    /// The estimate in each bin, trimmed like the data of the case, m2: where every search begins, and the same for all resampled blocks.
+    start: Vec<f64>,
     chord: Option<Chord>,
 }
 
 impl Refits<'_> {
     /// The fit to these bins, trimmed at `threshold_m`.
     pub fn to(&self, data: &[f64], threshold_m: f64) -> Minimum {
-        let Self { estimator, estimate, chord } = self;
+        let Self { estimator, estimate, start, chord } = self;
         let coordinates = estimator.case.coordinates(&estimate.form);
         let weights = estimate.likelihood.as_ref().map(|l| &l.weights);
-        let residuals = |p: &[f64]| {
-            estimator.whitened(&estimator.expectation.mean(&coordinates.decode(p), threshold_m), weights, data)
+        let is_trimmed_alike = threshold_m == estimator.case.survey.trim.threshold_m;
+        let residuals = |p: &[f64]| match is_trimmed_alike && p == estimate.at {
+            true => estimator.whitened(start, weights, data),
+            false => {
+                estimator.whitened(&estimator.expectation.mean(&coordinates.decode(p), threshold_m), weights, data)
+            }
         };
         let bounds = coordinates.bounds();
         let near = chord.as_ref().and_then(|chord| chord.minimise(&estimate.at, &bounds, residuals));

@@ -73,18 +73,14 @@ pub fn curvature(at: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64>
 
 /// `J'J` (row-major) and `J'r`.
 fn normal_equations(at: &[f64], r: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> (Vec<f64>, Vec<f64>) {
-    let slopes = slopes_from(at, r, residuals);
+    let slopes = slopes(at, r, residuals);
     let normal = slopes.iter().flat_map(|a| slopes.iter().map(move |b| dot(a, b))).collect();
     let gradient = slopes.iter().map(|a| dot(a, r)).collect();
     (normal, gradient)
 }
 
-/// The columns of J at a point.
-pub fn slopes(at: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
-    slopes_from(at, &residuals(at), &residuals)
-}
-
-fn slopes_from(at: &[f64], here: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
+/// The columns of J at a point with the residuals `here`.
+pub fn slopes(at: &[f64], here: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
     let slope = |k: usize| -> Vec<f64> {
         let mut moved = at.to_vec();
         moved[k] += DIFFERENCE;
@@ -125,20 +121,21 @@ impl Chord {
         bounds: &[(f64, f64)],
         residuals: impl Fn(&[f64]) -> Vec<f64>,
     ) -> Option<Minimum> {
-        let near = self.descend(start, bounds, CHORD_CONVERGED[0], &residuals)?;
-        let own = Self::new(slopes(&near.at, &residuals))?;
-        own.descend(&near.at, bounds, CHORD_CONVERGED[1], &residuals)
+        let (near, here) = self.descend(start, residuals(start), bounds, CHORD_CONVERGED[0], &residuals)?;
+        let own = Self::new(slopes(&near.at, &here, &residuals))?;
+        own.descend(&near.at, here, bounds, CHORD_CONVERGED[1], &residuals).map(|(end, _)| end)
     }
 
+    /// The minimum, and the residuals there, from a start with the residuals `here`.
     fn descend(
         &self,
         start: &[f64],
+        mut here: Vec<f64>,
         bounds: &[(f64, f64)],
         converged: f64,
         residuals: impl Fn(&[f64]) -> Vec<f64>,
-    ) -> Option<Minimum> {
+    ) -> Option<(Minimum, Vec<f64>)> {
         let mut at = start.to_vec();
-        let mut here = residuals(&at);
         for steps in 1..=CHORD_STEPS {
             let gradient: Vec<f64> = self.slopes.iter().map(|s| dot(s, &here)).collect();
             let step = self.normal.solve(&gradient);
@@ -150,7 +147,7 @@ impl Chord {
             let moved = step.iter().fold(0.0, |m: f64, s| m.max(s.abs()));
             let (before, value) = (dot(&here, &here), dot(&there, &there));
             if moved <= converged {
-                return Some(Minimum { value, at: next, steps });
+                return Some((Minimum { value, at: next, steps }, there));
             }
             if value > before {
                 return None;
@@ -306,7 +303,7 @@ mod tests {
         let bounds = [(-5.0, 5.0), (-5.0, 5.0)];
         let exact = minimise(&[0.0, 0.0], &bounds, residuals);
         let start = [exact.at[0] + 0.1, exact.at[1] - 0.1];
-        let chord = Chord::new(slopes(&start, residuals)).unwrap();
+        let chord = Chord::new(slopes(&start, &residuals(&start), residuals)).unwrap();
         let near = chord.minimise(&start, &bounds, residuals).unwrap();
         for k in 0..2 {
             assert!((near.at[k] - exact.at[k]).abs() < 1e-4, "{:?} {:?}", near.at, exact.at);
