@@ -18,6 +18,7 @@
 
 use sastrugi_statistics::normal;
 use std::f64::consts::PI;
+use std::sync::LazyLock;
 
 /// Correlation above which the integral replaces the series.
 const SERIES_MAX: f64 = 0.95;
@@ -38,8 +39,12 @@ pub struct TrimmedNormal {
     second_moment: f64,
     /// Squared coefficient of degree n: of the indicator for even n, of the trimmed variable for odd n.
     squares: Vec<f64>,
-    nodes: Vec<(f64, f64)>,
 }
+
+/// Nodes and weights of the integral.
+static QUADRATURE: LazyLock<Vec<(f64, f64)>> = LazyLock::new(|| gauss_legendre(NODES));
+/// For each degree n below [`TERMS`], `sqrt(n)` and `sqrt(n / (n - 1))`.
+static ROOTS: LazyLock<Vec<[f64; 2]>> = LazyLock::new(|| (0..TERMS).map(roots).collect());
 
 impl TrimmedNormal {
     /// Trimming at `t` standard deviations, `t > 0`, be it infinite.
@@ -48,7 +53,7 @@ impl TrimmedNormal {
         let t = if t > NOTHING_TRIMMED { NOTHING_TRIMMED } else { t };
         let (density, mass) = (normal::pdf(t), normal::central(t));
         let second_moment = mass - 2.0 * t * density;
-        Self { t, density, mass, second_moment, squares: squares(t, density, mass), nodes: gauss_legendre(NODES) }
+        Self { t, density, mass, second_moment, squares: squares(t, density, mass) }
     }
 
     /// T: mean product of the surviving pairs; `rho` in [-1, 1] (values beyond are clamped).
@@ -89,7 +94,7 @@ impl TrimmedNormal {
         }
         let (t, t2) = (self.t, self.t * self.t);
         let (mut pairs_lost, mut product_lost) = (0.0, 0.0);
-        for &(node, weight) in &self.nodes {
+        for &(node, weight) in QUADRATURE.iter() {
             let (theta, step) = (0.5 * end * (1.0 + node), 0.5 * end * weight);
             let (sin, cos) = libm::sincos(theta);
             let tan_half = sin / (1.0 + cos);
@@ -115,16 +120,22 @@ fn squares(t: f64, density: f64, mass: f64) -> Vec<f64> {
     let mut squares = vec![mass * mass, (mass - 2.0 * t * density) * (mass - 2.0 * t * density)];
     // Normalised Hermite polynomials of degrees n - 2 and n - 1 at t.
     let (mut before, mut last) = (1.0, t);
+    let of_degree: &[[f64; 2]] = &ROOTS;
     for n in 2..TERMS {
-        let degree = n as f64;
-        let next = (t * last - (degree - 1.0).sqrt() * before) / degree.sqrt();
-        let coefficient =
-            if n % 2 == 0 { last / degree.sqrt() } else { next + (degree / (degree - 1.0)).sqrt() * before };
+        let ([smaller, _], [root, ratio]) = (of_degree[n - 1], of_degree[n]);
+        let next = (t * last - smaller * before) / root;
+        let coefficient = if n % 2 == 0 { last / root } else { next + ratio * before };
         let scaled = 2.0 * density * coefficient;
         squares.push(scaled * scaled);
         (before, last) = (last, next);
     }
     squares
+}
+
+/// `sqrt(n)` and `sqrt(n / (n - 1))`.
+fn roots(n: usize) -> [f64; 2] {
+    let degree = n as f64;
+    [degree.sqrt(), (degree / (degree - 1.0)).sqrt()]
 }
 
 /// Nodes and weights of Gauss-Legendre quadrature on [-1, 1], by Newton's method on the recurrence.
