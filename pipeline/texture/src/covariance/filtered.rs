@@ -55,7 +55,7 @@ pub struct LagField {
 impl LagField {
     /// Value at a lag in cells.
     pub fn at(&self, lag: [isize; 2]) -> f64 {
-        let [row, col] = [0, 1].map(|k| lag[k].rem_euclid(self.shape[k] as isize) as usize);
+        let [row, col] = [0, 1].map(|k| wrapped(lag[k], self.shape[k]));
         self.values[row * self.shape[1] + col]
     }
 
@@ -63,6 +63,13 @@ impl LagField {
     pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
         Self { shape: self.shape, values: self.values.iter().map(|v| f(*v)).collect() }
     }
+}
+
+/// The place of a lag on a torus of `cells`.
+fn wrapped(lag: isize, cells: usize) -> usize {
+    let place = if lag < 0 { lag + cells as isize } else { lag };
+    // Nearly all lags are shorter than the torus, and a remainder takes longer than all the rest of a look-up.
+    if (0..cells as isize).contains(&place) { place as usize } else { lag.rem_euclid(cells as isize) as usize }
 }
 
 impl DetrendFilter {
@@ -195,4 +202,18 @@ fn complete_window(window: BoxWindow, shape: [usize; 2]) -> Vec<f64> {
     }
     kernel[0] += 1.0;
     kernel
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Against the remainder itself, several times around.
+    #[test]
+    fn prop_lags_wrap_around() {
+        for cells in 1..=9 {
+            (-40..=40)
+                .for_each(|lag| assert_eq!(wrapped(lag, cells), lag.rem_euclid(cells as isize) as usize, "{lag}"));
+        }
+    }
 }
