@@ -158,10 +158,15 @@ pub(crate) fn blur(spectrum: &mut HalfSpectrum, cell_m: [f64; 2], spread_m: f64)
 /// A covariance on a torus of `shape` cells, each lag taken the shorter way around.
 pub(crate) fn torus_covariance(shape: [usize; 2], cell_m: [f64; 2], model: &Covariance) -> Vec<f64> {
     let [rows, cols] = shape;
+    let by_lag = model.by_lag();
+    let is_symmetric = cell_m[0] == cell_m[1] && model.is_isotropic();
     let mut field = vec![0.0; rows * cols];
     for row in 0..=rows / 2 {
-        let at = |col: isize| model.at(lag_m([row as isize, col], cell_m));
-        let east: Vec<f64> = (0..=cols as isize / 2).map(at).collect();
+        let at = |col: isize| by_lag(lag_m([row as isize, col], cell_m));
+        // A lag whose row and column are swapped is as long, to the last bit, and was stored with its row.
+        let stored = if is_symmetric && 2 * row < cols { row } else { 0 };
+        let swapped = (0..stored).map(|col| field[col * cols + row]);
+        let east: Vec<f64> = swapped.chain((stored as isize..=cols as isize / 2).map(at)).collect();
         let west: Vec<f64> = match model.is_isotropic() {
             true => east.clone(),
             false => (0..=cols as isize / 2).map(|c| at(-c)).collect(),
@@ -207,6 +212,25 @@ fn complete_window(window: BoxWindow, shape: [usize; 2]) -> Vec<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::covariance::Form;
+
+    /// Every cell of an isotropic covariance has the bits of the model at its lag, on tori and cells of any shape.
+    #[test]
+    fn prop_a_torus_holds_the_model_itself() {
+        for name in ["exponential", "matern+nugget", "exponential+gaussian", "self_affine"] {
+            let model = Form::parse(name).unwrap().unit();
+            for (shape, cell_m) in
+                [([12, 12], [0.3; 2]), ([9, 16], [0.7; 2]), ([16, 9], [0.7; 2]), ([8, 10], [0.3, 0.7])]
+            {
+                for (k, value) in torus_covariance(shape, cell_m, &model).into_iter().enumerate() {
+                    let lag = [k / shape[1], k % shape[1]];
+                    let shorter = [0, 1].map(|axis| lag[axis].min(shape[axis] - lag[axis]) as isize);
+                    let expected = model.at(lag_m(shorter, cell_m));
+                    assert_eq!(value.to_bits(), expected.to_bits(), "{name}, {shape:?}, {lag:?}");
+                }
+            }
+        }
+    }
 
     /// Against the remainder itself, several times around.
     #[test]

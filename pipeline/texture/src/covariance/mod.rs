@@ -108,14 +108,38 @@ impl Covariance {
         self.structures.iter().map(term).sum::<f64>() + nugget
     }
 
-    /// Effective length of a lag `[east, north]`: rho', m.
-    pub fn distance_m(&self, [x, y]: [f64; 2]) -> f64 {
-        if self.is_isotropic() {
-            return (x * x + y * y).sqrt();
+    /// [`Self::at_distance`] for many distances: what depends on the parameters alone is computed once.
+    pub(crate) fn by_distance(&self) -> impl Fn(f64) -> f64 + Send + Sync + use<> {
+        let term = |s: &Structure| (s.sigma_m * s.sigma_m, s.range_m, s.model.of_shape(s.shape));
+        let terms: Vec<_> = self.structures.iter().map(term).collect();
+        let nugget_m2 = self.nugget_m2;
+        move |distance_m| {
+            let nugget = if distance_m == 0.0 { nugget_m2 } else { 0.0 };
+            let all = terms.iter().map(|(sill_m2, range_m, correlation)| sill_m2 * correlation(distance_m / range_m));
+            all.sum::<f64>() + nugget
         }
-        let (sin, cos) = libm::sincos(self.azimuth_deg.to_radians());
-        let (along, across) = (x * sin + y * cos, (x * cos - y * sin) / self.ratio);
-        (along * along + across * across).sqrt()
+    }
+
+    /// [`Self::at`] for many lags.
+    pub(crate) fn by_lag(&self) -> impl Fn([f64; 2]) -> f64 + Send + Sync + use<> {
+        let (length_m, covariance) = (self.lengths(), self.by_distance());
+        move |lag_m| covariance(length_m(lag_m))
+    }
+
+    /// Effective length of a lag `[east, north]`: rho', m.
+    pub fn distance_m(&self, lag_m: [f64; 2]) -> f64 {
+        self.lengths()(lag_m)
+    }
+
+    /// The effective length as a function of the lag.
+    fn lengths(&self) -> impl Fn([f64; 2]) -> f64 + Send + Sync + use<> {
+        let axis = (!self.is_isotropic()).then(|| libm::sincos(self.azimuth_deg.to_radians()));
+        let ratio = self.ratio;
+        move |[x, y]| {
+            let Some((sin, cos)) = axis else { return (x * x + y * y).sqrt() };
+            let (along, across) = (x * sin + y * cos, (x * cos - y * sin) / ratio);
+            (along * along + across * across).sqrt()
+        }
     }
 
     /// True if the range is the same in all directions.

@@ -88,8 +88,8 @@ impl Expectation<'_> {
         if inner_scale_m > 0.0 || !model.is_isotropic() {
             return self.partial.correction(measured);
         }
-        let noise = noise.covariance();
-        self.partial_by_distance.correction(|distance_m| model.at_distance(distance_m) + noise.at_distance(distance_m))
+        let (model, noise) = (model.by_distance(), noise.covariance());
+        self.partial_by_distance.correction(|distance_m| model(distance_m) + noise.at_distance(distance_m))
     }
 
     /// Covariance of the bins' estimates, row-major, m4.

@@ -9,6 +9,7 @@ use sastrugi_schemas::Kind;
 use sastrugi_schemas::kind::schema_of;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::sync::OnceLock;
 
 /// Parameters of the Matern model in a fit file.
 #[derive(Clone, Debug, Serialize, Deserialize, JsonSchema)]
@@ -37,7 +38,12 @@ impl Model for Matern {
     }
 
     fn correlation(&self, ratio: f64, shape: f64) -> f64 {
-        correlation(ratio, shape)
+        Order::new(shape).correlation(ratio)
+    }
+
+    fn of_shape(&'static self, shape: f64) -> Box<dyn Fn(f64) -> f64 + Send + Sync> {
+        let order = Order::new(shape);
+        Box::new(move |ratio| order.correlation(ratio))
     }
 
     fn shape(&self) -> Option<Shape> {
@@ -81,16 +87,50 @@ const RATIO_MIN: f64 = 1e-140;
 /// Ratio above which the correlation is taken as 0.
 const RATIO_MAX: f64 = 700.0;
 
-fn correlation(x: f64, nu: f64) -> f64 {
-    if x < RATIO_MIN {
-        return 1.0;
+/// The model of one smoothness. What depends on it alone is computed once, and only if it is needed.
+struct Order {
+    /// Smoothness nu.
+    nu: f64,
+    /// Gamma(nu).
+    gamma: OnceLock<f64>,
+    /// Steps of the recurrence up to nu.
+    steps: usize,
+    /// Order in [-1/2, 1/2] at which it starts.
+    mu: f64,
+    /// Temme's series at that order.
+    temme: OnceLock<Temme>,
+}
+
+impl Order {
+    fn new(nu: f64) -> Self {
+        let steps = (nu + 0.5) as usize;
+        Self { nu, gamma: OnceLock::new(), steps, mu: nu - steps as f64, temme: OnceLock::new() }
     }
-    if x > RATIO_MAX {
-        return 0.0;
+
+    fn correlation(&self, x: f64) -> f64 {
+        if x < RATIO_MIN {
+            return 1.0;
+        }
+        if x > RATIO_MAX {
+            return 0.0;
+        }
+        let gamma = self.gamma.get_or_init(|| libm::tgamma(self.nu));
+        let scale = libm::exp((1.0 - self.nu) * std::f64::consts::LN_2 + self.nu * libm::log(x)) / gamma;
+        // Rounding must not lift a correlation above 1.
+        (scale * self.bessel_k(x)).min(1.0)
     }
-    let scale = libm::exp((1.0 - nu) * std::f64::consts::LN_2 + nu * libm::log(x)) / libm::tgamma(nu);
-    // Rounding must not lift a correlation above 1.
-    (scale * bessel_k(nu, x)).min(1.0)
+
+    /// [`bessel_k`] of this order.
+    fn bessel_k(&self, x: f64) -> f64 {
+        let (mut now, mut next) = match x < 2.0 {
+            true => self.temme.get_or_init(|| Temme::new(self.mu)).at(x),
+            false => steed(self.mu, x),
+        };
+        for k in 1..=self.steps {
+            (now, next) = (next, now + 2.0 * (self.mu + k as f64) / x * next);
+        }
+        now
+    }
 }
 
 /// Largest number of terms of the series and of the continued fraction.
@@ -102,46 +142,57 @@ const ROUNDING: f64 = 1e-16;
 /// continued fraction (Thompson and Barnett, 1987) otherwise, at an order in [-1/2, 1/2], then forward recurrence. Relative
 /// error about 1e-14.
 pub fn bessel_k(nu: f64, x: f64) -> f64 {
-    let steps = (nu + 0.5) as usize;
-    let order = nu - steps as f64;
-    let (mut now, mut next) = if x < 2.0 { temme(order, x) } else { steed(order, x) };
-    for k in 1..=steps {
-        (now, next) = (next, now + 2.0 * (order + k as f64) / x * next);
-    }
-    now
+    Order::new(nu).bessel_k(x)
 }
 
-/// `K_mu` and `K_(mu+1)` for `|mu| <= 1/2`, `x < 2`.
-fn temme(mu: f64, x: f64) -> (f64, f64) {
-    use std::f64::consts::PI;
-    let (plus, minus) = (1.0 / libm::tgamma(1.0 + mu), 1.0 / libm::tgamma(1.0 - mu));
-    let half_sum = 0.5 * (minus + plus);
-    let half_difference = if mu.abs() < 1e-5 { -EULER_GAMMA } else { (minus - plus) / (2.0 * mu) };
-    let log = -libm::log(0.5 * x);
-    let e = mu * log;
-    let angle = PI * mu;
-    let ratio = if angle.abs() < 1e-9 { 1.0 } else { angle / libm::sin(angle) };
-    let sinhc = if e.abs() < 1e-9 { 1.0 } else { libm::sinh(e) / e };
-    let mut f = ratio * (half_difference * libm::cosh(e) + half_sum * sinhc * log);
-    let power = libm::exp(e);
-    let mut p = 0.5 * power / plus;
-    let mut q = 0.5 / (power * minus);
-    let quarter = 0.25 * x * x;
-    let mut c = 1.0;
-    let (mut sum, mut sum_next) = (f, p);
-    for k in 1..TERMS {
-        let k = k as f64;
-        f = (k * f + p + q) / (k * k - mu * mu);
-        c *= quarter / k;
-        p /= k - mu;
-        q /= k + mu;
-        sum += c * f;
-        sum_next += c * (p - k * f);
-        if (c * f).abs() < ROUNDING * sum.abs() {
-            break;
-        }
+/// Temme's series: `K_mu` and `K_(mu+1)` for `|mu| <= 1/2`, `x < 2`.
+struct Temme {
+    mu: f64,
+    /// `1 / Gamma(1 + mu)` and `1 / Gamma(1 - mu)`, half their sum, and half their difference over mu.
+    plus: f64,
+    minus: f64,
+    half_sum: f64,
+    half_difference: f64,
+    /// `pi mu / sin(pi mu)`.
+    ratio: f64,
+}
+
+impl Temme {
+    fn new(mu: f64) -> Self {
+        let (plus, minus) = (1.0 / libm::tgamma(1.0 + mu), 1.0 / libm::tgamma(1.0 - mu));
+        let half_sum = 0.5 * (minus + plus);
+        let half_difference = if mu.abs() < 1e-5 { -EULER_GAMMA } else { (minus - plus) / (2.0 * mu) };
+        let angle = std::f64::consts::PI * mu;
+        let ratio = if angle.abs() < 1e-9 { 1.0 } else { angle / libm::sin(angle) };
+        Self { mu, plus, minus, half_sum, half_difference, ratio }
     }
-    (sum, sum_next * 2.0 / x)
+
+    fn at(&self, x: f64) -> (f64, f64) {
+        let Self { mu, plus, minus, half_sum, half_difference, ratio } = *self;
+        let log = -libm::log(0.5 * x);
+        let e = mu * log;
+        let sinhc = if e.abs() < 1e-9 { 1.0 } else { libm::sinh(e) / e };
+        let mut f = ratio * (half_difference * libm::cosh(e) + half_sum * sinhc * log);
+        let power = libm::exp(e);
+        let mut p = 0.5 * power / plus;
+        let mut q = 0.5 / (power * minus);
+        let quarter = 0.25 * x * x;
+        let mut c = 1.0;
+        let (mut sum, mut sum_next) = (f, p);
+        for k in 1..TERMS {
+            let k = k as f64;
+            f = (k * f + p + q) / (k * k - mu * mu);
+            c *= quarter / k;
+            p /= k - mu;
+            q /= k + mu;
+            sum += c * f;
+            sum_next += c * (p - k * f);
+            if (c * f).abs() < ROUNDING * sum.abs() {
+                break;
+            }
+        }
+        (sum, sum_next * 2.0 / x)
+    }
 }
 
 /// `K_mu` and `K_(mu+1)` for `|mu| <= 1/2`, `x >= 2`.
@@ -182,6 +233,21 @@ const EULER_GAMMA: f64 = 0.577_215_664_901_532_9;
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    fn correlation(x: f64, nu: f64) -> f64 {
+        Matern.correlation(x, nu)
+    }
+
+    /// One order for many ratios, in any sequence, gives the bits of a new one for each.
+    #[test]
+    fn prop_an_order_serves_any_ratio() {
+        for nu in [0.05, 0.3, 0.5, 0.999_999_9, 1.0, 1.3, 2.5, 4.0] {
+            let of_ratio = super::super::model("matern").unwrap().of_shape(nu);
+            for x in [0.0, 1e-150, 3.0, 0.7, 1e-6, 1.999, 2.0, 0.7, 600.0, 800.0] {
+                assert_eq!(of_ratio(x).to_bits(), correlation(x, nu).to_bits(), "nu {nu}, x {x}");
+            }
+        }
+    }
 
     /// `K_nu(x)`, computed with mpmath at 30 digits.
     #[rustfmt::skip]

@@ -17,6 +17,11 @@ pub trait Model: Sync {
     /// [`Model::shape`], and is ignored by a model without one.
     fn correlation(&self, ratio: f64, shape: f64) -> f64;
 
+    /// [`Model::correlation`] for one shape, as a function of the ratio: what depends on the shape alone is computed once.
+    fn of_shape(&'static self, shape: f64) -> Box<dyn Fn(f64) -> f64 + Send + Sync> {
+        Box::new(move |ratio| self.correlation(ratio, shape))
+    }
+
     /// The shape parameter, if the model has one in addition to sigma and b.
     fn shape(&self) -> Option<Shape> {
         None

@@ -43,6 +43,7 @@ impl Spectrum {
         // For square cells the root is of integers, so that cells at equal distance from the origin get identical values.
         let aspect = dy / dx;
         let reach = reach::reach_m(covariance, NEGLIGIBLE) / dx;
+        let covariance = covariance.by_distance();
         let values = even_spectrum([rows, cols], |r, line| {
             let y = r as f64 * aspect;
             // Beyond the reach the root is NaN, which becomes 0 as an integer.
@@ -50,7 +51,7 @@ impl Spectrum {
             let (near, far) = line.split_at_mut(within);
             for (c, v) in near.iter_mut().enumerate() {
                 let x = c as f64;
-                *v = covariance.at_distance((x * x + y * y).sqrt() * dx);
+                *v = covariance((x * x + y * y).sqrt() * dx);
             }
             far.fill(0.0);
         });
