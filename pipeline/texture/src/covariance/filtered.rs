@@ -61,7 +61,12 @@ impl LagField {
 
     /// The field with `f` applied to every value.
     pub fn map(&self, f: impl Fn(f64) -> f64) -> Self {
-        Self { shape: self.shape, values: self.values.iter().map(|v| f(*v)).collect() }
+        self.map_all(|values| values.iter().map(|v| f(*v)).collect())
+    }
+
+    /// The field with `f` applied to all values at once.
+    pub fn map_all(&self, f: impl Fn(&[f64]) -> Vec<f64>) -> Self {
+        Self { shape: self.shape, values: f(&self.values) }
     }
 }
 

@@ -27,6 +27,12 @@ const TERMS: usize = 630;
 /// Threshold beyond which nothing is trimmed: in double precision no value of a unit normal lies beyond 30, while the Hermite polynomials
 /// of the series overflow from some 50 on.
 const NOTHING_TRIMMED: f64 = 30.0;
+/// Correlations whose series are summed side by side.
+const LANES: usize = 8;
+/// Terms after which their end is checked; divides [`TERMS`], and is even.
+const TERMS_AT_ONCE: usize = 10;
+/// Power of the correlation below which a series ends.
+const POWER_MIN: f64 = 1e-14;
 /// Nodes of the integral over at most acos(0.95) = 0.32 rad.
 const NODES: usize = 20;
 
@@ -69,6 +75,46 @@ impl TrimmedNormal {
         (product.copysign(rho), pairs)
     }
 
+    /// N and P of each of many correlations. Side by side, because every power of a correlation has to wait for the one before.
+    pub fn moments_of_each(&self, rhos: &[f64]) -> Vec<(f64, f64)> {
+        let mut all = Vec::with_capacity(rhos.len());
+        for some in rhos.chunks(LANES) {
+            let mut small = [0.0; LANES];
+            for (lane, rho) in small.iter_mut().zip(some) {
+                let size = rho.abs().min(1.0);
+                // The others have no series.
+                *lane = if size <= SERIES_MAX { size } else { 0.0 };
+            }
+            let [pairs, products] = self.series_of_each(small);
+            for ((rho, product), pairs) in some.iter().zip(products).zip(pairs) {
+                let size = rho.abs().min(1.0);
+                let found = if size <= SERIES_MAX { (product, pairs) } else { self.integral(size) };
+                all.push((found.0.copysign(*rho), found.1));
+            }
+        }
+        all
+    }
+
+    /// P and N of correlations of up to [`SERIES_MAX`], each with the bits of [`Self::series`].
+    fn series_of_each(&self, rhos: [f64; LANES]) -> [[f64; LANES]; 2] {
+        let mut sums = [[0.0; LANES]; 2];
+        let mut powers = [1.0; LANES];
+        for squares in self.squares.as_chunks::<TERMS_AT_ONCE>().0 {
+            for (n, square) in squares.iter().enumerate() {
+                for lane in 0..LANES {
+                    sums[n % 2][lane] += square * powers[lane];
+                    let power = powers[lane] * rhos[lane];
+                    // A series that has ended adds zeros to its sums, which are positive.
+                    powers[lane] = if power < POWER_MIN { 0.0 } else { power };
+                }
+            }
+            if powers == [0.0; LANES] {
+                break;
+            }
+        }
+        sums
+    }
+
     /// `a_1^2`: slope of N at rho = 0.
     pub fn linear_share(&self) -> f64 {
         self.second_moment * self.second_moment
@@ -80,7 +126,7 @@ impl TrimmedNormal {
         for (n, square) in self.squares.iter().enumerate() {
             sums[n % 2] += square * power;
             power *= rho;
-            if power < 1e-14 {
+            if power < POWER_MIN {
                 break;
             }
         }
@@ -163,4 +209,25 @@ fn legendre(n: usize, x: f64) -> (f64, f64) {
         (before, last) = (last, ((2.0 * k - 1.0) * x * last - (k - 1.0) * before) / k);
     }
     (last, n as f64 * (x * last - before) / (x * x - 1.0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Side by side, whatever their number and whichever are neighbours, correlations have the bits of each alone.
+    #[test]
+    fn prop_neighbours_change_no_bit() {
+        let mut rhos = vec![0.0, -0.0, 1.0, -1.0, 1.5, 0.95, -0.95, 0.9500001, 1e-15, -1e-9, 1e-200, f64::NAN];
+        rhos.extend((0..200u32).map(|k| f64::from(k.wrapping_mul(2_654_435_761)) / 2e9 - 1.07));
+        for t in [0.0, 0.7, 1.96, 6.0, f64::INFINITY] {
+            let trimmed = TrimmedNormal::new(t);
+            let bits = |(product, pairs): (f64, f64)| [product.to_bits(), pairs.to_bits()];
+            for n in [0, 1, 7, 8, 9, 40, rhos.len()] {
+                let alone: Vec<_> = rhos[..n].iter().map(|rho| bits(trimmed.moments(*rho))).collect();
+                let found: Vec<_> = trimmed.moments_of_each(&rhos[..n]).into_iter().map(bits).collect();
+                assert_eq!(found, alone, "t {t}, {n}");
+            }
+        }
+    }
 }

@@ -56,20 +56,26 @@ impl Expectation<'_> {
         let shares = self.partial.shares();
         let added = |k: usize, bin: usize| if shares[bin] > 0.0 { partial[k] / shares[bin] } else { 0.0 };
         let maps = [complete, complete + added(0, 0)].map(|variance| trimmed(variance, threshold_m));
+        let members = &self.bins.members;
+        let covariances: Vec<f64> = members.iter().map(|m| residual.at(m.lag)).collect();
+        let whole = maps[0].moments_of_each(&covariances.iter().map(|c| correlation(*c, complete)).collect::<Vec<_>>());
+        let variance = |bin: usize| not_negative(complete + added(0, bin));
+        let in_partial = |(m, c): (&Member, &f64)| correlation(c + added(m.bin, m.bin), variance(m.bin));
+        let in_partial: Vec<f64> = match self.partial.is_empty() {
+            true => Vec::new(),
+            false => members.iter().zip(&covariances).map(in_partial).collect(),
+        };
+        let [low, high] = maps.map(|map| map.moments_of_each(&in_partial));
         let mut mean = vec![0.0; self.bins.len()];
-        for m in &self.bins.members {
-            let (share, covariance) = (shares[m.bin], residual.at(m.lag));
-            let whole = maps[0].moments(correlation(covariance, complete));
+        for (k, (m, whole)) in members.iter().zip(whole).enumerate() {
+            let share = shares[m.bin];
             let mut sums = [(1.0 - share) * complete * whole.0, (1.0 - share) * whole.1];
             if share > 0.0 {
-                let variance = not_negative(complete + added(0, m.bin));
-                let correlation = correlation(covariance + added(m.bin, m.bin), variance);
-                let [low, high] = [0, 1].map(|k| maps[k].moments(correlation));
                 // The variance lies between those of the two maps: interpolate.
                 let place = shares[0] / share;
                 let between = |low: f64, high: f64| low + (high - low) * place;
-                sums[0] += share * variance * between(low.0, high.0);
-                sums[1] += share * between(low.1, high.1);
+                sums[0] += share * variance(m.bin) * between(low[k].0, high[k].0);
+                sums[1] += share * between(low[k].1, high[k].1);
             }
             mean[m.bin] += m.weight * sums[0] / sums[1];
         }
@@ -97,7 +103,10 @@ impl Expectation<'_> {
         let residual = self.wide.residual_within_reach(&self.wide.measured_covariance(model));
         let variance = residual.at([0, 0]);
         let trimmed = trimmed(variance, threshold_m);
-        let products = residual.map(|c| variance * trimmed.moments(c / variance).0);
+        let products = residual.map_all(|all| {
+            let moments = trimmed.moments_of_each(&all.iter().map(|c| c / variance).collect::<Vec<_>>());
+            moments.into_iter().map(|(product, _)| variance * product).collect()
+        });
         let linear = residual.map(|c| trimmed.linear_share() * c);
         let [second, product_orders, linear_order] =
             [&residual, &products, &linear].map(|field| self.bartlett(&self.wide.autocorrelation(field)));
