@@ -8,7 +8,7 @@
 //!
 //! | transform of | function |
 //! |---|---|
-//! | a real field | [`RealFft2::forward`], [`RealFft2::inverse`]; [`RealFft2::inverse_of`] for a spectrum that is written column by column |
+//! | a real field | [`RealFft2::forward`], [`RealFft2::inverse`]; [`RealFft2::inverse_rows`] for its first rows only; [`RealFft2::inverse_of`] for a spectrum that is written column by column |
 //! | a field that is even in both directions, such as a covariance | [`even_spectrum`] |
 //! | complex numbers in one dimension | [`Transform`] |
 
@@ -194,6 +194,21 @@ mod tests {
         };
         let alone = run(1);
         assert!((0..40).all(|_| run(5) == alone));
+    }
+
+    /// The first rows of a field have the bits that they have among all rows, for complete and incomplete groups of rows.
+    #[test]
+    fn prop_rows_left_out_change_no_bit() {
+        for (rows, cols) in [(1, 1), (1, 10), (9, 1), (2, 2), (17, 18), (24, 13), (35, 97), (33, 40), (64, 8)] {
+            let fft = RealFft2::new(rows, cols);
+            let spectrum = fft.forward(&noise(rows * cols, "field"));
+            let bits = |field: Vec<f64>| field.into_iter().map(f64::to_bits).collect::<Vec<u64>>();
+            let all = bits(fft.inverse(spectrum.clone()));
+            for wanted in [0, 1, 7, 8, 9, rows - 1, rows, rows + 5] {
+                let expected = &all[..wanted.min(rows) * cols];
+                assert_eq!(bits(fft.inverse_rows(spectrum.clone(), wanted)), expected, "{rows}x{cols}, {wanted}");
+            }
+        }
     }
 
     #[test]

@@ -46,9 +46,10 @@ impl Plane {
         values
     }
 
-    /// The field of the half spectrum whose columns are written by `fill`.
-    pub fn inverse_of(&self, fill: impl Fn(usize, &mut [Complex64]) + Sync) -> Vec<f64> {
+    /// The first `wanted` rows of the field of the half spectrum whose columns are written by `fill`.
+    pub fn inverse_of(&self, wanted: usize, fill: impl Fn(usize, &mut [Complex64]) + Sync) -> Vec<f64> {
         let Self { rows, cols, .. } = *self;
+        let wanted = wanted.min(rows);
         // Columns 0 and `cols / 2` are real after their transforms, so one complex column holds both.
         let packed = cols.next_multiple_of(2 * LANES);
         let last = cols.is_multiple_of(2).then(|| self.column_alone(cols / 2, &fill));
@@ -64,13 +65,14 @@ impl Plane {
                 self.inverse_columns(columns, last, &mut blocks, buffers);
             },
         );
-        field
+        // Rows are transformed in complete groups, whose members share transforms.
+        field[..wanted.next_multiple_of(GROUP).min(rows) * packed]
             .par_chunks_mut(GROUP * packed)
             .for_each_init(|| self.along_row.buffers(), |buffers, group| self.inverse_rows(group, packed, buffers));
         if packed > cols {
-            (1..rows).for_each(|row| field.copy_within(row * packed..row * packed + cols, row * cols));
-            field.truncate(rows * cols);
+            (1..wanted).for_each(|row| field.copy_within(row * packed..row * packed + cols, row * cols));
         }
+        field.truncate(wanted * cols);
         field
     }
 

@@ -87,21 +87,44 @@ impl RealFft2 {
     /// Field of a spectrum. Only the Hermitian part counts: the rest of the stored columns 0 and `cols / 2` is
     /// ignored.
     pub fn inverse(&self, spectrum: HalfSpectrum) -> Vec<f64> {
+        self.inverse_rows(spectrum, self.rows)
+    }
+
+    /// The first `wanted` rows of [`Self::inverse`], with the same bits. Columns are transformed completely, rows only up to there.
+    ///
+    /// ```
+    /// use sastrugi_numeric::fft::RealFft2;
+    ///
+    /// let fft = RealFft2::new(20, 6);
+    /// let field: Vec<f64> = (0..120).map(|k| f64::from(k % 7)).collect();
+    /// let spectrum = fft.forward(&field);
+    /// assert_eq!(fft.inverse_rows(spectrum.clone(), 3), fft.inverse(spectrum)[..18]);
+    /// ```
+    pub fn inverse_rows(&self, spectrum: HalfSpectrum, wanted: usize) -> Vec<f64> {
         assert_eq!(
             (spectrum.rows, spectrum.cols),
             (self.rows, self.cols),
             "spectrum must have the shape of the transform"
         );
         let rows = self.rows;
-        self.inverse_of(|kx, column| column.copy_from_slice(&spectrum.values[kx * rows..(kx + 1) * rows]))
+        self.inverse_rows_of(wanted, |kx, column| column.copy_from_slice(&spectrum.values[kx * rows..(kx + 1) * rows]))
     }
 
     /// Field of the spectrum whose columns are written by `fill`, each of `rows` values, for column frequencies `0..=cols / 2` in
     /// any order. The half spectrum is never held completely in memory. Only its Hermitian part counts.
     pub fn inverse_of(&self, fill: impl Fn(usize, &mut [Complex64]) + Sync) -> Vec<f64> {
+        self.inverse_rows_of(self.rows, fill)
+    }
+
+    /// The first `wanted` rows of [`Self::inverse_of`], with the same bits.
+    pub fn inverse_rows_of(&self, wanted: usize, fill: impl Fn(usize, &mut [Complex64]) + Sync) -> Vec<f64> {
         match &self.kind {
-            Kind::Line(transform) => self.inverse_line(transform, fill),
-            Kind::Plane(plane) => plane.inverse_of(fill),
+            Kind::Line(transform) => {
+                let mut field = self.inverse_line(transform, fill);
+                field.truncate(wanted.min(self.rows) * self.cols);
+                field
+            }
+            Kind::Plane(plane) => plane.inverse_of(wanted, fill),
         }
     }
 
