@@ -196,10 +196,10 @@ pub(crate) fn torus_covariance(shape: [usize; 2], cell_m: [f64; 2], model: &Cova
     field
 }
 
-/// Field of a real, even spectrum in the order of a half spectrum.
-pub(super) fn inverse_real(fft: &RealFft2, [rows, cols]: [usize; 2], spectrum: &[f64]) -> Vec<f64> {
+/// The first `wanted` rows of the field of a real, even spectrum in the order of a half spectrum.
+pub(super) fn inverse_real(fft: &RealFft2, [rows, cols]: [usize; 2], spectrum: &[f64], wanted: usize) -> Vec<f64> {
     let values = spectrum.iter().map(|&s| Complex64::new(s, 0.0)).collect();
-    fft.inverse(HalfSpectrum { rows, cols, values })
+    fft.inverse_rows(HalfSpectrum { rows, cols, values }, wanted)
 }
 
 /// The kernel `1 - D` of a complete window on the torus.

@@ -187,8 +187,8 @@ impl TileSums {
     /// Sum of products and number of pairs at each stored lag.
     fn finish(self) -> impl Iterator<Item = (f64, u64)> {
         let Self { fft, shape: [rows, cols], max_lag, data_power, mask_power, .. } = self;
-        let sums = super::filtered::inverse_real(&fft, [rows, cols], &data_power);
-        let pairs = super::filtered::inverse_real(&fft, [rows, cols], &mask_power);
+        let sums = super::filtered::inverse_real(&fft, [rows, cols], &data_power, max_lag[0] + 1);
+        let pairs = super::filtered::inverse_real(&fft, [rows, cols], &mask_power, max_lag[0] + 1);
         let [max_row, max_col] = max_lag.map(|l| l as isize);
         (0..=max_row).flat_map(move |r| (-max_col..=max_col).map(move |c| (r, c))).map(move |(r, c)| {
             let k = r as usize * cols + c.rem_euclid(cols as isize) as usize;

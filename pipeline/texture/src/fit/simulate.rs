@@ -7,7 +7,7 @@
 use crate::covariance::Covariance;
 use crate::covariance::density::{self, TORUS_RANGES};
 use crate::covariance::filtered::{Measurement, blur, torus_covariance};
-use crate::synth::fft_ma::{Phase, random_spectrum};
+use crate::synth::fft_ma::{Phase, random_column};
 use sastrugi_numeric::Streams;
 use sastrugi_numeric::fft::{RealFft2, smooth_length};
 
@@ -65,18 +65,19 @@ impl Simulator {
     pub fn surface(&self, streams: &Streams) -> Vec<f64> {
         let Shape { rows, cols, profiles } = self.shape;
         if profiles {
-            let profile = |k: usize| self.field(&streams.child(&format!("profile-{k}")));
+            let profile = |k: usize| self.field(1, &streams.child(&format!("profile-{k}")));
             return (0..rows).flat_map(|k| profile(k).into_iter().take(cols)).collect();
         }
-        let field = self.field(streams);
+        let field = self.field(rows, streams);
         (0..rows).flat_map(|r| field[r * self.torus[1]..][..cols].iter().copied()).collect()
     }
 
-    /// A field on the torus.
-    fn field(&self, streams: &Streams) -> Vec<f64> {
-        let rows = self.torus[0];
-        let amplitude = |kx: usize, ky: usize| self.amplitude[kx * rows + ky];
-        self.fft.inverse(random_spectrum(self.torus, amplitude, Phase::Gaussian, streams))
+    /// The first `wanted` rows of a field on the torus.
+    fn field(&self, wanted: usize, streams: &Streams) -> Vec<f64> {
+        let [rows, cols] = self.torus;
+        self.fft.inverse_rows_of(wanted, |kx, column| {
+            random_column(kx, cols, |ky| self.amplitude[kx * rows + ky], Phase::Gaussian, streams, column);
+        })
     }
 }
 
