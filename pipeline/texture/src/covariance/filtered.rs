@@ -49,6 +49,7 @@ pub struct DetrendFilter {
 /// A covariance (or any even function of the lag) on a torus.
 pub struct LagField {
     shape: [usize; 2],
+    /// All rows of the torus, or the first ones.
     values: Vec<f64>,
 }
 
@@ -136,9 +137,14 @@ impl DetrendFilter {
 
     /// Covariance of the residual of a field with the covariance `measured`, for complete windows.
     pub fn residual_covariance(&self, measured: &LagField) -> LagField {
+        self.residual_rows(measured, self.shape[0])
+    }
+
+    /// The same for lags of 0 to `rows - 1` cells southwards only.
+    pub fn residual_rows(&self, measured: &LagField, rows: usize) -> LagField {
         let mut spectrum = self.fft.forward(&measured.values);
         spectrum.values.iter_mut().zip(&self.response).for_each(|(s, a)| *s = Complex64::new(s.re * a, 0.0));
-        LagField { shape: self.shape, values: self.fft.inverse(spectrum) }
+        LagField { shape: self.shape, values: self.fft.inverse_rows(spectrum, rows) }
     }
 
     /// `IDFT[DFT(field)^2]`: sum over u of `field(u) field(u + h)`.

@@ -49,14 +49,16 @@ impl Expectation<'_> {
     /// Expected covariance of each bin when residuals beyond `threshold_m` are trimmed, m2.
     pub fn mean(&self, model: &Covariance, threshold_m: f64) -> Vec<f64> {
         let measured = self.filter.measured_covariance(model);
-        let residual = self.filter.residual_covariance(&measured);
+        let members = &self.bins.members;
+        // Of two opposite lags, bins have the one to the south.
+        let rows = members.iter().map(|m| m.lag[0] as usize + 1).max().unwrap_or(1);
+        let residual = self.filter.residual_rows(&measured, rows);
         let partial = self.correction(model, &measured);
         let complete = not_negative(residual.at([0, 0]));
         // Pairs with partial windows have their own variance and covariance, and trimming removes a different share of them.
         let shares = self.partial.shares();
         let added = |k: usize, bin: usize| if shares[bin] > 0.0 { partial[k] / shares[bin] } else { 0.0 };
         let maps = [complete, complete + added(0, 0)].map(|variance| trimmed(variance, threshold_m));
-        let members = &self.bins.members;
         let covariances: Vec<f64> = members.iter().map(|m| residual.at(m.lag)).collect();
         let whole = maps[0].moments_of_each(&covariances.iter().map(|c| correlation(*c, complete)).collect::<Vec<_>>());
         let variance = |bin: usize| not_negative(complete + added(0, bin));
