@@ -18,6 +18,7 @@ use crate::covariance::bins::{LagBins, Member};
 use crate::covariance::filtered::{DetrendFilter, LagField, Measurement};
 use crate::covariance::partial::{ByDistance, PartialWindows};
 use crate::covariance::trimmed::TrimmedNormal;
+use rayon::prelude::*;
 
 /// Most lags that represent a bin in the covariance of the bins.
 const BIN_LAGS: usize = 16;
@@ -138,14 +139,20 @@ impl Expectation<'_> {
         let n = self.bins.len();
         let lags: Vec<Vec<[isize; 2]>> =
             self.bins.members.chunk_by(|a, b| a.bin == b.bin).map(representatives).collect();
+        let up_to = |i: usize| -> Vec<f64> {
+            let mean = |j: usize| {
+                mean_over_pairs(&lags[i], &lags[j], |[r, c], [s, d]| {
+                    autocorrelation.at([r - s, c - d]) + autocorrelation.at([r + s, c + d])
+                })
+            };
+            (0..=i).map(|j| mean(j) / self.cells as f64).collect()
+        };
+        let lower: Vec<Vec<f64>> = (0..n).into_par_iter().map(up_to).collect();
         let mut matrix = vec![0.0; n * n];
         for i in 0..n {
             for j in 0..=i {
-                let mean = mean_over_pairs(&lags[i], &lags[j], |[r, c], [s, d]| {
-                    autocorrelation.at([r - s, c - d]) + autocorrelation.at([r + s, c + d])
-                });
-                matrix[i * n + j] = mean / self.cells as f64;
-                matrix[j * n + i] = matrix[i * n + j];
+                matrix[i * n + j] = lower[i][j];
+                matrix[j * n + i] = lower[i][j];
             }
         }
         matrix
