@@ -9,6 +9,7 @@ use crate::covariance::lag::{lag_m, length_m};
 use crate::covariance::models::exponential::Exponential;
 use crate::covariance::partial::{PAIRS_FINE, PAIRS_ROUGH, PartialWindows};
 use crate::covariance::{Covariance, Form, LagBins};
+use rayon::prelude::*;
 
 /// Most rounds of reweighting by the covariance of the bins.
 const WEIGHTING_ROUNDS: usize = 4;
@@ -132,7 +133,7 @@ impl<'a> Estimator<'a> {
     /// Fits every form, starting from the uncorrected exponential fitted to the same data.
     pub fn candidates(&self, naive: &Estimate) -> Vec<Estimate> {
         let (sigma_m, range_m) = (1.2 * naive.covariance.sigma_m(), 1.5 * naive.covariance.range_m());
-        self.case.settings.forms.iter().map(|form| self.fit(form, sigma_m, range_m)).collect()
+        self.case.settings.forms.par_iter().map(|form| self.fit(form, sigma_m, range_m)).collect()
     }
 
     /// Generalised least-squares fit of a form, starting from an exponential of the given sigma and b.

@@ -229,8 +229,15 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
     let resampled = resampling::block_replicates(&estimator, estimate, &blocks, settings.bootstrap(), streams);
     let (part, at_scales) = (examined(case)?, Area::settings(case));
     let area = Area::new(part.as_ref(), case, &at_scales)?;
-    let windows = area.windows(estimate);
     let rough = (!case.heights.are_profiles()).then(|| Estimator::rough(case, &by_direction));
+    // Searches that do not depend on each other.
+    let (windows, (profile, isotropy)) = rayon::join(
+        || area.windows(estimate),
+        || {
+            let isotropy = || rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate));
+            rayon::join(|| profile::profile(&estimator, estimate), isotropy)
+        },
+    );
     let disagreement = verdicts::window_disagreement(&windows);
     let measured = settings.empirical.then(|| carried::by_map(case, estimate));
     let (map, carried) = measured.map_or_else(|| (None, carried::by_model(on_rings, estimate)), |(m, c)| (Some(m), c));
@@ -244,10 +251,10 @@ fn corrected(case: &Case, naive: &Estimate, streams: &Streams) -> Result<FitFile
         block_intervals: resampling::intervals(&estimator, estimate, &resampled),
         candidates: verdicts::candidates(&estimates, on_rings),
         without_values,
-        profile: profile::profile(&estimator, estimate).filter(profile::is_finite),
+        profile: profile.filter(profile::is_finite),
         disagreement,
         others: windows.others.iter().map(verdicts::other_window).collect(),
-        isotropy: rough.as_ref().and_then(|rough| verdicts::isotropy(rough, estimate)),
+        isotropy,
         stationarity: verdicts::stationarity(&estimator, estimate, &blocks),
         misfit_p: verdicts::misfit_p(estimate, replicates.as_ref()),
         carried: Some(carried).filter(carried::is_finite),

@@ -6,6 +6,7 @@
 
 use super::estimator::{Estimate, Estimator, Held};
 use crate::covariance::form::Role;
+use rayon::prelude::*;
 use sastrugi_schemas::fit::Profile;
 
 /// Rise of twice the log-likelihood that rules a parameter out at 95 %.
@@ -23,7 +24,7 @@ pub fn profile(estimator: &Estimator, estimate: &Estimate) -> Option<Profile> {
     let mut places: Vec<f64> =
         SHARES.iter().map(|share| (estimate.at[coordinate] + libm::log(*share)).clamp(low, high)).collect();
     places.dedup();
-    let held = places.iter().map(|at| estimator.held(estimate, coordinate, *at)).collect::<Option<Vec<Held>>>()?;
+    let held = places.par_iter().map(|at| estimator.held(estimate, coordinate, *at)).collect::<Option<Vec<Held>>>()?;
     Some(Profile {
         range_m: held.iter().map(|h| coordinates.decode(&h.at).structures[0].range_m).collect(),
         chi2_rise: held.iter().map(|h| h.rise).collect(),
@@ -43,7 +44,8 @@ pub fn ends(estimator: &Estimator, estimate: &Estimate) -> Option<[Option<Held>;
     let find = |bound: f64, step: f64| {
         end(&|at| estimator.held(estimate, coordinate, at), estimate.at[coordinate], bound, step, limit)
     };
-    Some([find(low, -std::f64::consts::LN_2), find(high, std::f64::consts::LN_2)])
+    let (below, above) = rayon::join(|| find(low, -std::f64::consts::LN_2), || find(high, std::f64::consts::LN_2));
+    Some([below, above])
 }
 
 /// Steps from `start` towards `bound` until the rise passes `limit`; returns the last fit inside.
