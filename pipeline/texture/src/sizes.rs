@@ -21,12 +21,15 @@ pub(crate) const NORMAL_CONSISTENCY: f64 = 1.482_602_218_505_602;
 pub(crate) struct Sizes {
     counts: Vec<u64>,
     total: u64,
+    /// First class with values and the one after the last, usually a quarter of all; no value: [`CLASSES`] and 0.
+    first: usize,
+    end: usize,
 }
 
 impl Sizes {
     /// An empty histogram.
     pub fn new() -> Self {
-        Self { counts: vec![0; CLASSES], total: 0 }
+        Self { counts: vec![0; CLASSES], total: 0, first: CLASSES, end: 0 }
     }
 
     /// Histogram of the values that are not NaN.
@@ -38,11 +41,21 @@ impl Sizes {
 
     /// Adds the values that are not NaN.
     pub fn add(&mut self, values: &[f64]) {
+        let (mut first, mut end) = (self.first, self.end);
         for value in values.iter().filter(|v| !v.is_nan()) {
             let class = (value.abs().to_bits() >> SHIFT).saturating_sub(FIRST) as usize;
-            self.counts[class.min(CLASSES - 1)] += 1;
+            let class = class.min(CLASSES - 1);
+            self.counts[class] += 1;
             self.total += 1;
+            (first, end) = (first.min(class), end.max(class + 1));
         }
+        (self.first, self.end) = (first, end);
+    }
+
+    /// The classes with values, and how many they hold.
+    fn counted(&self) -> impl Iterator<Item = (usize, u64)> {
+        let occupied = self.counts.get(self.first..self.end).unwrap_or_default();
+        (self.first..).zip(occupied.iter().copied()).filter(|(_, count)| *count > 0)
     }
 
     /// Number of values counted.
@@ -54,14 +67,15 @@ impl Sizes {
     pub fn with(mut self, others: &Self) -> Self {
         self.counts.iter_mut().zip(&others.counts).for_each(|(own, other)| *own += other);
         self.total += others.total;
+        (self.first, self.end) = (self.first.min(others.first), self.end.max(others.end));
         self
     }
 
     /// Root mean square of the values; NaN without any. Relative error below 1e-4.
     pub fn root_mean_square(&self) -> f64 {
-        let counted = self.counts.iter().enumerate().filter(|(_, count)| **count > 0);
-        let squares: Vec<f64> = counted
-            .map(|(class, &count)| {
+        let squares: Vec<f64> = self
+            .counted()
+            .map(|(class, count)| {
                 let [low, high] = ends(class);
                 count as f64 * (low * low + low * high + high * high) / 3.0
             })
@@ -73,7 +87,7 @@ impl Sizes {
     pub fn exceeded_by(&self, level: f64) -> f64 {
         let rank = (1.0 - level) * self.total as f64;
         let mut below = 0.0;
-        for (class, &count) in self.counts.iter().enumerate().filter(|(_, count)| **count > 0) {
+        for (class, count) in self.counted() {
             let here = count as f64;
             if below + here >= rank {
                 let [low, high] = ends(class);
@@ -128,5 +142,19 @@ mod tests {
         assert_eq!(both.exceeded_by(0.3), all.exceeded_by(0.3));
         // A value at the lower end of its class: 2 of 5 values exceed 0.5, up to the width of a class.
         assert!((both.exceeded_by(0.4) / 0.5 - 1.0).abs() < 3e-4, "{}", both.exceeded_by(0.4));
+    }
+    /// Every value lies in the classes that quantiles look at, whatever the parts in which values came.
+    #[test]
+    fn prop_no_class_is_left_out() {
+        let values = [0.5, -0.25, 3.0, f64::NAN, -7.0, 0.0, 1e300, 0.125];
+        for n in 0..=values.len() {
+            let mut parts = Sizes::of(&values[..n]);
+            parts.add(&values[n..]);
+            for sizes in [parts, Sizes::of(&values[..n]).with(&Sizes::of(&values[n..]))] {
+                let all: Vec<(usize, u64)> = (0..).zip(sizes.counts.iter().copied()).filter(|(_, n)| *n > 0).collect();
+                assert_eq!((sizes.counted().collect::<Vec<_>>(), all.len()), (all, 7));
+            }
+        }
+        assert_eq!(Sizes::new().counted().count(), 0);
     }
 }
