@@ -1,4 +1,6 @@
-//! Nonlinear least squares with a handful of parameters.
+//! Nonlinear least squares with a handful of parameters. Slopes along them are computed on several threads.
+
+use rayon::prelude::*;
 
 /// Largest number of steps.
 const STEPS: usize = 60;
@@ -24,16 +26,25 @@ pub struct Minimum {
 
 /// Minimises the sum of squared `residuals(p)` by Levenberg (1944) and Marquardt (1963), with forward differences, from
 /// `start`, inside `bounds` (steps are cut to them).
-pub fn minimise(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
+pub fn minimise(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64]) -> Vec<f64> + Sync) -> Minimum {
     search(start, bounds, TOLERANCE, residuals)
 }
 
 /// As [`minimise`], but only until the sum of squares is accurate to a millionth.
-pub fn minimise_coarsely(start: &[f64], bounds: &[(f64, f64)], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
+pub fn minimise_coarsely(
+    start: &[f64],
+    bounds: &[(f64, f64)],
+    residuals: impl Fn(&[f64]) -> Vec<f64> + Sync,
+) -> Minimum {
     search(start, bounds, ROUGH_TOLERANCE, residuals)
 }
 
-fn search(start: &[f64], bounds: &[(f64, f64)], tolerance: f64, residuals: impl Fn(&[f64]) -> Vec<f64>) -> Minimum {
+fn search(
+    start: &[f64],
+    bounds: &[(f64, f64)],
+    tolerance: f64,
+    residuals: impl Fn(&[f64]) -> Vec<f64> + Sync,
+) -> Minimum {
     let squares = |r: &[f64]| dot(r, r);
     let mut at = start.to_vec();
     let mut current = residuals(&at);
@@ -66,13 +77,13 @@ fn search(start: &[f64], bounds: &[(f64, f64)], tolerance: f64, residuals: impl 
 }
 
 /// `J'J` of the residuals at a point, row-major: half the curvature of the sum of squares.
-pub fn curvature(at: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<f64> {
+pub fn curvature(at: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64> + Sync) -> Vec<f64> {
     let here = residuals(at);
     normal_equations(at, &here, residuals).0
 }
 
 /// `J'J` (row-major) and `J'r`.
-fn normal_equations(at: &[f64], r: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> (Vec<f64>, Vec<f64>) {
+fn normal_equations(at: &[f64], r: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64> + Sync) -> (Vec<f64>, Vec<f64>) {
     let slopes = slopes(at, r, residuals);
     let normal = slopes.iter().flat_map(|a| slopes.iter().map(move |b| dot(a, b))).collect();
     let gradient = slopes.iter().map(|a| dot(a, r)).collect();
@@ -80,13 +91,13 @@ fn normal_equations(at: &[f64], r: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64
 }
 
 /// The columns of J at a point with the residuals `here`.
-pub fn slopes(at: &[f64], here: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64>) -> Vec<Vec<f64>> {
+pub fn slopes(at: &[f64], here: &[f64], residuals: impl Fn(&[f64]) -> Vec<f64> + Sync) -> Vec<Vec<f64>> {
     let slope = |k: usize| -> Vec<f64> {
         let mut moved = at.to_vec();
         moved[k] += DIFFERENCE;
         residuals(&moved).iter().zip(here).map(|(a, b)| (a - b) / DIFFERENCE).collect()
     };
-    (0..at.len()).map(slope).collect()
+    (0..at.len()).into_par_iter().map(slope).collect()
 }
 
 fn dot(a: &[f64], b: &[f64]) -> f64 {
@@ -119,7 +130,7 @@ impl Chord {
         &self,
         start: &[f64],
         bounds: &[(f64, f64)],
-        residuals: impl Fn(&[f64]) -> Vec<f64>,
+        residuals: impl Fn(&[f64]) -> Vec<f64> + Sync,
     ) -> Option<Minimum> {
         let (near, here) = self.descend(start, residuals(start), bounds, CHORD_CONVERGED[0], &residuals)?;
         let own = Self::new(slopes(&near.at, &here, &residuals))?;
@@ -133,7 +144,7 @@ impl Chord {
         mut here: Vec<f64>,
         bounds: &[(f64, f64)],
         converged: f64,
-        residuals: impl Fn(&[f64]) -> Vec<f64>,
+        residuals: impl Fn(&[f64]) -> Vec<f64> + Sync,
     ) -> Option<(Minimum, Vec<f64>)> {
         let mut at = start.to_vec();
         for steps in 1..=CHORD_STEPS {
