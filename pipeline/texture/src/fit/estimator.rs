@@ -103,7 +103,12 @@ impl<'a> Estimator<'a> {
     }
 
     fn with_pairs(case: &'a Case<'a>, bins: &'a LagBins, pairs: f64) -> Self {
-        Self::with_partial(case, bins, PartialWindows::new(&case.survey.cells(), case.window, bins, pairs))
+        #[cfg(not(test))]
+        let partial = PartialWindows::new;
+        // Studies of the estimator fit thousands of rasters, most of them with the same cells.
+        #[cfg(test)]
+        let partial = super::tests::kept::partial_windows;
+        Self::with_partial(case, bins, partial(&case.survey.cells(), case.window, bins, pairs))
     }
 
     /// The estimator with these partial windows of the case's cells.

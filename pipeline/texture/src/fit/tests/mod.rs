@@ -1,9 +1,9 @@
 mod hostile;
+pub(super) mod kept;
 mod noise;
 mod slopes;
 
 use super::*;
-use crate::bitmap::Bitmap;
 use crate::covariance::Covariance;
 use crate::covariance::partial::{PAIRS_FINE, PartialWindows};
 use crate::noise::Noise;
@@ -12,7 +12,6 @@ use crate::synth::fft_ma::{self, FftMaParameters, Phase};
 use crate::synth::tile::{Cell, TileParameters};
 use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, sums};
-use std::sync::Mutex;
 
 const CELL_M: f64 = 0.06;
 
@@ -33,67 +32,40 @@ fn settings(mode: Mode, outer_scale_m: f64, trim: f64) -> FitSettings {
     FitParameters { mode, outer_scale_m, trim, bootstrap: 0, ..FitParameters::default() }.try_into().unwrap()
 }
 
-/// All that the partial windows of a raster follow from.
-#[derive(PartialEq)]
-struct Cells {
-    side: [usize; 2],
-    half: [usize; 2],
-    lags: Vec<([isize; 2], usize)>,
-    trusted: Bitmap,
-    used: Bitmap,
+/// The estimator of the program, which keeps no partial windows of other fits.
+fn alone<'a>(case: &'a Case<'a>) -> Estimator<'a> {
+    let partial = PartialWindows::new(&case.survey.cells(), case.window, &case.bins, PAIRS_FINE);
+    Estimator::with_partial(case, &case.bins, partial)
 }
 
-/// The partial windows that [`Estimator::new`] would compute. They take most of the time of an estimate, and the fields of a study that have neither
-/// holes nor objects have the same ones: these are computed once.
-fn partial_windows(case: &Case) -> PartialWindows {
-    static KNOWN: Mutex<Vec<(Cells, PartialWindows)>> = Mutex::new(Vec::new());
-    let cells = case.survey.cells();
-    let computed = || PartialWindows::new(&cells, case.window, &case.bins, PAIRS_FINE);
-    if cells.trusted.count() < case.geometry.len() {
-        return computed();
-    }
-    let of = Cells {
-        side: [cells.rows, cells.cols],
-        half: case.window.half,
-        lags: case.bins.members.iter().map(|m| (m.lag, m.bin)).collect(),
-        trusted: cells.trusted.clone(),
-        used: cells.used.clone(),
-    };
-    let known = |of: &Cells| KNOWN.lock().unwrap().iter().find(|(other, _)| other == of).map(|(_, w)| w.clone());
-    // The lock is free meanwhile: a thread that waits for others may take up another field.
-    known(&of).unwrap_or_else(|| {
-        let windows = computed();
-        KNOWN.lock().unwrap().push((of, windows.clone()));
-        windows
-    })
-}
-
-/// The same windows, kept or computed: the estimate of a field without gaps is that of the program.
-#[test]
-fn val_kept_partial_windows_are_those_of_the_program() {
-    let s = settings(Mode::Corrected, 2.0, 0.05);
-    for seed in [1, 2] {
-        let dem = field(0.28, 256, CELL_M, seed);
-        let case = Case::new(&dem, &s).unwrap();
-        let naive = ordinary(&case, &Form::parse("exponential").unwrap());
-        let ours = best(&Estimator::new(&case, &case.bins).candidates(&naive)).unwrap().covariance.clone();
-        let found = estimate(&dem, &s);
-        assert_eq!(found.map(f64::to_bits), [ours.sigma_m(), ours.range_m()].map(f64::to_bits), "{seed}");
-    }
+/// Sigma and b without intervals and verdicts.
+fn found_by(estimator: &Estimator) -> [f64; 2] {
+    let naive = ordinary(estimator.case, &Form::parse("exponential").unwrap());
+    let covariance = best(&estimator.candidates(&naive)).unwrap().covariance.clone();
+    [covariance.sigma_m(), covariance.range_m()]
 }
 
 /// The estimate alone, without intervals and verdicts.
 fn estimate(dem: &Grid, settings: &FitSettings) -> [f64; 2] {
     let case = Case::new(dem, settings).unwrap();
-    let naive = ordinary(&case, &Form::parse("exponential").unwrap());
-    let covariance = match settings.mode() {
-        Mode::Paper => naive.covariance,
-        Mode::Corrected => {
-            let estimator = Estimator::with_partial(&case, &case.bins, partial_windows(&case));
-            best(&estimator.candidates(&naive)).unwrap().covariance.clone()
-        }
-    };
-    [covariance.sigma_m(), covariance.range_m()]
+    if settings.mode() == Mode::Corrected {
+        return found_by(&Estimator::new(&case, &case.bins));
+    }
+    let naive = ordinary(&case, &Form::parse("exponential").unwrap()).covariance;
+    [naive.sigma_m(), naive.range_m()]
+}
+
+/// The same windows, kept or computed: estimates are those of the program, with holes too, whether the windows are new, known from another
+/// field, or known from the same one.
+#[test]
+fn val_kept_partial_windows_are_those_of_the_program() {
+    let s = settings(Mode::Corrected, 2.0, 0.05);
+    for (seed, spoil) in [(1, untouched as Spoil), (2, untouched), (2, scattered), (2, scattered), (1, blocky)] {
+        let mut dem = field(0.28, 256, CELL_M, seed);
+        spoil(&mut dem, seed);
+        let ours = found_by(&alone(&Case::new(&dem, &s).unwrap()));
+        assert_eq!(estimate(&dem, &s).map(f64::to_bits), ours.map(f64::to_bits), "{seed}");
+    }
 }
 
 /// A change made to the field of a seed before it is fitted.
@@ -385,14 +357,14 @@ fn stat_transects_are_fitted_in_one_dimension() {
     assert!(refused.to_string().contains("a transect has only one direction"), "{refused}");
 }
 
-/// Results are identical to the bit for any number of threads.
+/// Results are identical to the bit for any number of threads. Nothing that one number of threads computed is kept for the other.
 #[test]
 fn prop_threads_change_no_bit() {
     let mut dem = field(0.28, 256, CELL_M, 1);
     blocky(&mut dem, 1);
     let run = |threads| {
         let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
-        pool.install(|| estimate(&dem, &settings(Mode::Corrected, 2.0, 0.05)))
+        pool.install(|| found_by(&alone(&Case::new(&dem, &settings(Mode::Corrected, 2.0, 0.05)).unwrap())))
     };
     assert_eq!(run(1).map(f64::to_bits), run(3).map(f64::to_bits));
 }
