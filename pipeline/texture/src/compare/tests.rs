@@ -3,6 +3,7 @@ use crate::covariance::Covariance;
 use crate::covariance::filtered::Measurement;
 use crate::fit::simulate::{Shape, Simulator};
 use crate::noise::Noise;
+use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::fit::{FitFile, Intervals};
 
@@ -74,6 +75,12 @@ fn val_grids_may_differ() {
     assert!(!comparison.differs(), "{comparison:#?}");
 }
 
+/// How many of `count` comparisons each of some answers holds for. Side by side: the fit of a side takes one thread, its simulations all.
+fn counts<const N: usize>(count: usize, holds: impl Fn(usize) -> [bool; N] + Send + Sync) -> [usize; N] {
+    let all: Vec<[bool; N]> = (0..count).into_par_iter().map(holds).collect();
+    std::array::from_fn(|answer| all.iter().filter(|one| one[answer]).count())
+}
+
 /// Null: both sides have the same exponential covariance. 60 pairs of 128 x 128 cells, 119 simulations each; a pair has any wrong
 /// `different` with probability at most 0.05, so that more than 11 of 60 has a false-alarm probability of 3e-5 (binomial). A null that
 /// treated cells as independent would call nearly all pairs different. Power: 1.3 times the sigma is detected in at least 40 of 60,
@@ -83,15 +90,15 @@ fn val_grids_may_differ() {
 #[ignore = "slow: ./test --full"]
 fn stat_false_alarms_and_power() {
     let covariance = exponential(0.1, 0.12);
-    let (mut wrong, mut found, mut covered) = (0, 0, 0);
-    for k in 0..60 {
+    let of_pair = |k: usize| {
         let (a, b) = (surface(&covariance, 128, &format!("a{k}")), surface(&covariance, 128, &format!("b{k}")));
-        wrong += usize::from(compared(&a, &b, 119, &format!("null{k}")).differs());
+        let wrong = compared(&a, &b, 119, &format!("null{k}")).differs();
         let taller = compared(&a, &b.map(|z| 1.3 * z), 119, &format!("power{k}"));
-        found += usize::from(answer(&taller, "sigma_m") == Answer::Different);
+        let found = answer(&taller, "sigma_m") == Answer::Different;
         let [low, high] = taller.quantities[0].interval.unwrap();
-        covered += usize::from(low <= libm::log(1.3) && libm::log(1.3) <= high);
-    }
+        [wrong, found, low <= libm::log(1.3) && libm::log(1.3) <= high]
+    };
+    let [wrong, found, covered] = counts(60, of_pair);
     println!("wrong {wrong} of 60, found {found} of 60, covered {covered} of 60");
     assert!(wrong <= 11 && found >= 40 && covered >= 48, "{wrong} {found} {covered}");
 }
@@ -188,8 +195,8 @@ fn val_a_texture_differs_from_a_site_that_is_not_normal() {
 #[ignore = "slow: ./test --full"]
 fn stat_split_halves_of_a_normal_site_agree() {
     let covariance = exponential(0.1, 0.12);
-    let wrong =
-        (0..40).filter(|k| compared_halves(&oblong(&covariance, &format!("h{k}")), &format!("h{k}")).differs()).count();
+    let of_site = |name: &str| compared_halves(&oblong(&covariance, name), name).differs();
+    let [wrong] = counts(40, |k| [of_site(&format!("h{k}"))]);
     println!("wrong {wrong} of 40");
     assert!(wrong <= 9, "{wrong}");
 }
@@ -300,14 +307,12 @@ fn val_textures_that_cannot_be_judged_are_refused() {
 #[test]
 #[ignore = "slow: ./test --full"]
 fn stat_textures_of_the_covariance_of_the_site_agree() {
-    let (mut wrong, mut told) = (0, 0);
-    for k in 0..40 {
+    let [wrong, told] = counts(40, |k| {
         let name = format!("statistics-{k}");
         let of = |range_m: f64, side: &str| surface(&exponential(0.1, range_m), 200, &format!("{name}-{side}"));
         let (site, texture, longer) = (of(0.12, "site"), of(0.12, "texture"), of(0.24, "longer"));
-        wrong += usize::from(judged(&site, &texture, &name).differs());
-        told += usize::from(judged(&site, &longer, &name).differs());
-    }
+        [judged(&site, &texture, &name).differs(), judged(&site, &longer, &name).differs()]
+    });
     println!("wrong {wrong} of 40, told {told} of 40");
     assert!(wrong <= 9 && told >= 36, "{wrong} {told}");
 }

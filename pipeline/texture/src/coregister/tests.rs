@@ -1,4 +1,5 @@
 use super::*;
+use rayon::prelude::*;
 use sastrugi_numeric::{Geometry, Streams};
 use std::f64::consts::TAU;
 
@@ -299,13 +300,16 @@ fn replicates(count: u32, moved: [f64; 2], sigma: f64, reach: usize) -> Counted 
     // The plane was added to B at its original position: moved back it is lower by tilt times shift.
     let raise = -(tilt[0] * moved[0] + tilt[1] * moved[1]);
     let truth = [-moved[0], -moved[1], raise, -tilt[0], -tilt[1]];
-    let mut counted = Counted { replicates: count, ..Counted::default() };
-    for replicate in 0..count {
+    let found = |replicate: u32| {
         let mut s = Streams::for_seed(u64::from(replicate), "coregister-test").stream("coverage");
         let noisy = |grid: &Grid, s: &mut _| {
             Grid::new(g, grid.values.iter().zip(noise(g, reach, s)).map(|(z, n)| z + sigma * n).collect())
         };
-        let c = coregister(&noisy(&a, &mut s), &noisy(&b, &mut s)).unwrap().coregistration;
+        coregister(&noisy(&a, &mut s), &noisy(&b, &mut s)).unwrap().coregistration
+    };
+    let all: Vec<Coregistration> = (0..count).into_par_iter().map(found).collect();
+    let mut counted = Counted { replicates: count, ..Counted::default() };
+    for c in all {
         let (shift, errors) = (c.shift_m.unwrap(), c.standard_errors.unwrap());
         let of_shift = errors.shift_m.unwrap();
         let t = sastrugi_statistics::student::quantile(0.975, f64::from(errors.blocks - 1));
