@@ -8,10 +8,13 @@ use std::f64::consts::TAU;
 pub const TRUTH: [f64; 2] = [0.05, 0.28];
 const SIDE: usize = 256;
 
-/// The field of a seed on a slope (rise over run) that falls towards an azimuth, with an undulation of 0.3 m amplitude and 40 m
-/// wavelength along it.
+/// The field of a seed on a slope.
 fn sloping(seed: u64, slope: f64, azimuth_deg: f64) -> Grid {
-    let dem = field(TRUTH[1], SIDE, CELL_M, seed);
+    on_slope(&field(TRUTH[1], SIDE, CELL_M, seed), slope, azimuth_deg)
+}
+
+/// A field on a slope (rise over run) that falls towards an azimuth, with an undulation of 0.3 m amplitude and 40 m wavelength along it.
+fn on_slope(dem: &Grid, slope: f64, azimuth_deg: f64) -> Grid {
     let g = dem.geometry;
     let (sin, cos) = libm::sincos(azimuth_deg.to_radians());
     let height = |k: usize| {
@@ -66,8 +69,9 @@ fn errors(slope: f64, seeds: std::ops::Range<u64>, spoil: Spoil) -> Vec<(Pair, O
     seeds
         .into_par_iter()
         .map(|seed| {
+            let texture = field(TRUTH[1], SIDE, CELL_M, seed);
             let of = |slope: f64| {
-                let mut dem = sloping(seed, slope, 45.0 * (seed % 8) as f64 + 11.0);
+                let mut dem = on_slope(&texture, slope, 45.0 * (seed % 8) as f64 + 11.0);
                 spoil(&mut dem, seed);
                 let found = estimate(&dem, &s);
                 [0, 1].map(|k| 100.0 * (found[k] / TRUTH[k] - 1.0))
