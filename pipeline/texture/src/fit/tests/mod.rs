@@ -123,15 +123,27 @@ fn blocky(dem: &mut Grid, seed: u64) {
     }
 }
 
-/// Adds 25 cones, 10 sigma high and 0.6 m in radius.
+/// Adds 25 cones, 10 sigma high.
 fn trees(dem: &mut Grid, seed: u64) {
+    cones(dem, seed, 25, 10.0);
+}
+
+/// Adds cones of 0.6 m radius.
+fn cones(dem: &mut Grid, seed: u64, count: usize, height_m: f64) {
     let mut s = Streams::for_seed(seed, "fit-test").stream("trees");
     let g = dem.geometry;
-    for _ in 0..25 {
+    for _ in 0..count {
         let (x, y) = (s.uniform_in(0.0, g.size()[0]), s.uniform_in(0.0, g.size()[1]));
-        for (k, z) in dem.values.iter_mut().enumerate() {
-            let (dx, dy) = (g.x(k % g.cols) - x, g.y(k / g.cols) - y);
-            *z += (10.0 * (1.0 - (dx * dx + dy * dy).sqrt() / 0.6)).max(0.0);
+        for (r, line) in dem.values.chunks_exact_mut(g.cols).enumerate() {
+            let dy = g.y(r) - y;
+            // Most rows are beyond the cone.
+            if dy.abs() > 0.61 {
+                continue;
+            }
+            for (c, z) in line.iter_mut().enumerate() {
+                let dx = g.x(c) - x;
+                *z += (height_m * (1.0 - (dx * dx + dy * dy).sqrt() / 0.6)).max(0.0);
+            }
         }
     }
 }

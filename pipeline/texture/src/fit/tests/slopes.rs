@@ -34,17 +34,9 @@ pub fn of_table(seed: u64) -> Grid {
     dem
 }
 
-/// Adds six cones of 0.5 m height and 0.6 m radius.
+/// Adds six cones of 0.5 m height.
 fn with_trees(dem: &mut Grid, seed: u64) {
-    let mut s = Streams::for_seed(seed, "fit-test").stream("trees");
-    let g = dem.geometry;
-    for _ in 0..6 {
-        let (x, y) = (s.uniform_in(0.0, g.size()[0]), s.uniform_in(0.0, g.size()[1]));
-        for (k, z) in dem.values.iter_mut().enumerate() {
-            let (dx, dy) = (g.x(k % g.cols) - x, g.y(k / g.cols) - y);
-            *z += (0.5 * (1.0 - (dx * dx + dy * dy).sqrt() / 0.6)).max(0.0);
-        }
-    }
+    cones(dem, seed, 6, 0.5);
 }
 
 /// Removes 15 % of the cells at random.
