@@ -414,12 +414,15 @@ mod tests {
         let base = inner(&background_of(z));
         let mut sums = [covariances(&base), covariances(&less_background(&base))];
         let mut variance_m2 = 0.0;
-        for k in 0..count {
+        let covariances_of = |k: u64| {
             let made = texture.generate(&Streams::for_seed(k, "raised-test")).unwrap().grid;
             assert_eq!(made.geometry, Geometry::square(400, 400, CELL_M));
-            let own = [covariances(&made), covariances(&less_background(&made))];
+            [covariances(&made), covariances(&less_background(&made))]
+        };
+        let all: Vec<[Vec<f64>; 2]> = (0..count).into_par_iter().map(covariances_of).collect();
+        for own in &all {
             variance_m2 += own[0][0] / count as f64;
-            for (sum, own) in sums.iter_mut().zip(&own) {
+            for (sum, own) in sums.iter_mut().zip(own) {
                 sum.iter_mut().zip(own).for_each(|(sum, c)| *sum += c / count as f64);
             }
         }
@@ -460,13 +463,15 @@ mod tests {
     #[ignore = "slow: ./test --full"]
     fn stat_other_textures_add_up_with_their_background() {
         let (z, fit) = site(1.0, 2);
-        for (method, limit) in [("wavelet_statistics", 0.04), ("quilting", 0.06), ("exemplar", 0.08)] {
+        // Side by side: parts of each method take one thread.
+        let methods = [("wavelet_statistics", 0.04), ("quilting", 0.06), ("exemplar", 0.08)];
+        methods.into_par_iter().for_each(|(method, limit)| {
             let [surface, residual] = on_background(method, &z, &fit, "residual", 2);
             println!("{method}: {surface:?} {residual:?}");
             for [rms, error] in [surface, residual] {
                 assert!((rms - 1.0).abs() < limit && error < 2.0 * limit, "{method}: {surface:?} {residual:?}");
             }
-        }
+        });
     }
 
     /// Repeated tiles stay seamless, notes say what was done, and a fit without a window is refused.
