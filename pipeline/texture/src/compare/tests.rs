@@ -75,7 +75,7 @@ fn val_grids_may_differ() {
     assert!(!comparison.differs(), "{comparison:#?}");
 }
 
-/// How many of `count` comparisons each of some answers holds for. Side by side: the fit of a side takes one thread, its simulations all.
+/// For each answer, the number of `count` comparisons for which it holds. Side by side: parts of a comparison take one thread.
 fn counts<const N: usize>(count: usize, holds: impl Fn(usize) -> [bool; N] + Send + Sync) -> [usize; N] {
     let all: Vec<[bool; N]> = (0..count).into_par_iter().map(holds).collect();
     std::array::from_fn(|answer| all.iter().filter(|one| one[answer]).count())

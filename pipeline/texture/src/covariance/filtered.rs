@@ -54,7 +54,7 @@ pub struct LagField {
 }
 
 impl LagField {
-    /// Value at a lag in cells.
+    /// Value at a lag in cells, whose row must be there.
     pub fn at(&self, lag: [isize; 2]) -> f64 {
         let [row, col] = [0, 1].map(|k| wrapped(lag[k], self.shape[k]));
         self.values[row * self.shape[1] + col]

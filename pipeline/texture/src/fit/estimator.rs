@@ -341,7 +341,8 @@ pub fn ordinary(case: &Case, form: &Form) -> Estimate {
             difference(&model, &case.bins.covariance_m2).iter().map(|d| d / scale).collect()
         })
     });
-    let end = least(ends);
+    // In the thread pool, as [`Estimator::fit`].
+    let end = rayon::scope(|_| least(ends));
     let covariance = coordinates.decode(&end.at);
     Estimate { form: form.clone(), covariance, at: end.at, steps: end.steps, likelihood: None }
 }

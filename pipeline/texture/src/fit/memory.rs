@@ -14,8 +14,10 @@ const STATISTICS_CELL_BYTES: u64 = 180;
 /// Weights of partial windows, for two estimators: for each of up to 49 bins, 8 bytes per lag (one of each opposite pair) within
 /// the largest lag plus two half windows (1.5 windows).
 const WEIGHTS_BYTES: u64 = 2 * 49 * 8 * 9 / 2;
-/// Covariances of one model on a torus three windows wide, and their transforms.
-const MODEL_BYTES: u64 = 9 * 60;
+/// The same for the one estimator at twice the window, which has 33 bins.
+const WIDE_WEIGHTS_BYTES: u64 = 4 * 33 * 8 * 9 / 2;
+/// A covariance of one model on a torus six windows wide, for the weights of a search.
+const MODEL_BYTES: u64 = 36 * 40;
 
 impl FitSettings {
     /// Most bytes that a fit of `cells` cells needs on top of the heights, on `threads` threads. If the smaller side of a cell is
@@ -31,7 +33,9 @@ impl FitSettings {
         let examined = cells.min(CELLS_MAX as u64 + 49 * window).saturating_mul(STRIP_CELL_BYTES);
         let replicate = cells.min(CELLS_MAX as u64 + 9 * window).saturating_mul(REPLICATE_CELL_BYTES);
         let at_work = threads.min(self.bootstrap() as u64);
-        let models = window.saturating_mul(WEIGHTS_BYTES + (1 + at_work) * MODEL_BYTES);
+        // Searches run side by side, with and without replicates. At twice the window a model is four times as large.
+        let wide = if 36 * window <= cells { WIDE_WEIGHTS_BYTES + 5 * MODEL_BYTES } else { 0 };
+        let models = window.saturating_mul(WEIGHTS_BYTES + (1 + threads) * MODEL_BYTES + wide);
         let statistics = if self.has_statistics() { STATISTICS_CELL_BYTES } else { 0 };
         let examined = examined.max(cells.min(CELLS_MAX as u64 + 49 * window).saturating_mul(statistics));
         (64 << 20) + cells / 4 + models + strip.max(examined).max(replicate.saturating_mul(at_work))

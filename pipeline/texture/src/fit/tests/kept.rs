@@ -9,7 +9,7 @@ use crate::covariance::partial::{DetrendedCells, PartialWindows};
 use sastrugi_roughness::background::BoxWindow;
 use std::sync::Mutex;
 
-/// Most partial windows kept: some have 5 MB.
+/// Most partial windows kept: most have up to 5 MB.
 const KEPT_MAX: usize = 24;
 
 /// Those kept, the one used last at the end.

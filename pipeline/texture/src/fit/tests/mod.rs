@@ -404,6 +404,19 @@ fn prop_threads_change_no_bit() {
     assert_eq!(run(1).map(f64::to_bits), run(3).map(f64::to_bits));
 }
 
+/// The same for a whole fit: several forms, other windows, the profile and isotropy.
+#[test]
+fn prop_threads_change_no_bit_of_a_fit() {
+    let mut dem = field(0.28, 256, CELL_M, 1);
+    blocky(&mut dem, 1);
+    let run = |threads| {
+        let pool = rayon::ThreadPoolBuilder::new().num_threads(threads).build().unwrap();
+        let s = with_bootstrap("exponential,anisotropic:matern", 0);
+        pool.install(|| serde_json::to_string(&fit(&dem, &s, &streams()).unwrap().fit).unwrap())
+    };
+    assert_eq!(run(1), run(3));
+}
+
 /// Settings of a fit with intervals and verdicts.
 fn with_bootstrap(model: &str, bootstrap: u32) -> FitSettings {
     FitParameters { model: model.to_owned(), bootstrap, ..FitParameters::default() }.try_into().unwrap()
