@@ -23,7 +23,7 @@
 //!
 //! Textures made of copied cells wander: their long waves have more power than the residual's, up to 3 times at D = 0.7 and 20 times at 0.9 (`exemplar`, range
 //! 1 m; `quilting` 5 times at 0.9). Amplified, this gave 1.7 times the intended variance. In each class of responses, 0.1 wide and from 0.3 on, their waves
-//! are first reduced to the power of the residual, if they have more than chance allows ([`CHANCE`]). The other methods do not wander.
+//! are first reduced to the power of the residual, if they have more than chance allows. The other methods do not wander.
 //!
 //! Source: ours. It is a linear filter after the synthesis, the same for all methods. Shapes, increments and curvatures at wavelengths much shorter
 //! than the window do not change. Where D is negative (wavelengths of 0.5 to 1 windows) the filter attenuates, by a fifth at most. Heights become
