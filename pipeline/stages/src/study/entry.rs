@@ -218,7 +218,7 @@ impl<'a> Entry<'a> {
 
     fn sweep(&self, items: Vec<Expanded>, parameter: &str, values: &[Value]) -> Result<Vec<Expanded>, StudyError> {
         if is_too_deep(parameter) {
-            let message = format!("a swept key lies more than {TABLES_MAX} tables deep; no parameter does");
+            let message = format!("a swept key is nested more than {TABLES_MAX} tables deep; no parameter is");
             return Err(self.error("sweep", message));
         }
         if values.is_empty() {

@@ -125,7 +125,7 @@ fn parse_value(pair: &str, text: &str) -> Result<Value, Error> {
 
 fn place(params: &mut Value, dotted: &str, value: Value) -> Result<(), Error> {
     if is_too_deep(dotted) {
-        return Err(Error::Usage(format!("a key lies more than {TABLES_MAX} tables deep; no parameter does")));
+        return Err(Error::Usage(format!("a key is nested more than {TABLES_MAX} tables deep; no parameter is")));
     }
     let mut at = params;
     for word in dotted.split('.') {
@@ -216,7 +216,7 @@ mod tests {
             ("x=nan", "`--set x=nan`: the number is not finite"),
             ("x=2026-01-01", "dates must be written as text"),
             ("a.b=1", "`a.b`: its parent is not a table"),
-            (&format!("{}x=1", "d.".repeat(100_000)), "a key lies more than 100 tables deep"),
+            (&format!("{}x=1", "d.".repeat(100_000)), "a key is nested more than 100 tables deep"),
         ] {
             let error = assign(&mut params, &[pair.to_owned()]).unwrap_err();
             assert!(matches!(&error, Error::Usage(message) if message.contains(words)), "{pair}: {error}");
