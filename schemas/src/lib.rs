@@ -6,12 +6,13 @@
 //! 1. A table of a study becomes a type of [`study`] and the raw parameters of a kernel with [`kind::read_parameters`] or
 //!    [`kind::read_all`]; a [`ParameterError`] names the key that is wrong. [`kind::schema_of`] is the JSON Schema that editors check.
 //! 2. Registries describe their generators, methods and vehicles as [`Kind`]s.
-//! 3. Results are rows of [`tables`]: each row type is a [`Record`], and its [`Table`] holds names, units and descriptions of the columns.
+//! 3. Results are rows of [`tables`]: each row type is a [`Record`], whose [`Table`] holds the names, units and descriptions of the
+//!    columns.
 //! 4. Fits are [`fit::FitFile`]s, recordings have the [`topics`] listed here, and [`manifest::Manifest`] says where each file came from.
 //!
 //! # Example
 //!
-//! A row of a table: what its columns mean, and the way to cells and JSON and back.
+//! A row of a table: what its columns mean, and how it converts to cells and JSON and back.
 //!
 //! ```
 //! use sastrugi_schemas::tables::PsdRow;

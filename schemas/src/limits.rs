@@ -1,8 +1,8 @@
 //! Limits of parameters in their JSON Schema, for `#[schemars(transform = ...)]` at a field: the counterparts of the checks of
 //! [`ParameterError`](crate::ParameterError) and of ranges, so that an editor refuses what a run refuses.
 //!
-//! The limit of a list is that of each of its numbers. A limit that depends on another parameter has no counterpart; whole numbers have
-//! schemars' own `range`.
+//! The limit of a list applies to each of its numbers. A limit that depends on another parameter has no counterpart; for whole numbers,
+//! use schemars' own `range`.
 //!
 //! ```
 //! use sastrugi_schemas::kind::schema_of;

@@ -89,7 +89,7 @@ pub struct Source {
     /// Licence, as stated in the study.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub license: Option<String>,
-    /// Attribution: whom to name.
+    /// Attribution: whom to credit.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub attribution: Option<String>,
     /// How to cite it.

@@ -1,8 +1,8 @@
-//! The section `statistics` of a fit file: what methods need that reproduce more of a measured residual than its covariance.
+//! The section `statistics` of a fit file: what a method needs to reproduce more of a measured residual than its covariance.
 //!
 //! It holds statistics and extremes (the highest and lowest of heights and differences), no positions: no method is known to recover the DEM from
-//! them. It states fewer numbers ([`Statistics::numbers`]) than a quarter of the cells with data. Its size does not depend on the DEM's: at most
-//! [`LAGS_MAX`] lags along each axis, 129 probabilities and 32 bands, below 1 MB as JSON.
+//! them. The numbers that it states ([`Statistics::numbers`]) are fewer than a quarter of the cells with data. Its size does not depend on that
+//! of the DEM: at most [`LAGS_MAX`] lags along each axis, 129 probabilities and 32 bands, below 1 MB as JSON.
 
 use crate::{ParameterError, counted};
 use serde::{Deserialize, Serialize};
@@ -139,7 +139,7 @@ impl Statistics {
             if !(weights.is_finite() && weights > 0.0) {
                 return refuse(
                     "wavelets.differences.stencil",
-                    "must have finite weights, one of them not 0".to_owned(),
+                    "must have finite weights, at least one of them not 0".to_owned(),
                 );
             }
         }
@@ -162,7 +162,7 @@ impl Statistics {
         let counts = [self.probabilities.len(), wavelets.mean_log.len(), wavelets.differences.len(), cells];
         for ((key, most), count) in Self::COUNTS_MAX.into_iter().zip(counts) {
             if count > most {
-                let message = format!("has {count} entries; the most is {most}");
+                let message = format!("has {count} entries; the limit is {most}");
                 return Err(ParameterError::new(format!("statistics.{key}"), message));
             }
         }
@@ -193,7 +193,7 @@ impl LagCovariances {
             let ascend = lags.windows(2).all(|pair| pair[0] < pair[1]);
             let fit = lags.len() <= LAGS_MAX && lags.last().is_some_and(|lag| *lag <= LAG_MAX);
             if lags.first() != Some(&0) || !ascend || !fit {
-                let message = format!("must be at most {LAGS_MAX} lags that ascend from 0 to at most {LAG_MAX} cells");
+                let message = format!("must hold at most {LAGS_MAX} lags, ascending from 0 to at most {LAG_MAX} cells");
                 return Err(ParameterError::new(key, message));
             }
         }

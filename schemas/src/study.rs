@@ -55,8 +55,8 @@ pub struct StudyHead {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(regex(pattern = DOI))]
     pub doi: Option<String>,
-    /// Licence of the release: an SPDX expression, or `LicenseRef-<name>` for terms of your own. A DEM whose licence is known not to permit it is
-    /// refused; a combination of which one is unknown is noted.
+    /// Licence of the release: an SPDX expression, or `LicenseRef-<name>` for terms of your own. A DEM whose licence does not permit it is
+    /// refused; if that is unknown, a note says so.
     #[serde(default = "default_license")]
     #[schemars(regex(pattern = NOT_BLANK))]
     pub license: String,
@@ -272,15 +272,15 @@ pub struct DemItem {
     /// Use only the ground points (class 2) of a point cloud.
     #[serde(default)]
     pub ground_only: Option<bool>,
-    /// Licence of the data: an SPDX identifier, `public domain`, or `LicenseRef-<name>` with the terms in `license_file`. One that is known not to
-    /// permit the licence of the release is refused; a combination of which one is unknown is noted.
+    /// Licence of the data: an SPDX identifier, `public domain`, or `LicenseRef-<name>` with the terms in `license_file`. One that does not permit
+    /// the licence of the release is refused; if that is unknown, a note says so.
     #[serde(default)]
     #[schemars(regex(pattern = NOT_BLANK))]
     pub license: Option<String>,
-    /// File with the text of that licence, whichever it is, relative to the study file; it is copied into the release with the data.
+    /// File with the text of that licence, relative to the study file; it is copied into the release with the data.
     #[serde(default)]
     pub license_file: Option<String>,
-    /// Attribution: whom to name as the source.
+    /// Attribution: whom to credit as the source.
     #[serde(default)]
     #[schemars(regex(pattern = NOT_BLANK))]
     pub attribution: Option<String>,
@@ -428,7 +428,8 @@ pub struct TextureItem {
     #[serde(default = "default_method")]
     pub method: String,
     /// Several methods to compare, `"all"` or a list, instead of `method`: one texture `<id>-<method>` each, and the table
-    /// `scoreboard`. `"all"` are the methods of a covariance; if the fit has `statistics = true`, also those that repeat a site.
+    /// `scoreboard`. `"all"` means every method that synthesises a covariance; if the fit has `statistics = true`, also those
+    /// that repeat a site.
     #[serde(default)]
     pub methods: Option<Methods>,
     /// Number of realisations per method for the scoreboard.
@@ -437,7 +438,7 @@ pub struct TextureItem {
     pub realisations: u32,
     /// Base to which the texture is added: the id of a terrain, DEM or other texture, or `{ background = "<fit id>" }`, the background that a fit
     /// removed. The result has the base's cells, size and position: leave out `size_m`, `size_px` and `cell_m`, or state the same ones. A base with
-    /// `count` goes with the same `count` here: replicate k is added to replicate k of the base. Default: no base, level ground.
+    /// `count` needs the same `count` here: replicate k is added to replicate k of the base. Default: no base, level ground.
     #[serde(default)]
     pub onto: Option<Onto>,
     /// Factor on the heights of the texture, above 0; 2 doubles their standard deviation. Textures of a coarse DEM are steep on finer cells (RMS
@@ -449,7 +450,8 @@ pub struct TextureItem {
     /// Local factor on the texture: the id of a raster of factors, or a table of factors by the slope of the base.
     #[serde(default)]
     pub modulate: Option<Modulate>,
-    /// Id of a DEM whose holes are filled with texture conditioned on their surroundings, of `fft_ma` or a method that repeats the site.
+    /// Id of a DEM whose holes are filled with texture conditioned on their surroundings; `method` must be `fft_ma` or one that repeats
+    /// the site.
     #[serde(default)]
     pub fill: Option<String>,
     /// Label for statistics.
@@ -659,8 +661,7 @@ pub struct RoverItem {
     /// Navigator: see `sastrugi kinds`.
     pub kind: String,
     /// Ids of the terrains, textures or DEMs to drive on; the id of a replicated item includes all its replicates. On a `planetary` terrain,
-    /// rovers drive on the unbounded world, which is generated around them, not only in its window; rocks and albedo of other terrains are
-    /// those of their maps.
+    /// rovers may leave the window: the world is generated around them. On other terrains, rocks and albedo come from the maps.
     #[schemars(length(min = 1))]
     pub terrains: Vec<String>,
     /// Distance between rows of a rover in `rover_samples`, m; 0 for one row per cycle; default 0.5.
@@ -719,7 +720,7 @@ pub struct Perturb {
     #[schemars(range(min = 1))]
     pub rovers: Option<u32>,
     /// Parameters to vary: names of numbers, or of lists of numbers, which are scaled together; `noise.<name>` for those of the noise. Default: all
-    /// parameters of the navigator. Parameters of value 0 are left out and named in a note.
+    /// parameters of the navigator. Parameters equal to 0 are left out and named in a note.
     #[serde(skip_serializing_if = "Vec::is_empty")]
     pub parameters: Vec<String>,
 }
@@ -768,7 +769,7 @@ pub struct PhotoclinometryItem {
     /// Ids of images, three or more of each surface; the id of a swept image includes all its values.
     #[schemars(length(min = 1))]
     pub images: Vec<String>,
-    /// Id of a coarse DEM that constrains the heights: the first round starts from it, and it is a soft constraint.
+    /// Id of a coarse DEM: the start of the first round, and a soft constraint on the heights.
     #[serde(default)]
     pub coarse: Option<String>,
     /// Standard deviation of its heights, m.
@@ -822,9 +823,9 @@ pub struct HypothesisItem {
     pub id: String,
     /// Metric of the missions.
     pub statistic: Statistic,
-    /// Labels of the groups: two for `difference` and `equivalence`, three or more in order for `trend`. A single claim at the level of 0.05 takes
-    /// at least 4 terrains in each group for a difference, 2 for a trend over three groups, and 2 for equivalence; of paired terrains (`pairing =
-    /// "common"`) 6, 3 and 2. A family of several claims takes more: `sastrugi plan` tells how many are missing.
+    /// Labels of the groups: two for `difference` and `equivalence`, three or more in order for `trend`. A single claim at level 0.05 needs at
+    /// least 4 terrains in each group for a difference, 2 for a trend over three groups, and 2 for equivalence; with paired terrains (`pairing =
+    /// "common"`), 6, 3 and 2. A family of several claims needs more: `sastrugi plan` says how many are missing.
     #[schemars(length(min = 2), extend("uniqueItems" = true))]
     pub groups: Vec<String>,
     /// Id of the `[[traverse]]` whose missions are tested. It must drive all of these groups and have no sweep; required if several

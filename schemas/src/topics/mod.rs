@@ -1,8 +1,8 @@
 //! MCAP topics of a release, and the recordings of missions, teams and rovers that fill them.
 //!
-//! ROS 2 flavour: see [`ros2`]. Viewer flavour: Foxglove's public protobuf messages where they exist, own protobuf messages (package `sastrugi`)
-//! for the rest. Each own message starts with field 1, `timestamp` (google.protobuf.Timestamp); the listed fields
-//! follow as numbers 2, 3 ... A field is appended, never renumbered, renamed or removed.
+//! ROS 2 flavour: see [`ros2`]. Viewer flavour: Foxglove's public protobuf messages where they exist, our own (package `sastrugi`) for the rest.
+//! Each of our messages starts with field 1, `timestamp` (google.protobuf.Timestamp); the listed fields follow as numbers 2, 3 ... Fields are
+//! appended, never renumbered, renamed or removed.
 
 pub mod command;
 pub mod events;
