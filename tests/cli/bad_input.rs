@@ -153,7 +153,7 @@ fn val_places_are_refused_before_the_run() {
             texture("empirical", "cell_m = 3.0"),
             &["texture \"t\": `cell_m`", "whole multiples of the measured covariance's, 2 x 2 m"],
         ),
-        (texture("empirical", "cell_m = 2.0\nmethod = \"gaussians\""), &["`method`", "made by `fft_ma` only"]),
+        (texture("empirical", "cell_m = 2.0\nmethod = \"gaussians\""), &["`method`", "only `fft_ma` can synthesise"]),
         (
             texture("exponential", "").replace("outer_scale_m = 6.0", "outer_scale_m = 7.0"),
             &["fit \"f\"", "the outer scale of 7 m is more than a third of the DEM; it must be at most 6.66"],

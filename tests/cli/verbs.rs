@@ -513,7 +513,7 @@ fn val_textures_that_repeat_a_site_refuse() {
             "not those of the fit: none",
         ),
         ("fit.json", "modulated", &["--mask", "plot.geojson"], 2, "--exemplar"),
-        ("fit.json", "modulated", &["--cell", "0.2"], 2, "on the cells of the site only, 0.1 m x 0.1 m"),
+        ("fit.json", "modulated", &["--cell", "0.2"], 2, "only on the cells of the site, 0.1 m x 0.1 m"),
         ("fit.json", "modulated", &["--set", "ratio=0.5"], 2, "`modulated` keeps the directions of the site"),
         ("fit.json", "wavelet_statistics", &["--set", "azimuth_deg=30"], 2, "keeps the directions of the site"),
         ("fit.json", "wavelet_statistics", &["--set", "marginal=measured"], 2, "keeps the heights of the site"),

@@ -93,7 +93,7 @@ pub enum FitError {
         model: String,
     },
     /// Too few lags.
-    #[error("there are pairs of cells at only {}; a fit needs at least {needed}", counted(.found, "lag"))]
+    #[error("pairs of cells exist at only {}; a fit needs at least {needed}", counted(.found, "lag"))]
     TooFewLags {
         /// Bins with pairs.
         found: usize,

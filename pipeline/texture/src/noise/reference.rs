@@ -66,7 +66,7 @@ pub enum NoiseError {
     },
     /// More than half of it is exactly plane.
     #[error(
-        "the noise reference is exactly plane: its heights were interpolated or rounded, so they show no noise; use another one"
+        "the noise reference is an exact plane: its heights were interpolated or rounded, so they show no noise; use another one"
     )]
     Plane,
 }

@@ -4,9 +4,9 @@
 //! kriging estimate from cells around the hole. The result has the covariance on average, also between filled and measured cells,
 //! and measured cells keep their heights exactly.
 //!
-//! z_u may also be a texture that repeats a site beyond its covariance ([`fill_with`]). Nothing above supposes a normal z_u: rim and covariance
-//! are kept, and away from the rim K is smooth, so that increments and curvatures become those of the texture. Waves that such a texture lacks
-//! come from the surroundings, through K. Its shapes are not made to continue those at the rim.
+//! z_u may also be a texture that repeats a site beyond its covariance ([`fill_with`]). Nothing above requires a normal z_u: rim and covariance
+//! are kept, and away from the rim K is smooth, so increments and curvatures become those of the texture. Waves that such a texture lacks come
+//! from the surroundings, through K. Its shapes do not continue those at the rim.
 //!
 //! K is kriging with a planar drift, because the fitted covariance describes the texture and the background beneath
 //! it is unknown: weights w with `sum of w_j C(h_ij) + drift = C(h_i0)`, `sum of w_j f(x_j) = f(x_0)` for `f = 1, x, y`. For a

@@ -279,7 +279,7 @@ pub enum SynthesisError {
     },
     /// Patches without room for an overlap.
     #[error(
-        "`patch_m` is {patch}, too narrow for an overlap that can be cut; it must be at least {least} m",
+        "`patch_m` is {patch}, too narrow to cut through its overlap; it must be at least {least} m",
         patch = to_micrometres(*.patch_m),
         least = to_micrometres(*.least_m)
     )]
@@ -313,7 +313,7 @@ pub trait MethodParameters: DeserializeOwned + Serialize + JsonSchema + Clone + 
     /// A method that supports model covariances only; cells that are not whole multiples of the measured ones.
     fn check_measured(&self, _tile: &Tile, _measured_m: [f64; 2]) -> Result<(), ParameterError> {
         let message =
-            format!("is `{}`; textures with an empirical covariance can be made by `fft_ma` only", Self::NAME);
+            format!("is `{}`; only `fft_ma` can synthesise textures with an empirical covariance", Self::NAME);
         Err(ParameterError::new("method", message))
     }
 

@@ -8,9 +8,9 @@
 //!
 //! `g(D) = min(sqrt((1 + D) / (1 - D)), G)`, `G = 3` ([`GAIN_MAX`])
 //!
-//! which is exact up to D = 0.8. Of longer waves the residual has less than a twenty-fifth of the power. What is found there is leakage of a finite
-//! site rather than ground, so the gain stays at G. D is the response on the torus of the texture, so a periodic texture stays periodic. The mean,
-//! which the residual lacks, becomes 0.
+//! which is exact up to D = 0.8. The residual holds less than a twenty-fifth of the power of longer waves. What it shows there is leakage from a
+//! finite site rather than ground, so the gain stays at G. D is the response on the torus of the texture, so a periodic texture stays periodic. The
+//! mean, which the residual lacks, becomes 0.
 //!
 //! Closed form for exponential covariances of range b under a window of 2.1 m on cells of 0.1 m; errors of the covariance at any lag as shares of the
 //! variance (`val_the_sum_has_the_covariance_of_the_site`):
@@ -22,12 +22,12 @@
 //! | 3 | 0.934 | 0.983 | 0.128 | 0.034 | 0.082 | 0.001 |
 //!
 //! Textures made of copied cells wander: their long waves have more power than the residual's, up to 3 times at D = 0.7 and 20 times at 0.9 (`exemplar`, range
-//! 1 m; `quilting` 5 times at 0.9). Amplified, this gave 1.7 times the intended variance. In each class of responses, 0.1 wide and from 0.3 on, their waves
-//! are first reduced to the power of the residual, if they have more than chance allows. The other methods do not wander.
+//! 1 m; `quilting` 5 times at 0.9). Amplifying this gave 1.7 times the intended variance. In classes of response 0.1 wide, from 0.3 on, their waves are
+//! therefore first reduced to the power of the residual if they have more than chance explains. The other methods do not wander.
 //!
-//! Source: ours. It is a linear filter after the synthesis, the same for all methods. Shapes, increments and curvatures at wavelengths much shorter
-//! than the window do not change. Where D is negative (wavelengths of 0.5 to 1 windows) the filter attenuates, by a fifth at most. Heights become
-//! slightly more normal.
+//! Source: our own. It is a linear filter after the synthesis, the same for all methods. Shapes, increments and curvatures at wavelengths much
+//! shorter than the window do not change. Where D is negative (wavelengths of 0.5 to 1 windows) the filter attenuates, by a fifth at most. Heights
+//! become slightly more normal.
 //!
 //! Cost: four transforms of the texture. Memory: 24 bytes per cell. A texture that is not periodic is synthesised one window wider on each side,
 //! because the transform wraps around; the margin is cut off.

@@ -1,8 +1,8 @@
 //! Common to the methods that repeat more of a site than its covariance: [`super::modulated`], [`super::wavelet_statistics`],
 //! [`super::quilting`] and [`super::exemplar`].
 //!
-//! They are a second family beside [`super::Texture`], because little of it applies to them. A [`super::Kernel`] aims at a covariance
-//! model, on cells of any size, rotated and stretched as requested, and knows its mean covariance. These methods repeat the measured residual
+//! They form a second family next to [`super::Texture`], little of which applies to them. A [`super::Kernel`] aims at a covariance model, on
+//! cells of any size, rotated and stretched as requested, and its mean covariance is known. These methods repeat the measured residual
 //! ([`Source`]): the DEM minus its background, or statistics of that. Hence:
 //!
 //! * the cells are those of the site;
@@ -283,8 +283,8 @@ impl<P: ResidualParameters> Checked<P> {
         let [[x, y], [site_x, site_y]] = [tile_m, site_m].map(|sides| sides.map(super::to_micrometres));
         let name = P::NAME;
         let message = format!(
-            "is {x} m x {y} m, but `{name}` makes textures on the cells of the site only, {site_x} m x {site_y} m; set it to that, or \
-             resample the DEM and fit it again"
+            "is {x} m x {y} m, but `{name}` works only on the cells of the site, {site_x} m x {site_y} m; set it to that, or resample \
+             the DEM and fit it again"
         );
         Err(ParameterError::new("cell_m", message))
     }

@@ -26,8 +26,8 @@ const RATIO_MIN: f64 = 0.02;
 const SELF_AFFINE_RANGES: [f64; 2] = [16.0, 4.0];
 
 /// Meaning of `cell_m` for a method that repeats a site.
-const CELL_OF_SITE: &str = "Cell size of the site, that is of the DEM of the fit, m: one number, or east-west and north-south. These methods work on \
-    no other cells. Default: that cell size.";
+const CELL_OF_SITE: &str = "Cell size of the site (the DEM of the fit), m: one number, or east-west and north-south. These methods work on no other \
+    cells. Default: that cell size.";
 
 /// Keys of a tile that only textures from a covariance have, and what a method that repeats a site keeps instead.
 pub(super) const OF_COVARIANCE: [(&str, &str); 5] = [
@@ -154,7 +154,7 @@ impl Tile {
         }
         let cells = (geometry.len() as u64).saturating_mul(u64::from(down)).saturating_mul(u64::from(across));
         if cells > CELLS_MAX {
-            return Err(ParameterError::new("tile", format!("gives {cells} cells in total; the most is {CELLS_MAX}")));
+            return Err(ParameterError::new("tile", format!("gives {cells} cells in total; the limit is {CELLS_MAX}")));
         }
         if let Some(ratio) = parameters.ratio.filter(|r| !(RATIO_MIN..=1.0).contains(r)) {
             return Err(ParameterError::new("ratio", format!("is {ratio}; it must lie in [{RATIO_MIN}, 1]")));

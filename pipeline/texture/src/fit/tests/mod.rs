@@ -272,8 +272,8 @@ fn val_what_cannot_be_fitted_is_refused() {
     white.values.iter_mut().filter(|_| s.uniform() < 0.7).for_each(|z| *z = f64::NAN);
     assert!(matches!(refused(&white, scale(1.0)), FitError::NoWindow { needed_share: 0.5, .. }));
     let few = |found| FitError::TooFewLags { found, needed: 3 }.to_string();
-    assert_eq!(few(1), "there are pairs of cells at only 1 lag; a fit needs at least 3");
-    assert_eq!(few(2), "there are pairs of cells at only 2 lags; a fit needs at least 3");
+    assert_eq!(few(1), "pairs of cells exist at only 1 lag; a fit needs at least 3");
+    assert_eq!(few(2), "pairs of cells exist at only 2 lags; a fit needs at least 3");
     for (key, parameters) in [
         ("trim", FitParameters { trim: 0.5, ..scale(1.0) }),
         ("trim", FitParameters { trim: 0.0, ..scale(1.0) }),

@@ -1,44 +1,45 @@
 //! Exemplar: multiple-point statistics, by direct sampling of the measured residual on ever finer grids.
 //!
 //! # What
-//! The first cells lie on a wide grid, farther apart than the residual is correlated, and are drawn from the site at random. Cells between them follow on grids
-//! of half the spacing, down to every cell (`sampling.rs`). Each takes its detail from the place of the site whose neighbourhood is most like its own
-//! known one: `neighbours` cells, nearest first. The candidates are the places that continue a neighbour as the site does, and random places:
-//! `scan` of them on grids of 8 cells and wider, an eighth of that on each finer grid, at least 8. The search is thus wide for long waves, which
-//! short waves then follow.
+//! The first cells lie on a coarse grid, farther apart than the residual is correlated, and copy random places of the site. Grids of half the spacing follow,
+//! down to every cell (`sampling.rs`). Each cell takes its detail from the place of the site whose neighbourhood best matches its own known cells: `neighbours`
+//! of them, nearest first. Candidates are the places that continue a neighbour as the site does, and random places: `scan` of them on grids of 8 cells and
+//! coarser, an eighth of that on each finer grid, at least 8. Long waves thus come from a wide search, and short waves follow them.
 //!
-//! A cell gets the detail of its place (its height above the weighted mean of the neighbourhood) on the level of its own neighbourhood. Copying
-//! heights unchanged, as the sources do, took a third of the standard deviation from two real sites: no place fits a wide neighbourhood well, and a
-//! flat one fits it least badly.
+//! A cell gets the detail of that place (its height above the weighted mean of the neighbourhood), added to the level of its own neighbourhood.
+//! Copying heights unchanged, as the sources do, lost a third of the standard deviation on two real sites: no place fits a wide neighbourhood well,
+//! and flat places fit least badly.
 //!
 //! # Copies
-//! Places that continue a neighbour copy runs of the site, as long as they fit best; the first cells, drawn alone, end each run after about one
-//! spacing. A run keeps the level it began with, so it copies details: hardly any cell has exactly the height of its source.
+//! As long as they fit best, places that continue a neighbour copy runs of the site; the first cells, drawn independently, end each run after
+//! about one spacing. A run keeps the level at which it began, so it copies details: hardly any cell has exactly the height of its source.
 //! [`super::measured::Copies`] reports both.
 //!
 //! # Sources
 //! * Mariethoz, Renard and Straubhaar 2010, The direct sampling method to perform multiple-point geostatistical simulations, Water
 //!   Resources Research 46, W11536, doi:10.1029/2008WR007621.
 //! * Gravey and Mariethoz 2020, QuickSampling v1.0, Geoscientific Model Development 13, 2611, doi:10.5194/gmd-13-2611-2020: the best of all places
-//!   instead of the first below a threshold.
+//!   instead of the first one below a threshold.
 //! * Ashikhmin 2001, Synthesizing natural textures, I3D, 217, doi:10.1145/364338.364405: places that continue a neighbour.
 //!
 //! Departures: details instead of heights; grids instead of a random path, so that cells of one pass may be computed on any number of threads;
-//! for each cell, random places are compared instead of all places by transforms; the single best of them is taken, where Gravey and Mariethoz
-//! draw one of the k best.
+//! random places are compared for each cell, instead of all places by transforms; the best of them is taken, whereas Gravey and Mariethoz draw
+//! one of the k best.
 //!
 //! # Limits
 //! * Features wider than a few spacings are not seen as a whole. [`super::quilting`] keeps them up to the width of a patch.
-//! * Pieces of different places meet between the first cells, and roughen the smallest increments where the site is smooth: by 29 % along ridges
-//!   that are correlated over 3 cells (1 across), so that a ratio of increments of 2.4 became 1.9.
+//! * Pieces from different places meet between the first cells and roughen the smallest increments where the site is smooth: by 29 % along
+//!   ridges that are correlated over 3 cells (1 across), which lowered a ratio of increments from 2.4 to 1.9.
 //! * A site that is not stationary gives a texture that mixes its kinds of ground. Periodic features (furrows) may fall out of phase.
-//! * No bias of the standard deviation was found, but a tile with few first cells is a small sample: of tiles of 128 x 128 cells in an independent
-//!   program, a synthetic site rough in patches gave 1.08 +- 0.06 of it and 1.07 +- 0.06 of the increments (spacing 8), two measured ones 1.00 +-
-//!   0.04 and 0.98 +- 0.01, 0.89 +- 0.15 and 0.97 +- 0.11 (spacing 32). The logarithm of the increments' flatness was lower, by 0.1, 0.9 and 0.2; that of
-//!   the shipped kernel is lower by 0.19 to 0.39 on seven synthetic sites like those of its test: the excess over 3 drops by 28 to 49 %.
+//! * The standard deviation showed no bias, but a tile with few first cells is a small sample. Tiles of 128 x 128 cells by an independent program had
+//!   1.08 +- 0.06 of the site's standard deviation and 1.07 +- 0.06 of its increments on a synthetic site that is rough in patches (spacing 8), and 1.00
+//!   +- 0.04 and 0.98 +- 0.01, 0.89 +- 0.15 and 0.97 +- 0.11 on two measured sites (spacing 32). The logarithm of the increments' flatness was lower by
+//!   0.1, 0.9 and 0.2. That of the shipped kernel is lower by 0.19 to 0.39 on seven synthetic sites like those of its test: the excess over 3 drops by 28
+//!   to 49 %.
 //! * Distances are in cells, not in metres: on oblong cells the nearest neighbours are not the nearest on the ground.
 //! * A level residual gives a level texture, as with [`super::quilting`]; the methods that use statistics refuse it.
-//! * A gap in the site costs only the places whose neighbourhood it covers by more than 30 %. The DEM licence extends to the texture.
+//! * A gap in the site excludes only the places whose neighbourhood it covers by more than 30 %. The DEM licence extends to the
+//!   texture.
 //!
 //! # Cost
 //! For each cell of the texture `neighbours` places that continue a neighbour, and with the default `scan` at most 55 at random (23 for first cells

@@ -5,17 +5,17 @@
 //!
 //! `mismatch = var(k - z) / (var(k) + var(z)) + LEVEL_WEIGHT level^2 / sigma^2`
 //!
-//! The cell becomes `z(s) + level`: the detail of the place on the level of its own surroundings. Where the neighbours are one piece of
-//! the site, mismatch and level are 0 and the cell is a copy. Two neighbourhoods that have nothing in common have a mismatch of 1, whatever their
-//! roughness; without the division a flat place would fit a rough neighbourhood better than another rough one.
+//! The cell becomes `z(s) + level`: the detail of the place on the level of its own surroundings. Where the neighbours are one piece of the site,
+//! mismatch and level are 0 and the cell is a copy. Two unrelated neighbourhoods have a mismatch of 1, whatever their roughness; without the
+//! division a flat place would fit a rough neighbourhood better than another rough one.
 //!
 //! Where no place has data for enough of a neighbourhood, the cell becomes the weighted mean of its neighbours: a height drawn from the site would
 //! stand out by up to the site's relief.
 //!
 //! Unknown cells are visited on grids of spacing 2^k, 2^(k-1) ... 1, each in four passes: every second cell of both axes; the centres between them;
-//! the rest of every second row; the rest of the columns. Cells of one pass do not see each other, so that they may be computed in any order.
-//! On a torus whose side is not a multiple of a grid's spacing, the last line of a pass has no line of the pass before it beyond the border: it
-//! follows the other lines, so that it sees both sides. Without that, steps across the border are twice those within.
+//! the rest of every second row; the rest of the columns. Cells of one pass do not see each other, so that they may be computed in any order. On a
+//! torus whose side is not a multiple of a grid's spacing, the last line of a pass has no line of the pass before it beyond the border: it follows
+//! the other lines, so that it sees both sides. Otherwise steps across the border would be twice those inside.
 
 use crate::synth::measured::Holes;
 use rayon::prelude::*;

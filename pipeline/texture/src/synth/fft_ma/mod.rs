@@ -37,10 +37,10 @@
 //! Cost: a quarter of a complex transform for the spectrum (half of one if the axes of anisotropy are not the grid's),
 //! half of one for the field, a square root and a phase per mode.
 //!
-//! Memory at the peak, per torus cell: 10 bytes, of which 2 are a quarter of the spectrum and 8 the field, transformed where it
-//! lies; 16 if the axes of anisotropy are not the grid's, while the covariance (8) and its half transform (8) are there. With the buffers of
-//! the threads 175 MB were measured for 4096 x 4096 cells, 10.4 bytes each. A cost states 18 for both, which leaves room for those buffers
-//! on small tori, and 8 more for each cell of the tile (`tests/memory.rs`).
+//! Peak memory per torus cell: 10 bytes, 2 for a quarter of the spectrum and 8 for the field, which is transformed in place; 16 if the axes
+//! of anisotropy are not the grid's, while both the covariance (8) and its half transform (8) are held. Including thread buffers, 175 MB
+//! were measured for 4096 x 4096 cells, 10.4 bytes each. A cost states 18 for both, which leaves room for those buffers on small tori, and 8
+//! more for each cell of the tile (`tests/memory.rs`).
 
 mod aim;
 mod spectrum;
@@ -197,7 +197,7 @@ impl MethodParameters for FftMaParameters {
         let cells = self.torus_of_any(tile).map(|n| n as f64);
         if cells[0] * cells[1] > CELLS_MAX as f64 {
             let message = format!(
-                "is false, which needs a torus of {:.1e} cells; the most is {CELLS_MAX}: use larger cells or a smaller texture",
+                "is false, which needs a torus of {:.1e} cells; the limit is {CELLS_MAX}: use larger cells or a smaller texture",
                 cells[0] * cells[1]
             );
             return Err(ParameterError::new("periodic", message));
@@ -291,7 +291,7 @@ impl FftMaParameters {
                 ),
                 Some(_) => ("which".to_owned(), "use larger cells or a smaller texture"),
             };
-            let needed = format!("needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}");
+            let needed = format!("needs a torus of {cells:.1e} cells; the limit is {CELLS_MAX}");
             return Err(ParameterError::new("periodic", format!("is false, {whose} {needed}: {advice}")));
         }
         Ok(enough.map(|n| if self.periodic { n as usize } else { smooth_length(n as usize) }))

@@ -570,7 +570,7 @@ fn val_empirical_refusals() {
         raw[key] = value;
         raw
     };
-    assert!(refused("cholesky", size.clone(), fit).contains("made by `fft_ma` only"));
+    assert!(refused("cholesky", size.clone(), fit).contains("only `fft_ma` can synthesise"));
     assert!(refused("fft_ma", with("cell_m", json!(0.05)), fit).contains("whole multiples"));
     assert!(refused("fft_ma", with("azimuth_deg", json!(10.0)), fit).contains("is empirical"));
     assert!(

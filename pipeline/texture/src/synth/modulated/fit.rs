@@ -17,7 +17,7 @@
 //!
 //! Where Q is above 0.5, v is compared with v_0, the log variance found in normal products: v_0 / v is 1 less the mean slope of the iteration between 0
 //! and v. If v_0 is less than a quarter of v, or v is the largest allowed, v_0 is taken instead, and the difference counts as error. On rough ground
-//! the ratio is as small where patches are strong, but v is right. With numpy, 256 x 256 cells, patches of 8 cells:
+//! with strong patches the ratio is just as small, but v is right. With numpy, 256 x 256 cells, patches of 8 cells:
 //!
 //! | ground | truth | Q | v by the iteration | v_0 | v_0 / v |
 //! |---|---|---|---|---|---|

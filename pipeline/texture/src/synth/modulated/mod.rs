@@ -15,10 +15,10 @@
 //! | `log_variance`, s^2 | 0 to 2 | variance of ln A; 0 gives a normal field with the residual's heights |
 //! | `range_m`, L | m | distance over which the correlation of ln A falls to 1/e: half width of a patch |
 //!
-//! The fit ([`measure`], derivation in `fit.rs`) takes s^2 and L from the covariance by lag of `ln |d|`, d the mixed differences of blocks of 2 x 2
-//! cells: `s^2 rho(h)` plus a known term for normal variables. No slope reaches d; the map T is undone by the quantiles that s^2 implies, so
-//! that a skewed or heavy-tailed T is not taken for patches; and no moment above the second of a logarithm is used: a flatness rests on a handful
-//! of increments. An independent program found, for 40 fields of 256 x 256 cells with an exponential covariance of 6 cells, as mean and standard deviation
+//! The fit ([`measure`], derivation in `fit.rs`) takes s^2 and L from the covariance by lag of `ln |d|`, d the mixed differences of blocks of 2 x 2 cells:
+//! `s^2 rho(h)` plus a known term for normal variables. Slopes do not affect d. The map T is undone by the quantiles that s^2 implies, so a skewed or
+//! heavy-tailed T is not mistaken for patches. No moment above the second of a logarithm is used, because a flatness rests on a handful of increments. For
+//! 40 fields of 256 x 256 cells with an exponential covariance of 6 cells, an independent program found this mean and standard deviation:
 //!
 //! | s^2 | L = 4 cells | 8 | 20 | L = 8; slope, holes, 5 % white noise, less a moving average of 48 cells |
 //! |---|---|---|---|---|
@@ -28,9 +28,9 @@
 //! | 0.8 | 0.840, 0.198 | 0.826, 0.197 | 0.857, 0.247 | 0.763, 0.143 |
 //!
 //! L within 8 %. With a heavy-tailed T, 0.3 and 0.8 are found as 0.304 and 0.856; with a Matern 3/2 covariance as 0.340 and 1.00, and worse on smoother
-//! ground (`fit.rs`). White noise fills quiet places: with 20 % of the standard deviation 0.3 becomes 0.15, and the texture has the noise in patches
-//! too. L of 2 or 3 cells are found as 4.3 and 3.7. The stated standard error covers the spread within a third to a half, but not noise. s^2 is reduced
-//! until the covariance of a texture is within 10 % of the variance, and the variance of one-cell increments within 10 %.
+//! ground (`fit.rs`). White noise fills quiet places: noise of 20 % of the standard deviation turns 0.3 into 0.15, and the texture has the noise in
+//! patches too. An L of 2 or 3 cells is found as 4.3 or 3.7. The stated standard error covers the spread within a third to a half, but not noise. s^2
+//! is reduced until the covariance of a texture is within 10 % of the variance, and the variance of one-cell increments within 10 %.
 //!
 //! Source: Castaing, Gagne and Hopfinger 1990, Physica D 46, 177, doi:10.1016/0167-2789(90)90035-N (log-normal amplitudes, flatness by scale);
 //! Mehler 1866. Departure: the monotone map outside the product.
@@ -41,8 +41,9 @@
 //! Patches are isotropic in metres, whatever the anisotropy of the site.
 //!
 //! Not identified: s^2 of smooth ground (`fit.rs`); L beyond 40 cells or a sixth of the site, where the search ends. One scale of patches is fitted, so
-//! L is a compromise where patches have patches. Not reached: a flatness far above that of the heights, since T cuts the tails of the product to those
-//! of the heights. Flatness over 1, 2, 4, 8, 16 and 32 cells of the unseen half of three sites, of textures of the other half, and of T alone (s^2 = 0):
+//! L is a compromise where patches contain patches. Not reached: a flatness far above that of the heights, since T cuts the tails of the product to
+//! those of the heights. Flatness over 1, 2, 4, 8, 16 and 32 cells of the unseen half of three sites, of textures of the other half, and of T alone (s^2
+//! = 0):
 //!
 //! | site | s^2, L | unseen half | texture | T alone |
 //! |---|---|---|---|---|
@@ -442,7 +443,7 @@ fn check_range(range_m: f64, range_cells: [f64; 2], torus: [usize; 2], cell_m: [
     if torus[0] as f64 * torus[1] as f64 > tile::CELLS_MAX as f64 {
         let cells = torus[0] as f64 * torus[1] as f64;
         return refuse(format!(
-            "is {range_m}, which needs a torus of {cells:.1e} cells; the most is {}",
+            "is {range_m}, which needs a torus of {cells:.1e} cells; the limit is {}",
             tile::CELLS_MAX
         ));
     }

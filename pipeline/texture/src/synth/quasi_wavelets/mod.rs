@@ -117,7 +117,7 @@ impl MethodParameters for QuasiWaveletsParameters {
         }
         let least = self.least_count(tile);
         if least > COUNT_MAX {
-            let message = format!("is {packing}, which needs at least {least:.1e} bumps; the most is {COUNT_MAX:.0e}");
+            let message = format!("is {packing}, which needs at least {least:.1e} bumps; the limit is {COUNT_MAX:.0e}");
             return Err(ParameterError::new("packing", message));
         }
         Ok(())
@@ -191,7 +191,7 @@ fn classes(
         let count = bumps(packing, tile, along_m, across_m);
         if count > COUNT_MAX {
             let message = format!(
-                "is {}, which needs {count:.1e} bumps of {along_m:.3} m; the most is {COUNT_MAX:.0e}",
+                "is {}, which needs {count:.1e} bumps of {along_m:.3} m; the limit is {COUNT_MAX:.0e}",
                 parameters.packing
             );
             return Err(ParameterError::new("packing", message));

@@ -3,22 +3,22 @@
 //! # What
 //! Patches of the site are laid row by row, each onto an overlap with earlier ones.
 //!
-//! 1. Choose: over the overlap, every complete patch of the site is compared, or of a part of a large one that is drawn anew for each patch: the sum of
-//!    squared differences over the geometric mean of the two sums of squares, times a cost for cells that were laid more often than those
-//!    of the site (`search.rs`). One of those within `tolerance` of the least is taken at random.
-//! 2. Cut: within each strip of overlap, the connected path along which the squared differences add up to the least is found by
-//!    dynamic programming (`cut.rs`). Cells beyond the path are those of the new patch.
+//! 1. Choose: every complete patch of the site (of a large site, of a part drawn for each patch) is compared over the overlap, by the sum of squared
+//!    differences over the geometric mean of the two sums of squares, times a cost for cells that were laid more often than those of the site on
+//!    average (`search.rs`). One of the patches within `tolerance` of the best is taken at random.
+//! 2. Cut: dynamic programming finds the connected path with the least sum of squared differences through each strip of overlap
+//!    (`cut.rs`). Cells beyond the path come from the new patch.
 //! 3. Blend: the step that remains at the cut is spread over about two cells on each side (weights: the cut mask smoothed by (1, 2, 1) / 4,
-//!    twice). Without it a step of up to twice the usual increment lies along every cut.
+//!    twice). Without it, every cut has a step of up to twice the usual increment.
 //!
 //! A periodic tile is a torus: the last patches of a row or column are also cut against the first.
 //!
 //! # Statistics
-//! The least sum of squared differences, the rule of the source, prefers calm patches. It lowers the standard deviation by 17 to 40 %, and
-//! increments by 19 to 49 %, on five sites; cut and blend take 1 to 2 %, and 3 % of the increments. Dividing by the squares removes the preference,
-//! but the roughest or the calmest part of a site may then dominate the texture (0.85 to 1.26 of the standard deviation); the cost prevents that. An independent
-//! program made textures of 256 x 256 cells (gravel: 128 x 128; its gaps were not closed), of which two to four gave, as ratios to the site (mean
-//! and spread between textures) and as the difference of `ln` of the flatness at a lag of one cell:
+//! The rule of the source, the least sum of squared differences, prefers calm patches: on five sites it lowers the standard deviation by 17 to 40 % and
+//! increments by 19 to 49 %. Cut and blend lower them by 1 to 2 % and by 3 %. Dividing by the squares removes the preference, but the roughest or the calmest
+//! part of a site may then dominate the texture (0.85 to 1.26 of the standard deviation); the cost prevents that. The table gives ratios to the site (mean and
+//! spread between textures), and the difference of `ln` of the flatness at a lag of one cell, for two to four textures of 256 x 256 cells by an independent
+//! program (gravel: 128 x 128; its gaps were not closed):
 //!
 //! | site, cell; patch, cells | the source: deviation | increments | now: deviation | increments | flatness |
 //! |---|---|---|---|---|---|
@@ -29,8 +29,8 @@
 //! | gravel bar, 0.02 m; 15 | 0.60 +- 0.06 | 0.51 | 0.96 +- 0.03 | 0.97 | -0.3 |
 //!
 //! # Copies
-//! A place that would continue a neighbour as the site does is avoided, so that a copied run is about one patch long. Only a site too small for that
-//! breaks the rule. [`super::measured::Copies`] reports the result.
+//! Places that would continue a neighbour as the site does are avoided, so a copied run is about one patch long. Only a site that is too small
+//! breaks this rule. [`super::measured::Copies`] reports the result.
 //!
 //! # Source
 //! Efros and Freeman 2001, Image quilting for texture synthesis and transfer, SIGGRAPH, 341-346, doi:10.1145/383259.383296, section 2.
@@ -40,18 +40,20 @@
 //! anisotropy and skewness stay.
 //!
 //! # Limits
-//! * Patches have one size, and are laid once: no passes from wide to narrow patches, as in the texture transfer of the source (section 3).
-//! * Features wider than a patch are lost; a single striking feature (a boulder, a rut) comes back as often as its patch is chosen.
-//! * On a site that is not stationary (half gullies, half plain) gullies start and end at cuts: cut the site to one kind of ground.
+//! * Patches have one size and are laid once; there are no passes from wide to narrow patches, as in the texture transfer of the source
+//!   (section 3).
+//! * Features wider than a patch are lost; a single striking feature (a boulder, a rut) recurs as often as its patch is chosen.
+//! * On a site that is not stationary (half gullies, half plain) gullies start and end at cuts: crop the site to one kind of
+//!   ground.
 //! * A texture of few patches is a small sample: with 36 of them the standard deviation spreads by 4 to 6 % between textures, and the flatness of
 //!   increments, which single cells may decide, by up to a factor of e. The standard deviations of the halves of the measured sites have ratios of 0.57 to 1.07.
-//! * Cells near the border of a site or of a wide gap lie in few patches and occur seldom.
+//! * Cells near the border of a site or of a wide gap lie in few patches and are rarely copied.
 //! * Gaps of less than about 13 cells are closed first, by direct sampling from the site itself ([`super::exemplar`]). Patches with a wider gap are not
 //!   used: a site with many gets smaller patches; below [`PATCH_MIN`] cells it is refused.
-//! * A texture shows nothing that the site does not have: from one boulder it never makes a second kind. The DEM licence extends to it.
+//! * A texture shows nothing that the site does not have: one boulder never yields a second kind. The DEM licence extends to it.
 //!
 //! # Cost
-//! Per patch two transforms (three where a part of the site is searched) of at most 16 384 blocks and of at most 32 blocks for each cell of the
+//! Per patch, two transforms (three where a part of the site is searched) of at most 16 384 blocks and at most 32 blocks for each cell of the
 //! patch, and 32 exact comparisons for each cell of a block, at most 16: 1024 x 1024 cells take some 800 patches of 48, 1 to 2 s, or 6200 of
 //! 18, about 5 s, whatever the size of the site (estimates). Memory: 64 bytes per cell of the site, 24 per cell of the texture, and 8 MB.
 

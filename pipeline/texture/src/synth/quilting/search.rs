@@ -10,7 +10,8 @@
 //! patch is calmer than those before. The mismatch is least at a = 1, and 1/a fits as well as a does.
 //!
 //! # Use
-//! With this mismatch alone, the roughest or the calmest part of a site takes over, because like fits like. So it is multiplied by a cost,
+//! With this mismatch alone, the roughest or the calmest part of a site takes over, because like fits like. It is therefore multiplied by
+//! a cost,
 //!
 //! `1 + evenness max(0, u(s) - v)`
 //!
@@ -22,10 +23,10 @@
 //! the unknown cells of a patch are a rectangle. A large site is searched on block means of `factor` cells a side; the best [`CANDIDATES`] places are
 //! then compared exactly, at every cell of their blocks.
 //!
-//! Blocks cannot be wider than a third of the overlap, nor so wide that the exact comparison outweighs the transforms. Where they leave too
-//! many, each patch is sought in a part of the site only, the surroundings of a random place. For patches of 18 cells on a site of 1024 x 1024
-//! the least root mean square difference in such a part, 101 x 101 cells, is 1.15 (exponential covariance) to 1.26 times (Gaussian) that in all of the site
-//! (simulated), as much as a tolerance of 0.15 to 0.26 would give.
+//! Blocks cannot be wider than a third of the overlap, nor so wide that the exact comparison outweighs the transforms. Where they leave too many, each
+//! patch is sought only in a part of the site, around a random place. For patches of 18 cells on a site of 1024 x 1024 the least root mean square
+//! difference in such a part, 101 x 101 cells, is 1.15 (exponential covariance) to 1.26 times (Gaussian) that in all of the site (simulated), as much as a
+//! tolerance of 0.15 to 0.26 would give.
 
 use crate::synth::measured::Holes;
 use sastrugi_numeric::fft::{HalfSpectrum, RealFft2, smooth_length};

@@ -285,7 +285,7 @@ fn val_refusals() {
     );
     assert_eq!(
         refused(&site, &tile(50, 80, true), &parameters(1.1)),
-        "`patch_m` is 1.1, too narrow for an overlap that can be cut; it must be at least 1.2 m"
+        "`patch_m` is 1.1, too narrow to cut through its overlap; it must be at least 1.2 m"
     );
     assert_eq!(
         refused(&site, &tile(200, 200, true), &parameters(5.5)),

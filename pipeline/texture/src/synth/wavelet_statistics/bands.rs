@@ -1,10 +1,10 @@
 //! Wavelets: octaves and orientations of a surface, from its spectrum.
 //!
-//! Band (j, k) is `F^-1[ R_j(|f|) a |cos(theta - pi k / 4)|^3 (1 + sign) F z ]`: a complex field whose real part holds the waves of octave j
-//! and direction k, and whose imaginary part holds them a quarter of a wave later. `|f|` is the frequency over Nyquist's; `R_0` rises from 0
-//! at 1/2 to 1 at 1 and stays there, `R_j` is centred at `2^-j`; the squares of all bands and of the low-pass that is left add up to 1.
-//! Frequencies are per cell, so that on oblong cells bands are oblong too. At Nyquist's frequency, which only even sizes have, filters of odd and of 45-degree
-//! directions are not Hermitian, and bands do not add up to the field. Only changes of bands are added here, so that nothing of the field is lost.
+//! Band (j, k) is `F^-1[ R_j(|f|) a |cos(theta - pi k / 4)|^3 (1 + sign) F z ]`: a complex field whose real part holds the waves of octave j and direction k,
+//! and whose imaginary part holds them a quarter of a wave later. `|f|` is the frequency over Nyquist's; `R_0` rises from 0 at 1/2 to 1 at 1 and stays there,
+//! `R_j` is centred at `2^-j`; the squares of all bands and of the low-pass that is left add up to 1. Frequencies are per cell, so that on oblong cells bands
+//! are oblong too. At Nyquist's frequency, which only even sizes have, filters of odd and of 45-degree directions are not Hermitian, and bands do not add up
+//! to the field. Only changes of bands are added here, so the field loses nothing.
 //!
 //! Source: Simoncelli and Freeman 1995, doi:10.1109/ICIP.1995.537667; Portilla and Simoncelli 2000, International Journal of Computer Vision 40, 49,
 //! doi:10.1023/A:1026553619983. Departure: full size at every octave, so that any size can be transformed and a shift of the surface shifts its

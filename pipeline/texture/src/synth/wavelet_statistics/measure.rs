@@ -1,10 +1,10 @@
 //! Wavelet statistics of a masked residual.
 //!
-//! A magnitude counts only where the cells within `2^j` of it (octave j) all have data. Wavelets reach farther, though weakly: on ground whose
-//! short waves are weak a step at the edge of a hole or of the raster is seen everywhere. So cells without data, and a margin that joins the opposite
-//! sides of the raster, are filled smoothly first (`filling.rs`). Measured on smooth ground (amplitudes that fall with the fourth power of the
-//! frequency, 512 x 512 cells; error of the mean logarithm of the finest octave): with 0 in holes and margin 0.27, and 0.82 with a
-//! fifth of the cells in holes 40 wide; filled 0.02 and 0.06.
+//! A magnitude counts only where the cells within `2^j` of it (octave j) all have data. Wavelets reach farther, though weakly: on ground whose short
+//! waves are weak a step at the edge of a hole or of the raster is seen everywhere. So cells without data, and a margin that joins the opposite sides
+//! of the raster, are filled smoothly first (`filling.rs`). Error of the mean logarithm of the finest octave on smooth ground (amplitudes that fall
+//! with the fourth power of the frequency, 512 x 512 cells): with 0 in holes and margin, 0.27, and 0.82 with a fifth of the cells in holes 40 wide;
+//! filled, 0.02 and 0.06.
 //!
 //! A covariance between octaves is the correlation on the cells of the coarser one, with the standard deviations of each.
 

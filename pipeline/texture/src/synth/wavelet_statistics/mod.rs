@@ -2,10 +2,10 @@
 //! magnitudes of its wavelets across octaves and directions.
 //!
 //! From a normal field on a torus, `rounds` times, in this order:
-//! 1. magnitudes: each band of the field ([`Wavelets`]: octaves j, four directions) is a complex field u with logarithm
-//!    `l = ln(|u| + floor)`. All l together are mapped linearly to the measured means and covariance, `l' = mu_0 + A (l - mu)`, by the A that
-//!    moves them least (`symmetric.rs`). The mean of all l' at a cell is given the measured covariance by lag, so that rough places are as
-//!    large as on the site. Every band is multiplied by `exp(l' - l)`, at most [`GAIN_MAX`], its phase unchanged;
+//! 1. magnitudes: each band of the field ([`Wavelets`]: octaves j, four directions) is a complex field u with logarithm `l = ln(|u| +
+//!    floor)`. All l are mapped jointly and linearly to the measured means and covariance, `l' = mu_0 + A (l - mu)`, by the A that moves them
+//!    least (`symmetric.rs`). The mean of all l' at a cell is given the measured covariance by lag, so that rough places are as large as on
+//!    the site. Every band is multiplied by `exp(l' - l)`, at most [`GAIN_MAX`], its phase unchanged;
 //! 2. covariance: each mode is multiplied by the root of the measured spectrum over the field's, both smoothed in the same way
 //!    (`target.rs`), by a factor from 1/2 to 2; short waves by the spectra of the Laplacian ([`spectrum`]);
 //! 3. differences: the distributions of increments (lags of 1, 2, 4 ... 64 cells along rows and columns, 1 along diagonals), of the Laplacian
@@ -24,10 +24,10 @@
 //!   phases as covariances (Zhang and Mallat 2021, Maximum entropy models from phase harmonic covariances, Applied and Computational Harmonic Analysis
 //!   53, 199-230). Matching these takes gradient descent; a fixed number of projections does not reach them.
 //!
-//! Measured on halves of sites with a prototype of the same steps, which is not part of this repository (`benches/measure_textures` judges the shipped
-//! kernel); window 25 cells, four octaves, lags of differences to 8 cells. Values are the distance of the texture of one half from the other half, and
-//! in brackets that of the two halves from each other; slopes and curvatures relative. The last columns are the one-cell flatness (fitted half, other
-//! half) and the largest error of the covariance up to 12 lags.
+//! Measured on halves of sites with a prototype of the same steps that is not part of this repository (`benches/measure_textures` judges the shipped
+//! kernel); window 25 cells, four octaves, lags of differences to 8 cells. Values are the distance of the texture of one half from the other half and,
+//! in brackets, the distance between the two halves; slopes and curvatures are relative. The last columns are the one-cell flatness (fitted half,
+//! other half) and the largest error of the covariance up to 12 lags.
 //!
 //! | site | slope | curvature | flatness | third order | extrema | directions | one-cell flatness | covariance |
 //! |---|---|---|---|---|---|---|---|---|
@@ -200,7 +200,7 @@ impl WaveletStatisticsParameters {
         let cells = torus[0] as f64 * torus[1] as f64;
         if cells > CELLS_MAX as f64 {
             let message =
-                format!("needs a torus of {cells:.1e} cells; the most is {CELLS_MAX}: make the texture smaller");
+                format!("needs a torus of {cells:.1e} cells; the limit is {CELLS_MAX}: make the texture smaller");
             return Err(ParameterError::new("size_px", message));
         }
         let octaves = statistics.wavelets.octaves;
