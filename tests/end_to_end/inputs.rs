@@ -191,7 +191,7 @@ fn val_wrong_inputs_are_refused() {
         (call.code, call.stderr)
     };
     for (from, to, code, words) in [
-        ("\"bright.tif\"", "\"brihgt\"", 2, "names \"brihgt\", which is not among the ids that it can refer to"),
+        ("\"bright.tif\"", "\"brihgt\"", 2, "names \"brihgt\", which is not an id that it can refer to"),
         ("\"bright.tif\"", "\"dark.tif\"", 65, "dark.tif: no such file"),
         ("\"laser.csv\"", "\"laser.txt\"", 65, "laser.txt: no such file"),
         ("world.rock-potential", "site.rock-potential", 2, "names the map `rock-potential` of \"site\""),

@@ -478,7 +478,10 @@ fn val_merge_refuses_what_does_not_fit() {
         assert!(!path.join("merged").exists());
     };
     refused(&["a"], "shard 2 of 2 is missing; run the study again with `--shard 2/2`");
-    refused(&["a", "b", "nowhere"], "nowhere is not a shard: it has no shard.json; all 2 shards are there without it");
+    refused(
+        &["a", "b", "nowhere"],
+        "nowhere is not a shard: it has no shard.json; all 2 shards are present without it",
+    );
     refused(&["a", "nowhere"], "nowhere is not a shard: it has no shard.json; shard 2 of 2 is missing");
     refused(&["a", "a"], "both shard 1");
     refused(&["a", "c"], "another study");

@@ -262,7 +262,7 @@ fn val_the_verb_recovers_from_files() {
 fn val_wrong_items_are_refused() {
     let folder = area_with_points();
     for (before, after, words) in [
-        ("[0.0, 120.0, 240.0]", "[0.0, 120.0]", "need at least"),
+        ("[0.0, 120.0, 240.0]", "[0.0, 120.0]", "at least 3 are needed"),
         ("images = [\"suns\"]\nsamples = 16", "images = [\"sun\"]\nsamples = 16", "did you mean"),
         ("coarse_sigma_m = 20.0", "coarse_sigma_m = 0.0", "above 0"),
         ("[0.0, 120.0, 240.0]", "[0.0, 0.01, 180.0]", "the suns lie in one plane"),

@@ -116,7 +116,7 @@ fn val_holes_are_filled_in_a_study() {
         assert_eq!(info["valid"], 160 * 160, "{method}");
     }
     for (text, words) in [
-        (study("cholesky"), "takes `fft_ma` or a method that repeats the site"),
+        (study("cholesky"), "needs `fft_ma` or a method that repeats the site"),
         (study("modulated").replace("statistics = true\n", ""), "statistics = true"),
         (study("modulated").replace("seed = 4", "size_px = [9, 9]"), "takes its cells from the DEM"),
     ] {

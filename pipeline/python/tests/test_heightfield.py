@@ -154,6 +154,6 @@ def test_refusals():
     with pytest.raises(sastrugi.SastrugiError, match="A is in degrees; DEMs are co-registered in metres") as refused:
         sastrugi.coregister(DEMS / "jacksboro.tif", DEMS / "jacksboro.tif")
     assert refused.value.code == 65
-    with pytest.raises(sastrugi.SastrugiError, match="the height in row 0, column 1 is infinite; mark holes by NaN") as refused:
+    with pytest.raises(sastrugi.SastrugiError, match="the height in row 0, column 1 is infinite; mark holes with NaN") as refused:
         Heightfield([[1.0, np.inf]], cell=1.0).save("a.tif")
     assert refused.value.code == 65

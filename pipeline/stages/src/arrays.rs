@@ -1,4 +1,5 @@
-//! From arrays to arrays: what the verbs of the same names do with files, for callers that hold surfaces in memory (the Python module).
+//! Functions from arrays to arrays, for callers that hold surfaces in memory (the Python module); the verbs of the same names do this
+//! with files.
 //!
 //! Parameters have the form that they have in a study. The same heights, parameters and seed give the same result as the verb: the file that
 //! the verb writes and a file written from the result have the same bytes.
@@ -80,7 +81,9 @@ impl Raster {
         }
         if let Some(place) = grid.values.iter().position(|z| z.is_infinite()) {
             let (row, col) = (place / cols, place % cols);
-            return Err(Error::Input(format!("the height in row {row}, column {col} is infinite; mark holes by NaN")));
+            return Err(Error::Input(format!(
+                "the height in row {row}, column {col} is infinite; mark holes with NaN"
+            )));
         }
         Ok(Self { grid, crs })
     }
@@ -237,7 +240,7 @@ mod tests {
             "`cell` is [0.0, 1.0]; cell sizes must be finite and above 0"
         );
         assert_eq!(of([1.0; 2], [f64::NAN, 0.0], 3.0).unwrap_err(), "`origin` is [NaN, 0.0]; it must be finite");
-        let infinite = "the height in row 1, column 0 is infinite; mark holes by NaN";
+        let infinite = "the height in row 1, column 0 is infinite; mark holes with NaN";
         assert_eq!(of([1.0; 2], [0.0; 2], f64::INFINITY).unwrap_err(), infinite);
     }
 

@@ -653,11 +653,11 @@ pub fn unknown_id<'s>(entry: &Entry<'_>, key: &str, id: &str, known: impl Iterat
     let known: Vec<&str> = known.map(String::as_str).collect();
     let nearest = nearest(id, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
     let list = if known.is_empty() {
-        format!("no table without errors defines an id that `{key}` can name")
+        format!("no valid table defines an id for `{key}`")
     } else {
         format!("known: {}", known.join(", "))
     };
-    let error = entry.error(key, format!("`{key}` names \"{id}\", which is not among the ids that it can refer to"));
+    let error = entry.error(key, format!("`{key}` names \"{id}\", which is not an id that it can refer to"));
     StudyError { missing_id: Some(id.into()), ..error.with_help(Some(nearest.unwrap_or(list))) }
 }
 

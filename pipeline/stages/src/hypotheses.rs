@@ -94,7 +94,9 @@ fn check_run(builder: &Builder<'_>, entry: &Entry<'_>, item: &HypothesisItem) ->
         _ if of_all.is_empty() => {
             "cannot be determined: no traverse without a sweep drives all of these groups".to_owned()
         }
-        None if any.len() > 1 => format!("is missing; several traverses drive these groups: {list}"),
+        None if any.len() > 1 => {
+            format!("is missing; several traverses drive these groups; choose one that drives all of them: {list}")
+        }
         Some(run) if !of_all.contains(&run) => {
             format!("is \"{run}\", which is swept or does not drive all of these groups; choose one of: {list}")
         }

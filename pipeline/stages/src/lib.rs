@@ -4,14 +4,15 @@
 //! From a study to a release:
 //!
 //! 1. [`loaded::load`] reads the TOML file, checks it against the schemas of its sections ([`registry::SECTIONS`]), and adds the items of
-//!    each table to a [graph](runner::graph). Errors come all at once, with their places in the text ([`Error::Study`]).
+//!    each table to a [graph](runner::graph). All errors are reported at once, with their places in the text ([`Error::Study`]).
 //! 2. [`studies::plan_of`] compares the keys of the items with the work area: what would be computed, and why.
 //! 3. [`studies::run`] computes the missing items, each in a folder of its own in the work area, and assembles their files, the tables, the
 //!    report and the manifest into a release.
-//! 4. [`studies::merge`] does the last step for shards; [`verification::verify`] checks a release, and [`packing::pack`] makes one file of it;
-//!    [`remote`] keeps releases in an object store.
+//! 4. [`studies::merge`] does the last step for shards; [`verification::verify`] checks a release, and [`packing::pack`] packs it into one
+//!    file; [`remote`] keeps releases in an object store.
 //!
-//! [`verbs`] do the same work for single files, [`arrays`] for surfaces in memory. Nothing here prints: a run tells a [`runner::progress::Progress`].
+//! [`verbs`] do the same work for single files, [`arrays`] for surfaces in memory. Nothing here prints: a run reports to a
+//! [`runner::progress::Progress`].
 //!
 //! # Example
 //!

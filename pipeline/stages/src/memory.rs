@@ -1,5 +1,5 @@
-//! Memory that is still available. Work whose estimate exceeds it is refused: an allocation that fails ends the process, and with it the
-//! notebook that uses the Python module.
+//! Available memory. Work whose estimate exceeds it is refused, because a failed allocation ends the process, and with it the notebook
+//! that uses the Python module.
 
 use crate::error::Error;
 use std::fs;

@@ -1,9 +1,9 @@
 //! Releases in an object store, `s3://bucket/prefix`.
 //!
 //! A release is assembled in the work area and then uploaded: its checksums first, which no other release has, then its content, the manifest
-//! last. Checksums and manifest are created only if they do not exist, so two releases never mix: whoever created the checksums has the address.
-//! Without a manifest there is no release, so an interrupted upload never looks like one; the next upload resumes it. Nothing that exists is
-//! overwritten: objects with the same bytes are kept, others are refused.
+//! last. Checksums and manifest are created only if they do not exist, so two releases never mix: whoever created the checksums owns the
+//! address. Without a manifest there is no release, so an interrupted upload never looks like one; the next upload resumes it. Nothing that
+//! exists is overwritten: objects with the same bytes are kept, others are refused.
 
 use crate::error::Error;
 use crate::runner::cache::Cache;

@@ -183,8 +183,10 @@ fn images_by_surface(
     }
     match by_surface.iter().find(|(_, images)| images.len() < 3) {
         Some((surface, images)) => {
-            let message =
-                format!("`images` has {} of \"{surface}\"; two slopes and an albedo need at least 3", images.len());
+            let message = format!(
+                "`images` has {} of \"{surface}\"; at least 3 are needed to determine two slopes and an albedo",
+                images.len()
+            );
             Err(entry.error("images", message).into())
         }
         None if by_surface.is_empty() => Err(entry.error("images", "`images` is empty; at least 3 are needed").into()),

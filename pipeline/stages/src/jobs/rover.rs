@@ -130,7 +130,7 @@ fn check_planner_keys(params: &Value) -> Result<(), ParameterError> {
     };
     for key in params.as_object().into_iter().flat_map(|map| map.keys()) {
         if RULES.contains(&key.as_str()) {
-            let message = "is a rule of the reactive navigators; `planner` has none, it searches for its path";
+            let message = "is a rule of the reactive navigators; `planner` searches for its path instead";
             return Err(ParameterError::new(key, message));
         }
         if other.contains(key) && !own.contains(key) {

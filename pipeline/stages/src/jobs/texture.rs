@@ -436,8 +436,8 @@ impl<'t> One<'t> {
 fn on_cells_of(dem: &Heightfield, parameters: &mut Value) -> Result<(), String> {
     let Some(Geometry { rows, cols, cell, .. }) = dem.expected else {
         return Err(format!(
-            "\"{}\" does not state its cells before the run, which a texture that repeats a site needs; convert it to GeoTIFF, or fill with \
-             `fft_ma`",
+            "the cells of \"{}\" are not known before the run, but a texture that repeats a site needs them; convert it to GeoTIFF, or fill \
+             with `fft_ma`",
             dem.item.id
         ));
     };
@@ -517,7 +517,7 @@ fn check_purpose(entry: &Entry<'_>, item: &TextureItem, params: &Value) -> Resul
     let fills = item.method == fft_ma::kind().kind || needs(&item.method) != Some(Needs::Covariance);
     if item.fill.is_some() && (item.onto.is_some() || item.methods.is_some() || !fills) {
         let message =
-            "`fill` cannot be combined with `onto` or `methods`, and takes `fft_ma` or a method that repeats the site";
+            "`fill` cannot be combined with `onto` or `methods`, and needs `fft_ma` or a method that repeats the site";
         return Err(entry.error("fill", message));
     }
     let keys = params.as_object().into_iter().flat_map(|p| p.keys()).chain(item.sweep.keys());

@@ -1,4 +1,4 @@
-//! Room on surfaces for what is to happen there, as far as the sizes of the surfaces are known before the run.
+//! Checks before the run that surfaces have room for the missions and routes on them, as far as their sizes are known.
 
 use crate::builder::{Builder, Heightfield};
 use crate::study::{Entry, StudyError};

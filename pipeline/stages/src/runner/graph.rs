@@ -1,6 +1,6 @@
 //! The graph of items: their dependencies and keys.
 //!
-//! Beside its name and its job, an item takes less than 200 bytes here, because a study may have a million: keys are 32 bytes in place, parents
+//! Besides its name and its job, an item takes less than 200 bytes here, because a study may have a million: keys are 32 bytes inline, parents
 //! are positions, and the index holds hashes of names.
 
 use super::cache::KEY_DIGITS;

@@ -289,7 +289,7 @@ pub fn join(folders: &[PathBuf]) -> Result<Joined, Error> {
     let of_set = check_set(&shards);
     if let Some(one) = shards.first().filter(|_| !problems.is_empty() && of_set.is_empty()) {
         let it = if problems.len() == 1 { "it" } else { "them" };
-        problems.push(format!("all {} shards are there without {it}; leave {it} out", one.shard.part.count));
+        problems.push(format!("all {} shards are present without {it}; leave {it} out", one.shard.part.count));
     }
     problems.extend(of_set);
     if !problems.is_empty() {
@@ -421,7 +421,7 @@ fn mend(numbers: &[u32], count: u32) -> String {
         [one] => format!("`--shard {one}/{count}`"),
         several => format!("`--shard I/{count}` for I = {}", ranges(several)),
     };
-    format!("run the study again with {shards}, then merge again; what is complete is not computed again")
+    format!("run the study again with {shards}, then merge again; complete items are not recomputed")
 }
 
 /// Sorted numbers as a list of ranges, such as `2,5-7`: the form that Slurm's `--array` takes.
@@ -630,7 +630,7 @@ mod tests {
         check(&[1, 3, 5], "1,3,5");
         check(&[1, 2, 3, 7, 9, 10], "1-3,7,9-10");
         check(&[], "");
-        let advice = "then merge again; what is complete is not computed again";
+        let advice = "then merge again; complete items are not recomputed";
         assert_eq!(mend(&[2], 3), format!("run the study again with `--shard 2/3`, {advice}"));
         assert_eq!(mend(&[2, 3], 8), format!("run the study again with `--shard I/8` for I = 2-3, {advice}"));
     }

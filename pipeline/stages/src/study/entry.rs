@@ -218,7 +218,8 @@ impl<'a> Entry<'a> {
 
     fn sweep(&self, items: Vec<Expanded>, parameter: &str, values: &[Value]) -> Result<Vec<Expanded>, StudyError> {
         if is_too_deep(parameter) {
-            let message = format!("a swept key is nested more than {TABLES_MAX} tables deep; no parameter is");
+            let message =
+                format!("a swept key is nested more than {TABLES_MAX} tables deep; no parameter is that deep");
             return Err(self.error("sweep", message));
         }
         if values.is_empty() {

@@ -302,7 +302,7 @@ fn check_epoch(head: &StudyHead) -> Result<(), ParameterError> {
         return Ok(());
     }
     let rule = format!(
-        "time stamps of these recordings end in {year}, so it must be a year earlier or more, in ns since 1970-01-01"
+        "timestamps of these recordings end in {year}; it must lie at least a year earlier, in ns since 1970-01-01"
     );
     Err(ParameterError::new("epoch_ns", format!("is {}; {rule}", head.epoch_ns)))
 }

@@ -190,8 +190,8 @@ impl Chosen {
         if kinds.len() > 1 {
             let kinds = kinds.into_iter().collect::<Vec<_>>().join(", ");
             return Err(Error::Usage(format!(
-                "{folder}: has missions of {kinds}, but a LeRobot dataset has one robot and one rate; choose with --traverse \
-                 among {traverses}"
+                "{folder}: has missions of {kinds}, but a LeRobot dataset has one robot and one rate; choose with --traverse: \
+                 {traverses}"
             )));
         }
         let first = &rows[0];

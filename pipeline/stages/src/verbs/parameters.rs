@@ -125,7 +125,9 @@ fn parse_value(pair: &str, text: &str) -> Result<Value, Error> {
 
 fn place(params: &mut Value, dotted: &str, value: Value) -> Result<(), Error> {
     if is_too_deep(dotted) {
-        return Err(Error::Usage(format!("a key is nested more than {TABLES_MAX} tables deep; no parameter is")));
+        return Err(Error::Usage(format!(
+            "a key is nested more than {TABLES_MAX} tables deep; no parameter is that deep"
+        )));
     }
     let mut at = params;
     for word in dotted.split('.') {

@@ -193,7 +193,7 @@ fn measured(exemplar: &Exemplar<'_>, fit: &FitFile) -> Result<(Option<Arc<Measur
     let source = fit.source.clone().unwrap_or_default();
     if let Some(minus) = &source.minus {
         let message = format!(
-            "{name}: the fit is of the difference to {}; write that with `fit --minus --difference`, and fit it",
+            "{name}: the fit is of a difference from {}; write the difference with `fit --minus --difference` and fit that",
             minus.file
         );
         return Err(Error::Input(message));

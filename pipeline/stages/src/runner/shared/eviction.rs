@@ -1,4 +1,4 @@
-//! What is removed from a shared cache: entries unused for too long, the least recently used ones while the rest is too large, and old drafts.
+//! Removes from a shared cache entries unused for too long, the least recently used entries while the rest is too large, and old drafts.
 
 use super::{Entry, Shared};
 use crate::error::Error;

@@ -7,7 +7,7 @@
 //! ```
 //!
 //! Creating a folder is exclusive and renaming one is atomic, also over NFS: a draft belongs to the process that created it, and an entry
-//! appears and disappears in one step. Nobody but [`super::prune`] touches the drafts of others, and then only old ones.
+//! appears and disappears in one step. Only [`super::prune`] touches the drafts of others, and only old ones.
 
 use super::{ENTRIES, Entry, Shared, is_entry};
 use crate::error::Error;
@@ -213,7 +213,7 @@ fn marked(root: &Path) -> Result<bool, Error> {
         Ok(entries) => entries.flatten().map(|entry| entry.file_name()).collect(),
         Err(e) if e.kind() == ErrorKind::NotFound => return Ok(false),
         Err(e) if e.kind() == ErrorKind::NotADirectory => {
-            return Err(Error::Usage(format!("{}: a shared cache is a folder, and this is a file", root.display())));
+            return Err(Error::Usage(format!("{}: this is a file; a shared cache must be a folder", root.display())));
         }
         Err(e) => return Err(unusable(root, e)),
     };
@@ -231,7 +231,7 @@ fn mark(root: &Path) -> Result<(), Error> {
 
 /// A failure of the file system that says what the folder is for. Its number decides whether a retry can help, so the error itself is judged.
 fn unusable(root: &Path, error: io::Error) -> Error {
-    let why = format!("{}: cannot be used as shared cache: {}", root.display(), words(&error));
+    let why = format!("{}: cannot be used as a shared cache: {}", root.display(), words(&error));
     match Error::at(root, error) {
         Error::Retry(_) => Error::Retry(why),
         Error::Input(_) => Error::Input(why),
@@ -265,7 +265,7 @@ mod tests {
     fn val_what_makes_a_cache_unusable_decides() {
         let of = |number| unusable(Path::new("cache"), io::Error::from_raw_os_error(number));
         let (open_files, permission) = (of(24), of(13));
-        let said = "cache: cannot be used as shared cache: ";
+        let said = "cache: cannot be used as a shared cache: ";
         assert!(matches!(&open_files, Error::Retry(why) if why.starts_with(said)), "{open_files}");
         assert!(
             matches!(&permission, Error::Failed(why) if *why == format!("{said}permission denied")),

@@ -4,7 +4,7 @@
 //! appears complete or not at all, and never changes. Two runs that publish the same item made the same bytes, so it does not matter who is
 //! first. Nothing relies on locks, because network file systems and object stores do not offer them.
 //!
-//! An entry is used only if every file has the SHA-256 that the record states. A damaged entry counts as missing; the run that meets it
+//! An entry is used only if every file has the SHA-256 that the record states. A damaged entry counts as missing; the run that finds it
 //! removes it, computes the item and publishes it again. The hashes find damage, not malice: whoever may write to a cache decides what its
 //! readers get.
 //!

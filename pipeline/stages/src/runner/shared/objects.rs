@@ -1,8 +1,8 @@
 //! A shared cache in a bucket of an object store: `s3://bucket/prefix`.
 //!
 //! The objects of an entry are `entries/ab/ab12.../<file>`. There is no rename, so the record is written last, and only if there is none: an
-//! entry exists when its record does. It disappears with its record, which is removed first. Writers that meet write the same bytes; a
-//! reader that meets a removal finds a file missing and computes the item. A removal leaves files that are newer than the record, because
+//! entry exists when its record does. It disappears with its record, which is removed first. Concurrent writers write the same bytes; a
+//! reader that runs into a removal finds a file missing and computes the item. A removal leaves files that are newer than the record, because
 //! another run is uploading them to publish the item again. A file that is uploaded after they were listed may still be removed. Its entry is
 //! then damaged, and the next reader publishes it again. Entries age from their publication.
 
@@ -32,7 +32,7 @@ impl Objects {
     /// A release has this address, or the bucket cannot be read.
     pub fn open(bucket: Bucket, is_read_only: bool) -> Result<Self, Error> {
         if bucket.contains(MANIFEST)? {
-            let advice = "is a release, which takes no other objects; choose another prefix for the cache";
+            let advice = "is a release, which cannot hold a cache; choose another prefix for the cache";
             return Err(Error::Usage(format!("{} {advice}", bucket.address())));
         }
         Ok(Self::new(Arc::new(bucket), is_read_only))

@@ -183,7 +183,7 @@ fn val_a_cache_has_its_own_folder() {
         assert!(refused(foreign.path(), read_only).contains("neither empty nor a shared cache"));
         assert!(
             refused(&foreign.path().join("thesis.tex"), read_only)
-                .ends_with("a shared cache is a folder, and this is a file")
+                .ends_with("this is a file; a shared cache must be a folder")
         );
     }
     let missing = foreign.path().join("none");
