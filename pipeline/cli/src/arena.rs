@@ -1,8 +1,8 @@
-//! One arena of the C library for all threads, where memory is limited.
+//! A single allocation arena of the C library for all threads, where memory is limited.
 //!
-//! glibc gives each thread an arena, which keeps what the thread has freed for its next allocation, in pieces of up to 32 MiB. Threads that compute one
-//! item after another therefore hold more memory than the items in progress need, and only the latter is what `--memory` counts. The number of arenas
-//! is read from the environment when a program starts.
+//! glibc gives each thread an arena, which keeps freed memory for the thread's next allocation, in pieces of up to 32 MiB. Threads that compute one
+//! item after another therefore hold more memory than the items in progress need, but `--memory` counts only the latter. The number of arenas is read
+//! from the environment when a program starts.
 
 use std::env;
 use std::ffi::OsStr;

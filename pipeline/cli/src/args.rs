@@ -376,7 +376,7 @@ pub struct Cache {
     /// Shared cache.
     #[arg(value_name = "DIR|s3://...")]
     pub place: String,
-    /// Remove the least recently used entries until the rest is no larger, such as 500G.
+    /// Remove the least recently used entries until the cache is no larger than this, such as 500G.
     #[arg(long, value_name = "BYTES")]
     pub max_bytes: Option<String>,
     /// Remove entries unused for more than this many days.
@@ -829,7 +829,7 @@ pub enum Obstacles {
 /// `traverse`.
 #[derive(Debug, Args)]
 pub struct Traverse {
-    /// DEM with cells no larger than the wheel radius, and room for the missions: 35 m, 5 m from every edge.
+    /// DEM with cells no larger than the wheel radius, large enough for missions of 35 m that start and end at least 5 m from the edges.
     pub dem: PathBuf,
     /// Vehicle (see `kinds`), or your own vehicle file (.toml with a table `parameters`).
     #[arg(long, value_name = "V", default_value = "husky_a200")]
@@ -1170,7 +1170,7 @@ pub struct Schema {
 /// `completions`.
 #[derive(Debug, Args)]
 pub struct Completions {
-    /// Shell to complete in.
+    /// Shell to print completions for.
     pub shell: Shell,
 }
 

@@ -1,5 +1,5 @@
-//! Progress on stderr. Of a run: a bar with ETA on a terminal, plain lines otherwise, only failures when quiet. Of a verb without items: what it
-//! does and the time so far, on a terminal only.
+//! Progress on stderr. For a run: a bar with ETA on a terminal, plain lines otherwise, only failures when quiet. For a verb without items: what
+//! it does and the elapsed time, on a terminal only.
 
 use crate::output::warn;
 use indicatif::{ProgressBar, ProgressDrawTarget, ProgressStyle};

@@ -121,7 +121,7 @@ fn row_of_releases(q: &releases::Quantity) -> Vec<String> {
 fn text(comparison: &Comparison) -> String {
     let mut text = table(&comparison.quantities);
     if let Some(interleaved) = &comparison.interleaved {
-        text.push_str(&format!("\ninterleaved blocks in place of halves:\n{}", table(interleaved)));
+        text.push_str(&format!("\ninterleaved blocks instead of halves:\n{}", table(interleaved)));
     }
     text.push_str(&format!("\n{}: {}", comparison.answer.name(), comparison.sentence));
     for q in &comparison.quantities {

@@ -191,7 +191,7 @@ fn failed(summary: &RunSummary) -> String {
 /// What a run did with its shared cache.
 fn used(tally: &Tally) -> String {
     let Tally { fetched, published, damaged, changed, read_only, problems } = tally;
-    let published = if *read_only { "only read".to_owned() } else { format!("{published} published to it") };
+    let published = if *read_only { "read-only".to_owned() } else { format!("{published} published to it") };
     let mut text = format!("\n  shared cache: {} copied from it, {published}", counted(fetched, "item"));
     if !damaged.is_empty() {
         let outcome = if *read_only { "computed" } else { "replaced" };
