@@ -1,9 +1,9 @@
 //! Input of the page: the rows and files of one assembled release, read only through `sastrugi-store`.
 //!
-//! Tables are read once; rasters and samples are read one at a time, when a figure needs them. Whatever a release lacks is an
-//! empty table or `None`; a file that exists but cannot be read is an error, and so is one that the manifest lists but that is missing.
-//! Of missions and their starts only the columns that the page needs are kept ([`Mission`], [`Start`]); of the curves of terrains, those
-//! of a random sample of each large group.
+//! Tables are read once; rasters and samples are read one at a time, when a figure needs them. Whatever a release lacks is an empty
+//! table or `None`; a file that exists but cannot be read is an error, and so is one that the manifest lists but that is missing. Of
+//! missions and their starts, only the columns that the page needs are kept ([`Mission`], [`Start`]); of the curves of terrains, only
+//! those of a random sample of each large group.
 
 mod kept;
 

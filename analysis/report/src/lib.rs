@@ -7,8 +7,8 @@
 //!    the missions and terrains it keeps what statistics need.
 //! 2. Each question of [`questions::ALL`] answers with [`content::Block`]s: text, figures and tables with their
 //!    [`content::Numbers`], and the query that returns these numbers. A question without data has no section. The summary repeats their results.
-//! 3. [`render::html::page`](render::html::page()) sets the page; every figure also goes to `figures/*.svg`, its numbers to
-//!    `data/*.json`.
+//! 3. [`render::html::page`](render::html::page()) lays out the page; every figure also goes to `figures/*.svg`, its
+//!    numbers to `data/*.json`.
 //! 4. The folder is completed under another name and put in place at the end, so that a report is complete or absent.
 //!
 //! ```

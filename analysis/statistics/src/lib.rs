@@ -1,6 +1,6 @@
 //! Statistics on plain arrays: summaries, distributions, correlation, bootstrap intervals, cumulative incidence, nested variance
 //! components, and tests of groups whose missions are nested in terrains. The report, the comparison of releases and the fit of
-//! textures draw on it; it reads no file and knows nothing of terrains or missions but their numbers.
+//! textures use it; it reads no file and sees only the numbers of terrains and missions.
 //!
 //! # Flow
 //! 1. One number per terrain: the mean over its missions ([`components`] says how much of the scatter lies between terrains).

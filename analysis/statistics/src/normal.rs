@@ -1,8 +1,8 @@
 //! The standard normal distribution, computed with `libm` only, so that results do not depend on the CPU.
 //!
 //! Why not `statrs`: its functions call the C library (`f64::exp`, `f64::ln`), whose last bits change with the CPU and the
-//! version of that library, and a report or a texture must be the same bytes everywhere. It is suited as an oracle in tests, not
-//! for anything that ends in a file. The same holds for [`crate::student`] and [`crate::chi_square`].
+//! version of that library, and a report or a texture must be the same bytes everywhere. It serves as an oracle in tests, not
+//! for anything that ends up in a file. The same holds for [`crate::student`] and [`crate::chi_square`].
 
 use std::f64::consts::{FRAC_1_SQRT_2, PI};
 

@@ -1,4 +1,5 @@
-//! Distance to arrival: the share of rovers that has arrived by a distance, and the distance that a share needs.
+//! Distance to arrival: the share of rovers that have arrived by a distance, and the distance by which a given share
+//! has arrived.
 
 use super::sets::{Set, reached};
 use crate::content::{Block, Figure, Numbers, TableBlock, count, number, slug, text};

@@ -135,7 +135,7 @@ pub fn table(sets: &[Set]) -> TableBlock {
         ("low", "1"),
         ("high", "1"),
         ("efficiency at half the limit", "1"),
-        ("efficiency over the ground's", "1"),
+        ("efficiency over that of the shortest path", "1"),
         ("no path exists", "%"),
     ];
     let mut numbers = Numbers::computed(QUERY, &columns);

@@ -70,8 +70,8 @@ const EFFICIENCIES: &str = "The efficiency of a rover is the straight distance o
 the straight distance over the mean distance: a few short drives raise the first, a few long ones lower the second. Intervals are over worlds, which are the independent trials. For \
 means and ratios they are Student's, for the linearised ratio of world totals (Cochran, 1977), on the logarithm; for shares they are Korn and Graubard's (1998), with worlds as single \
 trials if all or no rovers arrive. Intervals and bands end at the value of a straight drive: an efficiency of 1; straight over mean distance may be slightly larger, because rovers stop \
-within a tolerance of their goal. At half the limit: each rover as if stopped after half of its distance limit. Over the ground's: relative to the efficiency of the shortest path on \
-the complete map, for rovers that have one; the other rovers are included in all other columns.";
+within a tolerance of their goal. At half the limit: each rover as if stopped after half of its distance limit. The shortest path is that on the complete map; only rovers that have \
+one count in that column, and all rovers in the others.";
 const ALIKE: &str = "Rovers on one world share its rocks and often a goal. The intraclass correlation is the share of the variance that lies between worlds (analysis of variance, \
 Searle's interval, exact for normal values). The design effect is the factor by which it increases the variance of a mean (Kish, 1965).";
 const EFFORT: &str = "Contacts are rocks higher than the clearance that passed under the rover; centre contacts are those under its centre line. Means are over all rovers, including \
@@ -174,8 +174,8 @@ fn no_way(sets: &[Set]) -> Option<String> {
     let (none, found) = (of(true), of(false));
     (none > 0).then(|| {
         format!(
-            "For {} of {}, the ground has no path that keeps the wheels clear of rocks above the clearance and off steep sand. Only the efficiency over the \
-             ground's leaves such rovers out.",
+            "For {} of {}, the ground has no path that keeps the wheels clear of rocks above the clearance and off steep sand. Only the efficiency over that \
+             of the shortest path leaves such rovers out.",
             set_number::count(none),
             set_number::counted(none + found, "rover")
         )

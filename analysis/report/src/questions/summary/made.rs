@@ -1,5 +1,4 @@
-//! What the release has, in a sentence: the surfaces, what was fitted to them, and the images of them. Routes, teams, rovers and missions
-//! have sentences of their own.
+//! The contents of the release in a sentence: surfaces, fits and images. Routes, teams, rovers and missions have sentences of their own.
 
 use crate::data::{Data, Group};
 use crate::render::number as set;

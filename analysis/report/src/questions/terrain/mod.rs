@@ -161,8 +161,8 @@ fn introduction(groups: &[Group<TerrainRow>]) -> String {
     format!(
         "The release has {} in {}: {}{more}. The roughness class of a cell follows from its largest gradient to its eight neighbours; \
          shares leave out {border} and are computed before the class map is closed. Reliefs are lit from the north-west. Their colours \
-         end at the 1st and 99th percentile of the heights, or at the lowest and highest height where these lie far beyond. On level \
-         ground with a few cells that rise above it, the colours begin below the ground, so that it is not the darkest.",
+         span the 1st to 99th percentile of the heights, or the lowest to the highest height where these lie far beyond. Where a few \
+         cells rise above level ground, the colours begin below the ground, so that it is not drawn darkest.",
         set::counted(n, "terrain"),
         set::counted(groups.len(), "group"),
         names.join(", ")

@@ -1,6 +1,6 @@
-//! In which order textures are drawn, so that the few that are drawn show what the page says of all: one of each group before a second one,
-//! those that do not match their measured surface first, then others that were compared with it, methods of a scoreboard (which has figures
-//! of its own) and textures on a base last.
+//! The order in which textures are drawn, so that the few that are drawn show what the page says about all of them: one of each group
+//! before a second one, those that do not match their measured surface first, then others that were compared with it, methods of a
+//! scoreboard (which has figures of its own) and textures on a base last.
 
 use super::verdict::{self, Answer};
 use crate::data::{self, Data, RESIDUAL};

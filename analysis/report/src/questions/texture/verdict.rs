@@ -124,7 +124,7 @@ pub fn method(textures: &[&TerrainRow]) -> [String; 2] {
         (!named.is_empty()).then(|| format!("Textures of {} {meaning}.", set::listed(&named)))
     });
     let shown: Vec<String> = shown.chain(lowered(textures)).collect();
-    let split = "Patches of roughness, crests and knobs are not among these quantities: `sastrugi compare SITE TEXTURE --statistics` compares \
+    let split = "These quantities do not cover patches of roughness, crests and knobs: `sastrugi compare SITE TEXTURE --statistics` compares \
                  them too, and `sastrugi compare DEM --split-half` judges a texture on ground that was not used in the fit.";
     [test, shown.iter().map(String::as_str).chain([split]).collect::<Vec<_>>().join(" ")]
 }
