@@ -5,10 +5,10 @@
 //! without TLS.
 //!
 //! There is no rename. An object appears complete or not at all, so whatever consists of several objects needs one that is written last, and
-//! only if it does not exist ([`Bucket::create`]): its presence says that the rest is there.
+//! only if it does not exist yet ([`Bucket::create`]): its presence means that the others are complete.
 //!
 //! The client is asynchronous. Its runtime lives in this module: calls block, and may come from any thread that is not part of another
-//! runtime. Failed requests are repeated for up to a minute; errors say whether a later attempt may succeed ([`ObjectError::is_transient`]).
+//! runtime. Failed requests are retried for up to a minute; errors say whether a later attempt may succeed ([`ObjectError::is_transient`]).
 
 use crate::digest::Hashed;
 use futures_util::StreamExt;
@@ -37,7 +37,7 @@ const RETRY_TIME_MAX: Duration = Duration::from_secs(60);
 #[derive(Debug, thiserror::Error)]
 pub enum ObjectError {
     /// An address that is not of the form `s3://bucket/prefix`.
-    #[error("\"{0}\" is not an address of objects; expected s3://bucket or s3://bucket/prefix")]
+    #[error("\"{0}\" is not the address of an object store; expected s3://bucket or s3://bucket/prefix")]
     Address(String),
     /// The environment does not describe a usable store.
     #[error("{address}: {source}; check the AWS_... variables")]
@@ -49,7 +49,7 @@ pub enum ObjectError {
     },
     /// The environment holds no credentials, and the machine has no role that gives any.
     #[error(
-        "{address}: no credentials; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or use a machine whose role may use the bucket"
+        "{address}: no credentials; set AWS_ACCESS_KEY_ID and AWS_SECRET_ACCESS_KEY, or run on a machine whose role may access the bucket"
     )]
     Credentials {
         /// The address.
@@ -94,7 +94,7 @@ fn in_words(error: &object_store::Error) -> String {
     let text = error.to_string();
     match error {
         PermissionDenied { .. } | Unauthenticated { .. } => {
-            "access denied; check the AWS_... variables, and what they may do with the bucket".to_owned()
+            "access denied; check the AWS_... variables and their permissions on the bucket".to_owned()
         }
         NotFound { .. } if text.contains("NoSuchBucket") => "no such bucket".to_owned(),
         NotFound { .. } => "no such bucket or object".to_owned(),
@@ -381,7 +381,10 @@ mod tests {
         for wrong in ["bucket", "s3:/bucket", "s3://", "s3:///a", "s3://bucket//a", "s3://bucket/a/../b", "S3://bucket"]
         {
             let error = parts(wrong).unwrap_err();
-            assert!(error.to_string().starts_with(&format!("\"{wrong}\" is not an address")), "{wrong}: {error}");
+            assert!(
+                error.to_string().starts_with(&format!("\"{wrong}\" is not the address of an object store")),
+                "{wrong}: {error}"
+            );
             assert!(!error.is_transient());
         }
         assert!(Bucket::is_address("s3://x") && !Bucket::is_address("release") && !Bucket::is_address("./s3://x"));

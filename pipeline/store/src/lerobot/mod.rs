@@ -66,7 +66,7 @@ const EPISODE_ROWS: usize = 1024;
 #[derive(Debug, thiserror::Error)]
 pub enum LerobotError {
     /// The destination holds something else, and is left untouched.
-    #[error("{}: holds files that are not a LeRobot dataset of sastrugi; choose a new folder", path.display())]
+    #[error("{}: the folder is not empty and not a LeRobot dataset written by sastrugi; choose a new folder", path.display())]
     Occupied {
         /// The folder.
         path: PathBuf,

@@ -1,5 +1,5 @@
 //! Lengths stated within the records of an MCAP file, checked before a record is parsed: the parser of the crate `mcap` allocates as many
-//! bytes as a text claims to have, and an allocation that fails ends the process.
+//! bytes as a text claims to have, and a failed allocation ends the process.
 //!
 //! MCAP format specification, "Records" and "Serialization": a text is its length in bytes (32 bits, little-endian) and its bytes; a map of
 //! texts is its length in bytes, then keys and values in turn. Records without texts, above all messages, cost nothing here.

@@ -1,8 +1,8 @@
 //! The footer and the page headers of a Parquet file: structures of the Thrift compact protocol, checked before the crate `parquet` reads them.
 //!
-//! The crate skips unknown fields element by element, as many as are claimed; elements of lists of booleans take no bytes there. It also reads known
-//! fields of any type. A few damaged bytes can therefore hold it up for hours. A structure that passes this check has only known fields of the
-//! right types, so that only values that are there are skipped. Cost: one pass over the bytes of each structure.
+//! The crate skips an unknown field element by element, up to the number claimed, and elements of a list of booleans take no bytes there. It also
+//! accepts known fields of any type. A few damaged bytes can therefore keep it busy for hours. A structure that passes this check has only known
+//! fields of the right types, so the crate skips only values that exist. Cost: one pass over the bytes of each structure.
 
 use bytes::Bytes;
 use parquet::errors::Result as ParquetResult;
