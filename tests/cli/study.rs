@@ -339,7 +339,7 @@ fn val_doubts_are_told_before_the_run() {
     told(
         "heavy.toml",
         &heavy,
-        &["traverse \"husky\": chassis.mass_kg is changed to 80 but inertia_kg_m2 still belongs"],
+        &["traverse \"husky\": chassis.mass_kg was changed to 80, but inertia_kg_m2 still belongs"],
     );
     let small = text.replacen("size_px = [1009, 1009]", "size_px = [600, 600]", 1);
     told(

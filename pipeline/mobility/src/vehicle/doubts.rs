@@ -33,7 +33,7 @@ fn clearance(vehicle: &VehicleParameters) -> Option<String> {
     let side = if clearance_m < 0.0 { "below" } else { "above" };
     (clearance_m <= sag_m(vehicle)).then(|| {
         format!(
-            "the bottom plate is {:.3} m {side} the lowest point of the wheels and the tyres sink by {:.3} m, so the vehicle will \
+            "the bottom plate is {:.3} m {side} the lowest point of the wheels and the tyres sag by {:.3} m, so the vehicle will \
              rest on its belly in every mission: chassis.bottom_z_m = {}, wheels.axle_z_m = {}, wheels.radius_m = {}",
             clearance_m.abs(), sag_m(vehicle), chassis.bottom_z_m, wheels.axle_z_m, wheels.radius_m
         )
@@ -51,7 +51,7 @@ fn sag(vehicle: &VehicleParameters) -> Option<String> {
     let (sag_m, radius_m) = (sag_m(vehicle), vehicle.wheels.radius_m);
     (sag_m > SAG_SHARE_MAX * radius_m).then(|| {
         format!(
-            "the tyres sink by {sag_m:.3} m under the vehicle's weight, {:.0} % of their radius; check tyre.stiffness_n_m = {}",
+            "the tyres sag by {sag_m:.3} m under the vehicle's weight, {:.0} % of their radius; check tyre.stiffness_n_m = {}",
             100.0 * sag_m / radius_m,
             vehicle.tyre.stiffness_n_m
         )
@@ -97,7 +97,7 @@ fn not_rescaled(vehicle: &VehicleParameters, base: &VehicleParameters) -> Vec<St
     if chassis.inertia_kg_m2 == old.inertia_kg_m2 {
         if (chassis.mass_kg / old.mass_kg - 1.0).abs() > MASS_CHANGE_MAX {
             doubts.push(format!(
-                "chassis.mass_kg is changed to {} but inertia_kg_m2 still belongs to a mass of {} kg; scaled in proportion it \
+                "chassis.mass_kg was changed to {}, but inertia_kg_m2 still belongs to a mass of {} kg; scaled in proportion it \
                  would be [{}]",
                 chassis.mass_kg,
                 old.mass_kg,
@@ -105,7 +105,7 @@ fn not_rescaled(vehicle: &VehicleParameters, base: &VehicleParameters) -> Vec<St
             ));
         } else if chassis.size_m != old.size_m {
             doubts.push(format!(
-                "chassis.size_m is changed to {:?} but inertia_kg_m2 still belongs to a size of {:?} m",
+                "chassis.size_m was changed to {:?}, but inertia_kg_m2 still belongs to a size of {:?} m",
                 chassis.size_m, old.size_m
             ));
         }
@@ -115,7 +115,7 @@ fn not_rescaled(vehicle: &VehicleParameters, base: &VehicleParameters) -> Vec<St
     if body(wheels) != body(old_wheels) && moments(wheels) == moments(old_wheels) {
         let [mass, radius, width] = body(wheels);
         doubts.push(format!(
-            "mass, radius or width of the wheels is changed but their moments of inertia are not; solid cylinders would have \
+            "mass, radius or width of the wheels was changed, but not their moments of inertia; solid cylinders would have \
              spin_inertia_kg_m2 = {:.4} and transverse_inertia_kg_m2 = {:.4}",
             0.5 * mass * radius * radius,
             mass / 12.0 * (3.0 * radius * radius + width * width)
@@ -154,7 +154,7 @@ mod tests {
             json!({ "chassis": { "mass_kg": 60.0 } }),
             "still belongs to a mass of 46.034 kg; scaled in proportion it would be [0.7849, 2.2661, 2.6453]",
         );
-        one(json!({ "chassis": { "size_m": [1.1, 0.6, 0.25] } }), "size_m is changed");
+        one(json!({ "chassis": { "size_m": [1.1, 0.6, 0.25] } }), "size_m was changed");
         one(json!({ "wheels": { "radius_m": 0.15 } }), "spin_inertia_kg_m2 = 0.0297");
         one(
             json!({ "wheels": { "axle_z_m": 0.165 } }),
@@ -164,7 +164,7 @@ mod tests {
             json!({ "wheels": { "axle_z_m": 0.3 } }),
             "the bottom plate is 0.135 m below the lowest point of the wheels",
         );
-        one(json!({ "tyre": { "stiffness_n_m": 3000.0 } }), "the tyres sink by 0.046 m");
+        one(json!({ "tyre": { "stiffness_n_m": 3000.0 } }), "the tyres sag by 0.046 m");
         one(json!({ "chassis": { "inertia_kg_m2": [0.6, 0.6, 2.0] } }), "is not physical");
         one(json!({ "chassis": { "inertia_kg_m2": [60.0, 170.0, 200.0] } }), "a solid box of that mass and size");
         assert_eq!(of(json!({ "drive": { "torque_limit_n_m": 30.0 } })), Vec::<String>::new());

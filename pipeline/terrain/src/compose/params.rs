@@ -380,7 +380,7 @@ impl Whole {
             return Ok(());
         }
         let message = format!(
-            "make `{kind}` choose {} x {} cells of {} m in place of {} x {} of {} m; define it as a separate terrain and use `of`",
+            "make `{kind}` choose {} x {} cells of {} m instead of {} x {} of {} m; define it as a separate terrain and use `of`",
             own.cols, own.rows, own.cell[0], whole.cols, whole.rows, whole.cell[0]
         );
         Err(ParameterError::new("parameters", message))

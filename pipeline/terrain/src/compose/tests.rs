@@ -205,7 +205,7 @@ fn val_cells_of_a_listing_are_refused() {
     let processes = json!([{"kind": "mavs_gaussian", "parameters": {"compat": true, "hi_len_m": 1.5}}]);
     let params = json!({"size_px": [5, 5], "cell_m": 3.0, "processes": processes});
     let error = crate::prepare(KIND, &params).err().unwrap();
-    assert!(error.key == "processes.0.parameters" && error.message.contains("in place of 5 x 5"), "{error}");
+    assert!(error.key == "processes.0.parameters" && error.message.contains("instead of 5 x 5"), "{error}");
 }
 
 #[test]
