@@ -30,8 +30,8 @@ class TerrainClient:
         client = TerrainClient("http://127.0.0.1:8080")
         heights = client.patch("planet", center=(0.0, 0.0), size=(512, 512), resolution=0.02)
 
-    A busy server is asked again after the time that it states. Raises SastrugiError with the server's sentence: 2 for a wrong request, 65 for
-    ground that it does not have, 75 if it stays busy or does not answer.
+    Requests to a busy server are retried after the time that it states. Raises SastrugiError with the server's message: 2 for an invalid
+    request, 65 for ground that it does not have, 75 if it stays busy or does not answer.
     """
 
     def __init__(self, address: str, *, token: str | None = None, timeout: float = 600.0) -> None:
@@ -42,7 +42,7 @@ class TerrainClient:
         self._timeout = timeout
 
     def collections(self) -> list[dict[str, Any]]:
-        """What it serves: id, title, bounds_m, cell_m, spacing_m, fields ..."""
+        """The collections that it serves: id, title, bounds_m, cell_m, spacing_m, fields ..."""
         collections = self._json("/v1/collections", {}).get("collections")
         if not isinstance(collections, list):
             raise self._foreign("a list of collections")

@@ -1,10 +1,10 @@
-"""The one exception of the package."""
+"""The package's only exception."""
 
 from __future__ import annotations
 
 
 class SastrugiError(Exception):
-    """A failure, with the sentence that the program prints.
+    """A failure, with the message that the program prints.
 
     `code` is the exit code that the program would use: 1 failed, 2 bad usage or study, 65 input data missing or unusable, 75 interrupted or
     retryable.

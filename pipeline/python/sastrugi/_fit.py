@@ -97,7 +97,7 @@ class Fit:
 
     @property
     def interval_kind(self) -> str | None:
-        """How the intervals were found, or None without intervals."""
+        """How the intervals were computed, or None without intervals."""
         kind: str | None = self._quoted["kind"]
         return kind
 
@@ -134,7 +134,7 @@ class Fit:
         size: extent east-west and north-south, m; one number for a square.
         cell: size of its cells, m; by default 0.1, or that of the site for methods that repeat it.
         seed: of the random streams; the same seed gives the same heights.
-        method: fft_ma, cholesky, gaussians or quasi_wavelets; modulated or wavelet_statistics, of a `fit(..., statistics=True)`; quilting or
+        method: fft_ma, cholesky, gaussians or quasi_wavelets; modulated or wavelet_statistics, for a `fit(..., statistics=True)`; quilting or
             exemplar, with `exemplar`. Its parameters (`sastrugi kinds`) as keywords.
         exemplar: the fitted heights (a Heightfield, or a file), from which quilting and exemplar copy. Their licence extends to the texture.
 
@@ -161,7 +161,7 @@ class Fit:
         return Heightfield.read(exemplar, cell=self._content.get("cell_m"), window=source.get("window"))
 
     def plot(self, ax: matplotlib.axes.Axes | None = None) -> matplotlib.axes.Axes:
-        """Plots covariance by lag: measured, and of the model, both after detrending and trimming. Needs matplotlib."""
+        """Plots the measured covariance by lag and that of the model, both after detrending and trimming. Needs matplotlib."""
         lags = np.asarray(self._content.get("lags_m", []), dtype=float)
         if lags.size == 0:
             raise SastrugiError("a stated model has no measured covariance to draw", USAGE)
@@ -192,18 +192,18 @@ def fit(
     """Fits the covariance of a measured surface, as `sastrugi fit` does.
 
     dem: a file, a Heightfield, or an array (rows, columns) of heights in m with `cell`.
-    outer_scale: window of the moving average, m: what is wider is background.
+    outer_scale: window of the moving average, m; wider features are background.
     cell: size of the cells, m, for arrays and for files that state none.
     window: part of a file, (x0, y0, x1, y1) in its own coordinates.
-    minus: another file, which is co-registered to `dem` (then a file too) and subtracted.
+    minus: another file, which is co-registered to `dem` (which must then be a file too) and subtracted.
     seed: of the replicates.
     parameters: as in a study (`sastrugi kinds covariance`): mode, trim, model, bootstrap, statistics, inner_scale_m, noise_sigma_m ...
 
-    Notes on how a file was read, such as a cell size that was assumed, are issued as warnings. The file that `save` writes is that of the program
-    for the same file and parameters. Ctrl-C returns within two seconds; the fit then ends in the background without effect.
+    Notes on how a file was read, such as a cell size that was assumed, are issued as warnings. For the same file and parameters, `save`
+    writes the same file as the program. Ctrl-C returns within two seconds; the fit then ends in the background without effect.
 
     Raises SastrugiError: 2 for an unknown parameter or one that is out of range, 65 for a file that cannot be read or heights that cannot be
-    fitted, 75 for an array that needs more memory than there is.
+    fitted, 75 for an array that needs more memory than is available.
 
     >>> site = Fit({"model": "exponential", "parameters": {"sigma_m": 0.05, "range_m": 0.2}}).texture(
     ...     16.0, 0.1, seed=1, phase="gaussian", periodic=False)

@@ -24,11 +24,11 @@ class Heightfield:
     Row 0 is north: `values[row, column]` is the height at (`x[column]`, `y[row]`), where `x` increases eastwards with the column and `y`
     decreases southwards with the row. A value belongs to the centre of its cell. Holes are NaN.
 
-    values: array (rows, columns) of float64, m; cells that a mask (`numpy.ma`) hides become NaN.
+    values: array (rows, columns) of float64, m; masked cells (`numpy.ma`) become NaN.
     cell: size of a cell east-west and north-south, m.
     origin: south-west corner of the south-west cell (x, y), m.
-    crs: coordinate system that a file stated, passed on to files; None for a local plane.
-    maps: other rasters on the same cells that a generator made, by name.
+    crs: coordinate system stated by a file, passed on when saving; None for a local plane.
+    maps: further rasters that a generator made on the same cells, by name.
     notes: what was noted while reading or generating it.
 
     >>> import numpy as np
@@ -168,7 +168,7 @@ class Heightfield:
 
 
 def heights_of(dem: Any, cell: float | Sequence[float] | None = None) -> Heightfield:
-    """A heightfield as it is, a file read, or an array with its cell. Notes on how a file was read are warnings of the caller's caller."""
+    """Returns a heightfield unchanged, reads a file, or wraps an array with its cell. Notes on reading are warnings of the caller's caller."""
     if isinstance(dem, Heightfield):
         if cell is not None:
             raise SastrugiError("a heightfield has its own `cell`; omit it", USAGE)

@@ -393,7 +393,7 @@ class Release:
         return Recording(self.path / self._mission(mission).row["path"])
 
     def track(self, mission: Mission | str) -> Track:
-        """The recorded poses of a mission. Those of other missions on its terrain are read too, and stay in memory for later calls.
+        """The recorded poses of a mission. Those of other missions on its terrain are read too and kept in memory for later calls.
 
         Raises SastrugiError (65) for a mission without samples.
         """

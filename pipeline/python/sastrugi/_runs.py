@@ -21,7 +21,7 @@ from ._release import Release
 from ._values import USAGE, numbers, refuse_stated, seed_of, to_json, warn
 
 Progress = Callable[[int, int, str], object]
-"""`progress(done, total, what)`: items that are done and in total, and what just happened."""
+"""`progress(done, total, what)`: number of items done and in total, and what just happened."""
 
 
 def run(
@@ -32,15 +32,15 @@ def run(
     replace: bool = False,
     progress: Progress | None = None,
 ) -> Release:
-    """Runs a study file and returns its release, as `sastrugi run` does; what an earlier run computed is not computed again.
+    """Runs a study file and returns its release, as `sastrugi run` does; items that an earlier run finished are not recomputed.
 
     output: folder of the release.
     work: work area; by default the output's name with `.work`.
     replace: also replace a release of another study, or one with fewer failed items.
-    progress: called as `progress(done, total, what)` on this thread; what it raises ends the run.
+    progress: called as `progress(done, total, what)` on this thread; an exception in it ends the run.
 
     Items that failed are listed in `release.summary["failures"]`. Settings that are allowed but implausible give warnings. On Ctrl-C no
-    further item starts; the work area stays busy until those that had begun have ended, and another call goes on from there.
+    further item starts; the work area stays busy until the items in progress have ended. Another call resumes from there.
 
     Raises SastrugiError: 2 for an invalid study (each error with its place), 65 for input data that cannot be used, 75 for a busy work area.
 
@@ -88,7 +88,7 @@ def traverse(
     vehicle: name of a vehicle (`sastrugi kinds`), or a vehicle file.
     replicates: starts per mission, to estimate the probability of success.
     rules: keys of `[[missions]]`, such as length_m.
-    roughness: keys of `[roughness]`, which decides where missions may start and end.
+    roughness: keys of `[roughness]`, which decide where missions may start and end.
     parameters: keys of `[[traverse]]`.
 
     Raises SastrugiError: 2 for an unknown key, 65 for a DEM that cannot be used, 75 for a busy work area.
@@ -144,14 +144,14 @@ def navigate(
     progress: Progress | None = None,
     **parameters: Any,
 ) -> Route | Release:
-    """Plans a route over a DEM, as `sastrugi navigate` does; with a folder as output, a release with a team that follows it, if there is one.
+    """Plans a route over a DEM, as `sastrugi navigate` does. A folder as output becomes a release, optionally with a team on the route.
 
     start, goal: (x, y) in the DEM's own coordinates.
     output: None or a name that ends in .geojson returns a `Route`; another name is the folder of a `Release`.
     method: grid, roadmap, theta_star or anytime; its parameters as keywords.
     vehicle: whose slope limits apply; otherwise slopes up to 30 degrees.
     obstacles: one or several GeoJSON files of polygons, or rasters.
-    formation, team: formation of a team that follows the route, and its parameters; they need a release.
+    formation, team: formation of a team that follows the route, and its parameters; they need a folder as output.
 
     Raises SastrugiError (65) if there is no route.
 
@@ -197,13 +197,13 @@ def analyze(
     offset_m: Sequence[float] | None = None,
     group: str | None = None,
 ) -> list[dict[str, Any]]:
-    """Metrics of traversals from MCAP logs of any origin, as `sastrugi analyze --json` prints them: one row for each log, with `notes`.
+    """Computes traversal metrics from MCAP logs of any origin, as `sastrugi analyze --json` prints them: one row per log, with `notes`.
 
     paths: one or several MCAP files, or folders of ROS 2 bags.
     dem: ground under the logs, for clearance and classes.
     output: Parquet file to write the rows to.
     topic: of the poses; otherwise chosen by message type.
-    body_frame, fixed_frame: of poses that come as transforms; base_link, and the root of the transforms, by default.
+    body_frame, fixed_frame: for poses given as transforms; by default base_link and the root of the transforms.
     rate_hz, band_hz, differentiator: how accelerations are computed: rate of the samples and band, Hz; second_difference or gradient.
     offset_m: (x, y, z), added to the poses to place them on the DEM.
     group: label of the rows.

@@ -55,7 +55,7 @@ def elaborate(dem: Any, seed: int = 0, **parameters: Any) -> Heightfield:
     >>> fine.shape
     (48, 64)
     """
-    # A file is read here and not by the generator, which would not say how it was read.
+    # A file is read here rather than by the generator, which would not report how it was read.
     return terrain("elaborate", seed, inputs={"dem": heights_of(dem)}, dem="dem", **parameters)
 
 
@@ -68,7 +68,7 @@ def roughness(
     allow_coarse: bool = False,
     **settings: Any,
 ) -> dict[str, Any]:
-    """Measures a surface, as `sastrugi roughness --json` prints it: heights, slopes, classes, areal parameters, spectra.
+    """Measures a surface and returns what `sastrugi roughness --json` prints: heights, slopes, classes, areal parameters, spectra.
 
     dem: a file, a Heightfield, or an array with `cell`.
     vehicle: name of a vehicle, "wb=WHEELBASE,r=TYRE_RADIUS" in m, or a vehicle file: adds the key `ride`, roughness in its band.
@@ -76,7 +76,7 @@ def roughness(
     allow_coarse: accept cells larger than half the shortest wavelength.
     settings: those of `[roughness]` in a study: low_max, semi_max, border_m, band_window_m.
 
-    A value that does not exist is None. Notes on how a file was read are issued as warnings.
+    Undefined values are None. Notes on how a file was read are issued as warnings.
 
     Raises SastrugiError: 2 for an unknown setting or vehicle, 65 for a file that cannot be read, or a surface too small or coarse for the band.
 
@@ -96,12 +96,12 @@ def roughness(
 class Coregistration:
     """How a DEM B was moved onto a DEM A.
 
-    shift: east and north, m; None if the ground does not tell.
+    shift: east and north, m; None if the ground does not determine it.
     raised: m, at the centre of A.
     tilt: east and north, m/m.
     verdict: in one sentence.
     difference: A minus the moved B, on A's cells.
-    details: everything that `sastrugi coregister --json` prints of it.
+    details: everything that `sastrugi coregister --json` prints about it.
     """
 
     shift: tuple[float, float] | None
@@ -124,10 +124,10 @@ def _as_it_is(dem: Any) -> Heightfield:
 def coregister(a: Any, b: Any) -> Coregistration:
     """Finds the shift, raise and tilt that bring DEM B onto DEM A, and their difference, as `sastrugi coregister` does.
 
-    a, b: files or heightfields, in metres and the same coordinate system. A file in degrees is refused: converted to metres, DEMs lose their place
-    to each other, and so have heightfields that were read from such files.
+    a, b: files or heightfields, in metres and the same coordinate system. A file in degrees is refused, because conversion to metres loses the
+    position of the DEMs relative to each other; heightfields that were read from such files have lost it already.
 
-    Raises SastrugiError (65) for DEMs that cannot be read, or that cannot be laid onto each other.
+    Raises SastrugiError (65) for DEMs that cannot be read or co-registered.
 
     >>> from sastrugi import Fit
     >>> hills = Fit({"model": "gaussian", "parameters": {"sigma_m": 2.0, "range_m": 12.0}}).texture(96.0, 1.0, seed=2)

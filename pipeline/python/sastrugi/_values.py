@@ -45,7 +45,7 @@ def counted(number: int, noun: str) -> str:
 
 
 def heights(values: Any) -> npt.NDArray[np.float64]:
-    """Heights as an array (rows, columns) of float64; what a mask hides is NaN."""
+    """Heights as an array (rows, columns) of float64; masked cells are NaN."""
     try:
         given = values if isinstance(values, np.ndarray) else np.asarray(values)
         # NumPy would parse text, also in arrays of objects, and drop the imaginary part of complex numbers.
@@ -72,7 +72,7 @@ def _shown(value: Any) -> str:
 
 
 def numbers(name: str, value: Sequence[float] | None, count: int) -> tuple[float, ...] | None:
-    """So many numbers; None stays None."""
+    """As many numbers as `count`; None stays None."""
     if value is None:
         return None
     found = _floats(value)
@@ -82,7 +82,7 @@ def numbers(name: str, value: Sequence[float] | None, count: int) -> tuple[float
 
 
 def pair(name: str, value: float | Sequence[float]) -> tuple[float, float]:
-    """A number, which stands for both, or two numbers."""
+    """Two numbers, or one number for both."""
     found = _floats(value)
     if len(found) not in (1, 2):
         raise SastrugiError(f"`{name}` must be one or two numbers, got {_shown(value)}", USAGE)
@@ -134,7 +134,7 @@ def refuse_stated(parameters: Mapping[str, Any], **stated: str) -> None:
 
 
 def warn(notes: Iterable[str], callers: int = 1) -> None:
-    """Issues notes as warnings of whoever called the function of the package, which lies so many calls above this one."""
+    """Issues notes as warnings of the caller of the package's function, which is `callers` calls above this one."""
     for note in notes:
         warnings.warn(note, stacklevel=callers + 2)
 

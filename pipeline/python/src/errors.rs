@@ -1,4 +1,4 @@
-//! Errors of the program as the one exception of the package.
+//! Turns errors of the program into the package's only exception.
 
 use pyo3::PyErr;
 use pyo3::import_exception;

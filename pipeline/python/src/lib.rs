@@ -1,5 +1,6 @@
-//! `sastrugi._native`: what the Python package takes from the program. Thin: every function is one call into the stages or a kernel, with the
-//! interpreter's lock released while it works. Parameters and results that are not arrays pass as JSON; `sastrugi/*.py` gives them their shape.
+//! `sastrugi._native`: the part of the Python package that is written in Rust. Thin: every function makes one call into the stages or a kernel,
+//! and releases the interpreter's lock meanwhile. Parameters and results that are not arrays pass as JSON; `sastrugi/*.py` gives them their
+//! shape.
 //!
 //! # Flow
 //!
