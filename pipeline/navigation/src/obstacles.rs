@@ -1,6 +1,6 @@
 //! Polygonal obstacles that are blocked on a map.
 //!
-//! Blocked are the cells that the polygon's edge touches (supercover) or whose centre lies inside (even-odd rule), and all cells within a margin of
+//! This blocks the cells that the polygon's edge touches (supercover) or whose centre lies inside (even-odd rule), and all cells within a margin of
 //! those. (The thesis marks the cells of the edge as vertices, which would then lie inside the obstacle.)
 
 use crate::map::{Node, TravelMap};

@@ -12,8 +12,8 @@
 //! * `directional_psd`: `ln` of the mean power in sectors of 30 degrees over the mean of all, between the longest increment (at least
 //!   8 cells) and half the Nyquist frequency.
 //!
-//! [`surface_statistics`], of parts of a surface, adds half an extremum of each kind, and one cell: a smooth part may have none, whose logarithm
-//! would be infinite. It also adds what a fit may set, and the shape of the sets above a level:
+//! [`surface_statistics`], for parts of a surface, counts half an extremum more of each kind, and one cell more: a smooth part may have no
+//! extrema, and the logarithm of 0 is infinite. It also contains what a fit may set, and the shape of the sets above a level:
 //! * `covariance`: mean product of the residuals, m²: at lag 0, then at lags of 1, 2, 3 ... cells east-west, north-south, and along both diagonals up to
 //!   the same distance in cells;
 //! * `height_distribution`: 99 quantiles over their root mean square, so that unit and sigma do not count; it is also the area above a level,

@@ -3,7 +3,7 @@
 //! # What
 //! A neighbourhood of [`COPY_SIDE`] x [`COPY_SIDE`] cells is a copy if the Laplacians (five points) of its cells are those of a neighbourhood
 //! of the other surface, up to [`COPY_TOLERANCE`] of their root mean square. Laplacians do not change with an offset or a tilt, so a patch is
-//! recognised on any base whose curvature is small against that of the texture. Neither mirrored nor turned copies are looked for.
+//! recognised on any base whose curvature is small against that of the texture. Mirrored and rotated copies are not searched for.
 //!
 //! # How
 //! The signs of its Laplacians, 49 bits, are the key of a neighbourhood. A neighbourhood is compared with the one that continues the copy of its
@@ -11,8 +11,8 @@
 //! edge of a copied patch, not the patch.
 //!
 //! # When not to use it
-//! Surfaces that are flat or rounded to few heights (integer metres, filled holes) hold equal neighbourhoods by chance: compare with the share
-//! that two parts of the site have of each other.
+//! Surfaces that are flat or rounded to few heights (integer metres, filled holes) contain equal neighbourhoods by chance: compare with the
+//! share of copies between two parts of the site.
 //!
 //! # Cost
 //! One sort of the other surface's keys; at most `49 (CANDIDATES + 2)` products per cell; some 50 bytes per cell.

@@ -23,7 +23,7 @@
 //!
 //! Maps of generators (`class`, `albedo` ...) are kept where their process takes effect (w above 0); of two maps with the same name the
 //! later wins. They have no data where no process provides any, where a blend replaces the operand (w = 1), and outside a mask. Roughness
-//! maps are dropped, because they describe the operand alone; so do notes that begin with `process k alone` (k from 1).
+//! maps are dropped, because they describe the operand alone. Notes that begin with `process k alone` (k from 1) describe it alone too.
 //!
 //! The centre line of every trail becomes a line of the surface (`trail`, `trail-2` ... in order), with the heights of the finished
 //! surface; lines of operands are kept.
