@@ -5,9 +5,9 @@
 //! of 8 cells times the exponential of a smoother one: rough in patches; its statistics have lags to 96 cells, as with a window of 64 cells.
 //!
 //! Other programs. Portilla and Simoncelli's synthesis in plenoptic (MIT; PyTorch), if its Python is installed (`floors/wavelet_statistics.py`;
-//! `floors/set_up plenoptic`): seconds an iteration on one thread, printed before the table. Of quick sampling (Gravey and Mariethoz 2020)
-//! the package index has only the client of a server (G2S 0.99.3); of direct sampling, interfaces to MPSlib (scikit-mps 0.6.0, which can compile it) and
-//! to DeeSse (geone 1.3.4), neither of which has been run here; of quilting it has no package by that name.
+//! `floors/set_up plenoptic`): seconds an iteration on one thread, printed before the table. The package index has, for quick sampling (Gravey and
+//! Mariethoz 2020), only the client of a server (G2S 0.99.3); for direct sampling, interfaces to MPSlib (scikit-mps 0.6.0, which can compile it) and to
+//! DeeSse (geone 1.3.4), neither of which has been run here; for quilting, no package by that name.
 //!
 //! The patches of `quilting` are 6 correlation lengths wide, here some 48 cells. On ground with a shorter correlation they are narrower and more, and
 //! the time grows: see its module header.

@@ -8,8 +8,8 @@
 //! * Memory with 1000 connections.
 //! * Time from the disconnection of the last client of a coarse window, which takes seconds, to the end of the work on it.
 //!
-//! Targets: 64 clients: median 2 ms, p99 10 ms; new patch: 60 ms of one core, and 5 ms beyond the kernel; session: 20 s cold, 2 s warm; 5 times
-//! the tiles of titiler; work ends 50 ms after its last client. It takes 2 minutes of two cores that do nothing else, and measures the program that was built before:
+//! Targets: 64 clients: median 2 ms, p99 10 ms; new patch: 60 ms of one core, and 5 ms beyond the kernel; session: 20 s cold, 2 s warm; 5 times the tiles of titiler;
+//! work ends 50 ms after its last client. It takes 2 minutes on two otherwise idle cores, and measures the program that was built before:
 //!
 //! ```text
 //! benches/floors/set_up && cargo build --release && cargo bench -p sastrugi-benches --bench server

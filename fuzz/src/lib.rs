@@ -1,4 +1,4 @@
-//! What the fuzz targets share: files for readers that take a path.
+//! Shared by the fuzz targets: files for readers that take a path.
 
 use std::fs;
 use std::path::{Path, PathBuf};

@@ -1,4 +1,4 @@
-//! Rasters: the first byte chooses the name, by which some formats are told. All of a raster, and row by row.
+//! Rasters, read whole and row by row. The first byte selects the file name, by which some formats are recognised.
 #![no_main]
 
 use sastrugi_fuzz::file;

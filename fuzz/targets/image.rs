@@ -1,4 +1,4 @@
-//! Descriptions of images: sun, camera, photometry and noise. What was read is read again as it is written.
+//! Descriptions of images: sun, camera, photometry and noise. A description that was read is written and read again.
 #![no_main]
 
 use sastrugi_fuzz::file;

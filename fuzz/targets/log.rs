@@ -1,4 +1,4 @@
-//! Recordings, MCAP: all of it, and its summary alone.
+//! MCAP recordings: the complete file, and its summary alone.
 #![no_main]
 
 use sastrugi_fuzz::file;

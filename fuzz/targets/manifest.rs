@@ -1,4 +1,5 @@
-//! The manifest and the sums of a release, parted by a zero byte. What is read at once is the same piece by piece.
+//! The manifest and the checksums of a release, separated by a zero byte. Reading at once and piece by piece gives the
+//! same result.
 #![no_main]
 
 use sastrugi_fuzz::{file, folder};

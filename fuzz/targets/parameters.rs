@@ -1,4 +1,4 @@
-//! Parameters of terrains and textures: an object of JSON with `kind` or `method`.
+//! Parameters of terrains and textures: a JSON object with `kind` or `method`.
 #![no_main]
 
 use serde_json::Value;

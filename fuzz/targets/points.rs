@@ -1,4 +1,4 @@
-//! Point clouds, LAS and LAZ; the last byte chooses how they are gridded.
+//! Point clouds, LAS and LAZ; the last byte selects how they are gridded.
 #![no_main]
 
 use sastrugi_fuzz::file;

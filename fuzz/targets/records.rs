@@ -1,4 +1,4 @@
-//! Small files from folders of users: vehicles, worlds to serve, and what a work area knows of an item. The first byte chooses which.
+//! Small files in users' folders: vehicles, worlds to serve, and the records of items in a work area. The first byte selects which.
 #![no_main]
 
 use sastrugi_fuzz::{file, folder};

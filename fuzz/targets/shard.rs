@@ -1,4 +1,4 @@
-//! The description of a shard and its study, parted by a zero byte.
+//! The description of a shard and its study, separated by a zero byte.
 #![no_main]
 
 use sastrugi_fuzz::{file, folder};

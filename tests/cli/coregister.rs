@@ -1,4 +1,4 @@
-//! `coregister A B`: the shift, raise and tilt that were made are found, and what they gain is said.
+//! `coregister A B`: finds the shift, raise and tilt that were applied, and says what they gain.
 
 use sastrugi_tests::{area, sastrugi_in, write};
 use serde_json::Value;

@@ -1,4 +1,4 @@
-//! What a release says of itself: licences, sources, citation.
+//! What a release says about itself: licences, sources, citation.
 
 use sastrugi_tests::{area, rows, sastrugi_in, small_study, sums, write};
 use serde_json::Value;

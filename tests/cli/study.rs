@@ -1,4 +1,4 @@
-//! Writing a study: where to start, what is wrong with it, and what makes no sense in it.
+//! Writing a study: starting studies, errors, and warnings about implausible settings.
 
 use sastrugi_tests::{area, sastrugi_in, sums, write};
 use serde_json::Value;
