@@ -74,7 +74,7 @@ impl<'a> Side<'a> {
     fn interval(&self, name: &str) -> Result<([f64; 2], f64), String> {
         let given = || [&self.file.intervals, &self.file.block_intervals].into_iter().flatten();
         if given().filter_map(|i| i.values.get(name)).any(|ends| ends.contains(&None)) {
-            return Err(format!("the interval of {name} of {} is open: its data does not bound it", self.name));
+            return Err(format!("the interval of {name} of {} is open: its data do not bound it", self.name));
         }
         let of = |i: &Intervals| {
             let [low, high] = *i.values.get(name)?;
