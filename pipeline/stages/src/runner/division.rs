@@ -193,7 +193,8 @@ fn advice(graph: &Graph, division: &Division, count: u32) -> Vec<String> {
     }
     if *recommended < count {
         advice.push(format!(
-            "the largest number of shards that use at least half of the time reserved for them is {recommended}"
+            "use {}, the largest power of two at which the shards use at least half of the time reserved for them",
+            counted(*recommended, "shard")
         ));
     }
     advice

@@ -67,7 +67,7 @@ fn val_shards_out_of_balance_are_named() {
     assert_eq!((division.recommended, division.common_ancestors.items), (1, 0));
     let said = division.advice.join("\n");
     assert!(said.contains("takes 8.0 times as long as the mean, 2.0 s of it for s/long"), "{said}");
-    assert!(said.contains("reserved for them is 1"), "{said}");
+    assert!(said.contains("use 1 shard, the largest power of two"), "{said}");
     // Many equal items are divided further.
     assert!(divide(&wide(&area), 2).recommended >= 4);
 }
