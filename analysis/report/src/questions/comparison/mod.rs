@@ -91,7 +91,7 @@ fn introduction(data: &Data, groups: &[Group<Mission>], pairing: &Pairing) -> St
     format!(
         "{registered} Every terrain counts once, with the mean over its missions (success: all missions; other metrics: successful \
          missions only). {tests} p is the share of all arrangements that are at least as extreme, or of about ten thousand random \
-         ones where there are more; from 300 values on, it comes from the normal distribution with the variance over all \
+         ones where there are more; for 300 values or more, it comes from the normal distribution with the variance over all \
          arrangements, unless a value stands out. The shift is Hodges and Lehmann's; its {} % interval holds the shifts that the \
          test would not reject if there were no ties (ties make it too wide). Delta is Cliff's, with Newcombe's interval, or \
          Clopper and Pearson's for blocks; correlations have Bonett and Wright's interval, or Clopper and Pearson's for blocks. \

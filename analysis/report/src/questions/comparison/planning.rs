@@ -46,7 +46,7 @@ pub fn blocks(data: &Data, metrics: &[Metric], pairing: &Pairing) -> Vec<Block> 
          points in success, or of a tenth of another metric's mean, at {} % without adjustment, if terrains and missions scatter \
          as they do here. Power is simulated with the test above on normally distributed terrain means and is accurate to about \
          3 points. Scatter is a standard deviation: between terrains{of_blocks}, and between missions on one terrain{of_both}. \
-         More missions on the same terrains help only in so far as the scatter is between missions.{left_out}",
+         More missions on the same terrains help only with the scatter between missions.{left_out}",
         set::fixed(POINTS, 0),
         set::fixed(100.0 * ALPHA, 0)
     );
