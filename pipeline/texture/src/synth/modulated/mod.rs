@@ -42,8 +42,8 @@
 //!
 //! Not identified: s^2 of smooth ground (`fit.rs`); L beyond 40 cells or a sixth of the site, where the search ends. One scale of patches is fitted, so
 //! L is a compromise where patches contain patches. Not reached: a flatness far above that of the heights, since T cuts the tails of the product to
-//! those of the heights. Flatness over 1, 2, 4, 8, 16 and 32 cells of the unseen half of three sites, of textures of the other half, and of T alone (s^2
-//! = 0):
+//! those of the heights. Flatness over 1, 2, 4, 8, 16 and 32 cells of the unseen half of three sites, of textures of the other half, and of T alone
+//! (s^2 = 0):
 //!
 //! | site | s^2, L | unseen half | texture | T alone |
 //! |---|---|---|---|---|

@@ -2,10 +2,10 @@
 //! magnitudes of its wavelets across octaves and directions.
 //!
 //! From a normal field on a torus, `rounds` times, in this order:
-//! 1. magnitudes: each band of the field ([`Wavelets`]: octaves j, four directions) is a complex field u with logarithm `l = ln(|u| +
-//!    floor)`. All l are mapped jointly and linearly to the measured means and covariance, `l' = mu_0 + A (l - mu)`, by the A that moves them
-//!    least (`symmetric.rs`). The mean of all l' at a cell is given the measured covariance by lag, so that rough places are as large as on
-//!    the site. Every band is multiplied by `exp(l' - l)`, at most [`GAIN_MAX`], its phase unchanged;
+//! 1. magnitudes: each band of the field ([`Wavelets`]: octaves j, four directions) is a complex field u with logarithm
+//!    `l = ln(|u| + floor)`. All l are mapped jointly and linearly to the measured means and covariance, `l' = mu_0 + A (l - mu)`, by the A that
+//!    moves them least (`symmetric.rs`). The mean of all l' at a cell is given the measured covariance by lag, so that rough places are as large
+//!    as on the site. Every band is multiplied by `exp(l' - l)`, at most [`GAIN_MAX`], its phase unchanged;
 //! 2. covariance: each mode is multiplied by the root of the measured spectrum over the field's, both smoothed in the same way
 //!    (`target.rs`), by a factor from 1/2 to 2; short waves by the spectra of the Laplacian ([`spectrum`]);
 //! 3. differences: the distributions of increments (lags of 1, 2, 4 ... 64 cells along rows and columns, 1 along diagonals), of the Laplacian
