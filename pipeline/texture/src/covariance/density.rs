@@ -13,11 +13,18 @@ use std::f64::consts::PI;
 /// Width of a torus, in ranges, that is enough for a covariance with a kink at lag zero.
 pub const TORUS_RANGES: f64 = 16.0;
 
+/// Modes of a column whose eigenvalues are computed side by side.
+const LANES: usize = 8;
+
 /// Eigenvalues of a stationary covariance on a torus, m2, in the order of a half spectrum.
 pub fn spectrum(covariance: &Covariance, torus: [usize; 2], cell_m: [f64; 2]) -> HalfSpectrum {
+    let [rows, cols] = torus;
     match smoothnesses(covariance) {
-        Some(nu) if reaches_across(covariance, torus, cell_m) => from_density(covariance, &nu, torus, cell_m),
-        _ => RealFft2::new(torus[0], torus[1]).forward(&torus_covariance(torus, cell_m, covariance)),
+        Some(nu) if reaches_across(covariance, torus, cell_m) => {
+            let values = from_density(covariance, &nu, torus, cell_m);
+            HalfSpectrum { rows, cols, values: values.into_iter().map(|v| Complex64::new(v, 0.0)).collect() }
+        }
+        _ => RealFft2::new(rows, cols).forward(&torus_covariance(torus, cell_m, covariance)),
     }
 }
 
@@ -38,28 +45,30 @@ fn smoothnesses(covariance: &Covariance) -> Option<Vec<f64>> {
 }
 
 /// Eigenvalues of a sum of Matern covariances of any range, in the order of a half spectrum.
-fn from_density(
-    covariance: &Covariance,
-    smoothness: &[f64],
-    [rows, cols]: [usize; 2],
-    cell_m: [f64; 2],
-) -> HalfSpectrum {
+fn from_density(covariance: &Covariance, smoothness: &[f64], [rows, cols]: [usize; 2], cell_m: [f64; 2]) -> Vec<f64> {
     let wave = |k: usize, n: usize, cell: f64| {
         let k = if 2 * k > n { k as f64 - n as f64 } else { k as f64 };
         2.0 * PI * k / (n as f64 * cell)
     };
     let (sin, cos) = libm::sincos(covariance.azimuth_deg.to_radians());
-    let value = |k: usize| {
-        // Rows run southwards.
-        let wave = [wave(k / rows, cols, cell_m[0]), -wave(k % rows, rows, cell_m[1])];
-        let terms = covariance.structures.iter().zip(smoothness).map(|(term, &nu)| {
-            let eigenvalue = matern::eigenvalue(wave, term.range_m, nu, cell_m, [sin, cos], covariance.ratio);
-            term.sigma_m * term.sigma_m * eigenvalue
-        });
-        Complex64::new(terms.sum::<f64>() + covariance.nugget_m2, 0.0)
+    let lanes = |kx: usize, ky: usize| -> [f64; LANES] {
+        let east = wave(kx, cols, cell_m[0]);
+        // Rows run southwards. The last ones fill the lanes of a column's end.
+        let north: [f64; LANES] = std::array::from_fn(|lane| -wave((ky + lane).min(rows - 1), rows, cell_m[1]));
+        let mut sums = [0.0; LANES];
+        for (term, &nu) in covariance.structures.iter().zip(smoothness) {
+            let of_term = matern::eigenvalues(east, north, term.range_m, nu, cell_m, [sin, cos], covariance.ratio);
+            sums.iter_mut().zip(of_term).for_each(|(sum, value)| *sum += term.sigma_m * term.sigma_m * value);
+        }
+        sums.map(|sum| sum + covariance.nugget_m2)
     };
-    let values = (0..rows * (cols / 2 + 1)).into_par_iter().map(value).collect();
-    HalfSpectrum { rows, cols, values }
+    let mut values = vec![0.0; rows * (cols / 2 + 1)];
+    values.par_chunks_mut(rows).enumerate().for_each(|(kx, column)| {
+        for (run, ky) in column.chunks_mut(LANES).zip((0..rows).step_by(LANES)) {
+            run.copy_from_slice(&lanes(kx, ky)[..run.len()]);
+        }
+    });
+    values
 }
 
 #[cfg(test)]
@@ -82,8 +91,10 @@ mod tests {
             let covariance = form.covariance(&values.collect()).unwrap();
             let (torus, cell_m) = ([240, 200], [0.06, 0.05]);
             let fft = RealFft2::new(torus[0], torus[1]);
-            let spectrum = from_density(&covariance, &smoothnesses(&covariance).unwrap(), torus, cell_m);
-            let field = fft.inverse(spectrum);
+            let nu = smoothnesses(&covariance).unwrap();
+            let values = from_density(&covariance, &nu, torus, cell_m);
+            let values = values.into_iter().map(|v| Complex64::new(v, 0.0)).collect();
+            let field = fft.inverse(HalfSpectrum { rows: torus[0], cols: torus[1], values });
             let wanted = torus_covariance(torus, cell_m, &covariance);
             let worst = field.iter().zip(&wanted).map(|(a, b)| (a - b).abs()).max_by(f64::total_cmp).unwrap();
             assert!(worst < 3e-3 * wanted[0], "{model}: {worst:e} of {}", wanted[0]);

@@ -58,28 +58,48 @@ const ALIASES: i32 = 4;
 /// m, for a covariance whose long axis has `[sin, cos]` of the azimuth and whose range across is `ratio` times the range
 /// along: the spectral density `nu b^2 / pi (1 + b^2 k^2)^(-nu - 1)`, with wavenumbers above half a wave per cell folded back (the
 /// far ones as an integral). Always positive, unlike the transform of a covariance truncated to a torus.
-pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2], [sin, cos]: [f64; 2], ratio: f64) -> f64 {
+pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2], axis: [f64; 2], ratio: f64) -> f64 {
+    let [value] = eigenvalues(k[0], [k[1]], range_m, nu, cell_m, axis, ratio);
+    value
+}
+
+/// [`eigenvalue`] at several wavenumbers that differ in their part to the north, with the same bits. Each sum of aliases takes its terms in the
+/// same sequence, side by side with the others, so that roots and quotients of several take one instruction.
+pub fn eigenvalues<const N: usize>(
+    east: f64,
+    north: [f64; N],
+    range_m: f64,
+    nu: f64,
+    cell_m: [f64; 2],
+    [sin, cos]: [f64; 2],
+    ratio: f64,
+) -> [f64; N] {
     use std::f64::consts::PI;
     let b2 = range_m * range_m;
-    let density = |k2: f64| {
-        let q = 1.0 + b2 * k2;
-        // The exponential needs no power function.
-        if nu == 0.5 { 1.0 / (q * q.sqrt()) } else { libm::exp(-(nu + 1.0) * libm::log(q)) }
-    };
     let turn = cell_m.map(|c| 2.0 * PI / c);
-    let near: f64 = (-ALIASES..=ALIASES)
-        .flat_map(|i| (-ALIASES..=ALIASES).map(move |j| [f64::from(i), f64::from(j)]))
-        .map(|[i, j]| {
-            let [x, y] = [k[0] + i * turn[0], k[1] + j * turn[1]];
-            // Across the long axis distances are stretched by 1 / ratio, and wavenumbers shrunk.
-            let (along, across) = (x * sin + y * cos, (x * cos - y * sin) * ratio);
-            density(along * along + across * across)
-        })
-        .sum();
+    let mut near = [0.0; N];
+    for i in -ALIASES..=ALIASES {
+        let x = east + f64::from(i) * turn[0];
+        for j in -ALIASES..=ALIASES {
+            let shift = f64::from(j) * turn[1];
+            let q = north.map(|north| {
+                let y = north + shift;
+                // Across the long axis distances are stretched by 1 / ratio, and wavenumbers shrunk.
+                let (along, across) = (x * sin + y * cos, (x * cos - y * sin) * ratio);
+                1.0 + b2 * (along * along + across * across)
+            });
+            // The exponential needs no power function.
+            let densities = match nu == 0.5 {
+                true => q.map(|q| 1.0 / (q * q.sqrt())),
+                false => q.map(|q| libm::exp(-(nu + 1.0) * libm::log(q))),
+            };
+            near.iter_mut().zip(densities).for_each(|(sum, density)| *sum += density);
+        }
+    }
     // Beyond the summed aliases, replaced by a circle of equal area and this squared radius.
     let radius2 = (2.0 * f64::from(ALIASES) + 1.0) * (2.0 * f64::from(ALIASES) + 1.0) * turn[0] * turn[1] / PI;
     let far = libm::exp(-nu * libm::log1p(b2 * radius2 * ratio));
-    near * ratio * nu * b2 / PI * turn[0] * turn[1] + far
+    near.map(|near| near * ratio * nu * b2 / PI * turn[0] * turn[1] + far)
 }
 
 /// Ratio below which the correlation is taken as 1.
@@ -271,6 +291,40 @@ mod tests {
         for (nu, x, expected) in BESSEL {
             let found = bessel_k(nu, x);
             assert!((found / expected - 1.0).abs() < 1e-12, "K_{nu}({x}) = {found}, expected {expected}");
+        }
+    }
+
+    /// Side by side, eigenvalues have the bits of the sum over aliases one after the other.
+    #[test]
+    fn prop_eigenvalues_side_by_side_change_no_bit() {
+        use std::f64::consts::PI;
+        let one = |k: [f64; 2], b: f64, nu: f64, cell_m: [f64; 2], [sin, cos]: [f64; 2], ratio: f64| {
+            let turn = cell_m.map(|c| 2.0 * PI / c);
+            let mut near = 0.0;
+            for i in -ALIASES..=ALIASES {
+                for j in -ALIASES..=ALIASES {
+                    let [x, y] = [k[0] + f64::from(i) * turn[0], k[1] + f64::from(j) * turn[1]];
+                    let (along, across) = (x * sin + y * cos, (x * cos - y * sin) * ratio);
+                    let q = 1.0 + b * b * (along * along + across * across);
+                    near += if nu == 0.5 { 1.0 / (q * q.sqrt()) } else { libm::exp(-(nu + 1.0) * libm::log(q)) };
+                }
+            }
+            let radius2 = (2.0 * f64::from(ALIASES) + 1.0) * (2.0 * f64::from(ALIASES) + 1.0) * turn[0] * turn[1] / PI;
+            let far = libm::exp(-nu * libm::log1p(b * b * radius2 * ratio));
+            near * ratio * nu * (b * b) / PI * turn[0] * turn[1] + far
+        };
+        let (sin, cos) = libm::sincos(0.6);
+        for nu in [0.3, 0.5, 1.7] {
+            for (cell_m, axis, ratio) in [([0.02; 2], [0.0, 1.0], 1.0), ([0.05, 0.07], [sin, cos], 0.4)] {
+                let north: [f64; 8] = std::array::from_fn(|l| 1.3 * l as f64 - 5.0);
+                let found = eigenvalues(2.7, north, 1.9, nu, cell_m, axis, ratio);
+                for (found, north) in found.into_iter().zip(north) {
+                    let expected = one([2.7, north], 1.9, nu, cell_m, axis, ratio);
+                    assert_eq!(found.to_bits(), expected.to_bits(), "nu {nu}, {cell_m:?}, {north}: {found} {expected}");
+                    let alone = eigenvalue([2.7, north], 1.9, nu, cell_m, axis, ratio);
+                    assert_eq!(alone.to_bits(), expected.to_bits(), "nu {nu}, {cell_m:?}, {north}: {alone} {expected}");
+                }
+            }
         }
     }
 
