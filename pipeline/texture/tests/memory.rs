@@ -2,7 +2,7 @@
 
 use peak_alloc::PeakAlloc;
 use sastrugi_numeric::Streams;
-use sastrugi_schemas::fit::FitFile;
+use sastrugi_schemas::fit::{CovarianceMap, FitFile};
 use sastrugi_texture::synth::statistics;
 use sastrugi_texture::{Measured, prepare, prepare_from};
 use serde_json::{Value, json};
@@ -57,6 +57,55 @@ fn val_textures_take_the_memory_that_they_state() {
                     "{raw}: {peak}, {bytes} per cell"
                 );
             }
+        }
+    }
+}
+
+/// The same for measured covariances and for what a background lacks, with what a binding to the fit takes and holds; cells as wide as the fit's, and twice as
+/// wide. With a range of 0.4 m the model's covariance is transformed, with one of 40 m its density is summed.
+#[test]
+fn val_textures_for_a_background_take_the_memory_that_they_state() {
+    let _alone = ALONE.lock().unwrap_or_else(PoisonError::into_inner);
+    let at = |(r, c): (i32, i32)| 0.0025 / (1.0 + f64::from(r * r + c * c) / 16.0);
+    let lags = (0..=37).flat_map(|r| (-37..=37).map(move |c| (r, c)));
+    let map = CovarianceMap {
+        base: "residual".to_owned(),
+        model: "exponential".to_owned(),
+        max_lag: [37; 2],
+        covariance_m2: lags.map(at).collect(),
+    };
+    for (range_m, is_measured, cell_m, size_px) in [
+        (0.4, true, 0.1, [1000, 1000]),
+        (40.0, true, 0.1, [1000, 1000]),
+        (40.0, true, 0.2, [500, 563]),
+        (0.4, false, 0.1, [1000, 1000]),
+        (0.4, false, 0.2, [500, 500]),
+    ] {
+        let parameters = [("sigma_m", 0.05), ("range_m", range_m)].map(|(k, v)| (k.to_owned(), v)).into();
+        let model = if is_measured { "empirical" } else { "exponential" };
+        let fit = FitFile {
+            model: model.to_owned(),
+            parameters,
+            map: is_measured.then(|| map.clone()),
+            window_m: Some([2.5; 2]),
+            cell_m: Some([0.1; 2]),
+            ..FitFile::default()
+        };
+        for periodic in [true, false] {
+            let size_px = if periodic { size_px } else { size_px.map(|n| n / 2) };
+            let raw = json!({ "size_px": size_px, "cell_m": cell_m, "periodic": periodic, "covariance": "residual" });
+            let pool = rayon::ThreadPoolBuilder::new().num_threads(2).build().expect("a pool of threads");
+            let [peak, stated] = pool.install(|| {
+                let before = ALLOCATED.current_usage();
+                ALLOCATED.reset_peak_usage();
+                let texture = prepare("fft_ma", &raw, &fit).expect("the fit suits the method");
+                let made = texture.generate(&Streams::for_seed(1, "texture")).expect("a texture");
+                let peak = ALLOCATED.peak_usage() - before;
+                drop(made);
+                [peak as f64, texture.cost().memory_bytes as f64]
+            });
+            println!("{raw}, {range_m} m: {:.1} MB, stated {:.1} MB", 1e-6 * peak, 1e-6 * stated);
+            assert!(peak <= stated + SMALL && stated <= SLACK * peak + SMALL, "{raw}, {range_m} m: {peak} {stated}");
         }
     }
 }

@@ -711,6 +711,9 @@ impl Job for TextureJob {
         if self.base.as_ref().is_some_and(|base| base.was_fitted) {
             notes.push(has_its_texture("onto = { background = \"<fit id>\" }"));
         }
+        let is_periodic = synthesis.is_periodic();
+        // It may hold a spectrum.
+        drop(synthesis);
         // Computed before the amplitude is applied, so that it can be compared with the residual of the fit.
         let residual = self.residual(&grid, &fit);
         let grid = scaled(grid, self.amplitude);
@@ -719,7 +722,7 @@ impl Job for TextureJob {
             Some(base) => {
                 let base = dem::read(&work.parent(&base.item, base.file)?).map_err(input_error)?;
                 let factors = self.factors(work, &base.grid)?;
-                (lay_onto(&base.grid, &grid, synthesis.is_periodic(), factors.as_ref())?, base.info.crs)
+                (lay_onto(&base.grid, &grid, is_periodic, factors.as_ref())?, base.info.crs)
             }
         };
         let mut outcome = self.released(work, &heights, &crs, notes)?;

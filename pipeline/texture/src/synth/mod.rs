@@ -517,7 +517,10 @@ impl<K: Kernel> Texture<K> {
         let mut notes = Vec::new();
         let wanted = tile.covariance(fitted.covariance.clone(), &mut notes);
         let kernel = own.kernel(tile, &wanted, &fitted)?;
-        let variance_m2 = if kernel.aims_at_a_model() { wanted.at_distance(0.0) } else { kernel.achieved()([0.0; 2]) };
+        let variance_m2 = || match kernel.aims_at_a_model() {
+            true => wanted.at_distance(0.0),
+            false => kernel.achieved()([0.0; 2]),
+        };
         let marginal = tile.marginal(&fitted.quantiles_m, variance_m2)?;
         notes.extend(kernel.notes());
         Ok(Self { tile: tile.clone(), parameters: tile.parameters_with(own), marginal, wanted, kernel, notes })
@@ -552,6 +555,10 @@ impl<K: Kernel> Texture<K> {
     }
 
     fn error_note(&self) -> Option<String> {
+        // Then the target is what is achieved.
+        if self.marginal.is_none() && !self.kernel.aims_at_a_model() {
+            return None;
+        }
         let lags = self.covariance();
         let worst = lags.iter().max_by(|a, b| a.error_m2().total_cmp(&b.error_m2()))?;
         let variance_m2 = lags[0].wanted_m2;

@@ -165,16 +165,20 @@ impl Tile {
         parameters.outer_m.map(|m| ParameterError::positive("outer_m", m)).transpose()?;
         let tile = Self { parameters, geometry, periodic, note };
         if tile.parameters.marginal_m.is_some() {
-            tile.marginal(&[], f64::NAN)?;
+            tile.marginal(&[], || f64::NAN)?;
         }
         Ok(tile)
     }
 
-    /// The height distribution, unless normal; `measured_m` are the fit's quantiles.
+    /// The height distribution, unless normal; `measured_m` are the fit's quantiles. The variance is asked for only where it counts.
     ///
     /// # Errors
     /// A table that is not a distribution; a fit without heights.
-    pub fn marginal(&self, measured_m: &[f64], variance_m2: f64) -> Result<Option<Marginal>, ParameterError> {
+    pub fn marginal(
+        &self,
+        measured_m: &[f64],
+        variance_m2: impl FnOnce() -> f64,
+    ) -> Result<Option<Marginal>, ParameterError> {
         match (&self.parameters.marginal_m, self.parameters.marginal) {
             (None, Heights::Normal) => Ok(None),
             (Some(_), Heights::Measured) => Err(ParameterError::new(
@@ -186,7 +190,7 @@ impl Tile {
                 let message = "is `measured`, but the fit file has no `height_quantiles_m`; fit the DEM again";
                 Err(ParameterError::new("marginal", message))
             }
-            (None, Heights::Measured) => Marginal::of_shape(measured_m, variance_m2).map(Some),
+            (None, Heights::Measured) => Marginal::of_shape(measured_m, variance_m2()).map(Some),
         }
     }
 

@@ -1,4 +1,6 @@
 //! Target covariances other than the model of the surface, and their spectra.
+//!
+//! Such a spectrum is computed on cells no larger than the fit's ([`Lattice`]), once for each texture ([`Aimed`]).
 
 use super::spectrum::Spectrum;
 use crate::covariance::Covariance;
@@ -23,22 +25,70 @@ pub enum Aim {
     Empirical { map: Box<CovarianceMap>, window: BoxWindow, purpose: Purpose, times: [usize; 2] },
 }
 
+/// A target on its torus.
+pub struct Aimed {
+    /// The cells on which its spectrum was computed.
+    pub lattice: Lattice,
+    /// Its spectrum on a torus of the texture's cells.
+    pub spectrum: Spectrum,
+    /// Shares of a measured covariance.
+    pub shares: Option<Shares>,
+}
+
+/// How the spectrum of a measured covariance is composed.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Shares {
+    /// Share of the measured spectrum that was negative and set to 0.
+    pub clipped: f64,
+    /// Share of the variance that comes from the model.
+    pub continued: f64,
+}
+
+/// The cells on which the spectrum of a target is computed.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Lattice {
+    /// How many make up one of the texture's, north-south and east-west.
+    pub times: [usize; 2],
+    /// How many a torus needs at least, north-south and east-west.
+    least: [usize; 2],
+}
+
+impl Lattice {
+    /// For the part of a model that a background over a window lacks.
+    fn of_window(window: BoxWindow, times: [usize; 2]) -> Self {
+        Self { times, least: window.cells().map(|width| 2 * width) }
+    }
+
+    /// For a covariance measured at lags of up to `max_lag` cells.
+    fn of_lags(max_lag: [usize; 2], times: [usize; 2]) -> Self {
+        Self { times, least: max_lag.map(|lag| lag.saturating_mul(2).saturating_add(2)) }
+    }
+
+    /// Number of cells per cell of the texture.
+    pub fn oversampling(&self) -> f64 {
+        self.times[0] as f64 * self.times[1] as f64
+    }
+
+    /// Sides, east-west and north-south, that a torus needs at least, m, for a texture with cells of `cell_m`.
+    pub fn torus_m(&self, cell_m: [f64; 2]) -> [f64; 2] {
+        let fine_m = finer(cell_m, self.times);
+        [0, 1].map(|k| self.least[1 - k] as f64 * fine_m[k])
+    }
+}
+
 impl Aim {
     /// The target for a fit and a purpose; `None` if it is the model of the surface.
     ///
     /// # Errors
     /// A fit without a window; cells that are not multiples of the measured ones.
     pub fn of(wanted: &Wanted, purpose: Purpose, cell_m: [f64; 2]) -> Result<Option<Self>, ParameterError> {
-        let window_at = |cell_m: [f64; 2]| window_on(wanted.window_m, cell_m);
         let Some(map) = &wanted.map else {
             return match purpose {
                 Purpose::Surface => Ok(None),
                 Purpose::Residual => {
-                    // A few coarse cells cannot represent the fit's window, so cells no larger than the fit's are used.
                     let fitted_m = wanted.cell_m.unwrap_or(cell_m);
-                    let times = [1, 0].map(|k| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0));
-                    let window = window_at([cell_m[0] / times[1], cell_m[1] / times[0]])?;
-                    Ok(Some(Self::Residual { window, times: times.map(|t| t as usize) }))
+                    let (window, times) = residual_window(wanted.window_m, cell_m, fitted_m)?;
+                    Ok(Some(Self::Residual { window, times }))
                 }
             };
         };
@@ -51,25 +101,15 @@ impl Aim {
         };
         let times = multiples(cell_m, measured_m)?;
         let needs_window = map.base != "surface" || purpose == Purpose::Residual;
-        let window = if needs_window { window_at(measured_m)? } else { BoxWindow { half: [0, 0] } };
+        let window = if needs_window { window_on(wanted.window_m, measured_m)? } else { BoxWindow { half: [0, 0] } };
         Ok(Some(Self::Empirical { map: map.clone(), window, purpose, times }))
     }
 
-    /// Number of computed cells per cell of the texture.
-    pub fn oversampling(&self) -> usize {
+    /// The cells on which its spectrum is computed.
+    pub fn lattice(&self) -> Lattice {
         match self {
-            Self::Residual { times, .. } | Self::Empirical { times, .. } => times[0] * times[1],
-        }
-    }
-
-    /// Sides, east-west and north-south, that a torus needs for the measured lags, m.
-    pub fn torus_m(&self, cell_m: [f64; 2]) -> [f64; 2] {
-        match self {
-            Self::Residual { window, times } => window.size_m(finer(cell_m, *times)).map(|side| 2.0 * side),
-            Self::Empirical { map, times, .. } => {
-                let fine_m = finer(cell_m, *times);
-                [0, 1].map(|k| (2 * map.max_lag[1 - k] + 2) as f64 * fine_m[k])
-            }
+            Self::Residual { window, times } => Lattice::of_window(*window, *times),
+            Self::Empirical { map, times, .. } => Lattice::of_lags(map.max_lag, *times),
         }
     }
 
@@ -78,7 +118,8 @@ impl Aim {
     /// # Errors
     /// A tile that is too small.
     pub fn check_tile(&self, tile: &Geometry) -> Result<(), ParameterError> {
-        let ([needed_x_m, needed_y_m], [x_m, y_m]) = (self.torus_m(tile.cell).map(tidy), tile.size().map(tidy));
+        let needed_m = self.lattice().torus_m(tile.cell);
+        let ([needed_x_m, needed_y_m], [x_m, y_m]) = (needed_m.map(tidy), tile.size().map(tidy));
         if matches!(self, Self::Residual { .. }) || (x_m >= needed_x_m && y_m >= needed_y_m) {
             return Ok(());
         }
@@ -89,32 +130,41 @@ impl Aim {
         Err(ParameterError::new("size_m", message))
     }
 
-    /// The spectrum on a torus of the texture's cells.
-    pub fn spectrum(&self, model: &Covariance, torus: [usize; 2], cell_m: [f64; 2]) -> (Spectrum, Composition) {
-        match self {
-            Self::Residual { window, times } => {
-                let fine = [0, 1].map(|k| torus[k] * times[k]);
-                let values = empirical::residual_spectrum(model, *window, fine, finer(cell_m, *times));
-                let half = HalfSpectrum { rows: fine[0], cols: fine[1], values: Vec::new() };
-                let none = Composition { values: Vec::new(), clip_share: 0.0, continued_share: 0.0 };
-                (Spectrum::of_values(torus, folded(&half, values, *times)), none)
+    /// The target on a torus of the texture's cells.
+    pub fn on_torus(&self, model: &Covariance, torus: [usize; 2], cell_m: [f64; 2]) -> Aimed {
+        let lattice = self.lattice();
+        let times = lattice.times;
+        let (fine, fine_m) = ([0, 1].map(|k| torus[k] * times[k]), finer(cell_m, times));
+        let (values, shares) = match self {
+            Self::Residual { window, .. } => (empirical::residual_spectrum(model, *window, fine, fine_m), None),
+            Self::Empirical { map, window, purpose, .. } => {
+                let Composition { values, clip_share, continued_share } =
+                    empirical::spectrum(map, model, *window, *purpose, fine, fine_m);
+                (values, Some(Shares { clipped: clip_share, continued: continued_share }))
             }
-            Self::Empirical { map, window, purpose, times } => {
-                let fine = [0, 1].map(|k| torus[k] * times[k]);
-                let mut made = empirical::spectrum(map, model, *window, *purpose, fine, finer(cell_m, *times));
-                let half = HalfSpectrum { rows: fine[0], cols: fine[1], values: Vec::new() };
-                let values = folded(&half, std::mem::take(&mut made.values), *times);
-                (Spectrum::of_values(torus, values), made)
-            }
-        }
+        };
+        let half = HalfSpectrum { rows: fine[0], cols: fine[1], values: Vec::new() };
+        Aimed { lattice, spectrum: Spectrum::of_values(torus, folded(&half, values, times)), shares }
     }
 }
 
-/// How many cells, each no larger than the fit's, make up one cell of the texture, for the spectrum of a residual or of a measured
-/// covariance.
-pub fn finest(cell_m: [f64; 2], fitted_m: [f64; 2]) -> u64 {
-    let times = |k: usize| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0) as u64;
-    times(0).saturating_mul(times(1))
+/// The window of the background on cells no larger than the fit's, and how many of these make up one cell of the texture: a few coarse cells
+/// cannot represent it.
+///
+/// # Errors
+/// A fit without a window.
+fn residual_window(
+    window_m: Option<[f64; 2]>,
+    cell_m: [f64; 2],
+    fitted_m: [f64; 2],
+) -> Result<(BoxWindow, [usize; 2]), ParameterError> {
+    let times = finest(cell_m, fitted_m);
+    Ok((window_on(window_m, finer(cell_m, times))?, times))
+}
+
+/// How many cells, each no larger than the fit's, make up one cell of the texture, north-south and east-west.
+pub fn finest(cell_m: [f64; 2], fitted_m: [f64; 2]) -> [usize; 2] {
+    [1, 0].map(|k| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0) as usize)
 }
 
 /// How many cells of a measured covariance make up one cell of a texture, north-south and east-west.

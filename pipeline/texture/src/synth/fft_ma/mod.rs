@@ -34,13 +34,24 @@
 //! Unit phases are exact only on the complete torus. Crops scatter like any sample, and the spread over an ensemble of
 //! unit-phase tiles is too small: Monte Carlo work needs `gaussian`.
 //!
+//! The spectrum of what a background lacks, or of a measured covariance, is `lambda` itself, computed once for each texture on cells no larger than the fit's.
+//! `periodic = true`: the tile is the torus. `periodic = false`: the torus is at least twice as wide as the tile, and as two windows of the
+//! background or twice the measured lags, whatever the range of the model. What a background lacks is not confined to the window: a spectrum that falls as
+//! `k^-(2 + 2 nu)`, times `1 - D^2 ~ k^2`, leaves a correlation that falls as `h^-(2 - 2 nu)` up to the range b, and as the model beyond. Of an exponential with b of 20
+//! windows 9.5 % of the variance are left at 1.5 windows, 2.7 % at 4 and 0.8 % at 8, with b of 0.56 windows 1.9, 0.03 and 0.00003 %. A torus of a crop and 1.5
+//! windows, the reach of a measured covariance, would give the longest lags of the crop errors of 2 to 7 % of the variance
+//! (`val_what_a_background_lacks_reaches_beyond_the_window`).
+//!
 //! Cost: a quarter of a complex transform for the spectrum (half of one if the axes of anisotropy are not the grid's),
-//! half of one for the field, a square root and a phase per mode.
+//! half of one for the field, a square root and a phase per mode. For what a background lacks or a measured covariance: half a transform of the finer cells for
+//! each of measured covariance and model. If the model reaches across the torus, 81 aliases for each mode that takes it instead of its transform: all modes if the
+//! covariance is a model's, long waves if it was measured.
 //!
 //! Peak memory per torus cell: 10 bytes, 2 for a quarter of the spectrum and 8 for the field, which is transformed in place; 16 if the axes
 //! of anisotropy are not the grid's, while both the covariance (8) and its half transform (8) are held. Including thread buffers, 175 MB
 //! were measured for 4096 x 4096 cells, 10.4 bytes each. A cost states 18 for both, which leaves room for those buffers on small tori, and 8
-//! more for each cell of the tile (`tests/memory.rs`).
+//! more for each cell of the tile (`tests/memory.rs`). The spectrum of what a background lacks, or of a measured covariance, takes 24 bytes for each
+//! finer cell while it is computed, for which a cost states 40, and 4 for each torus cell for as long as the texture exists.
 
 mod aim;
 mod spectrum;
@@ -49,7 +60,7 @@ use super::tile::{self, CELLS_MAX, Tile, TileParameters};
 use super::{Cost, Kernel, Made, MethodParameters, Prospect, SynthesisError, Texture, Wanted, reach};
 use crate::covariance::Covariance;
 use crate::covariance::empirical::Purpose;
-use aim::Aim;
+use aim::{Aim, Aimed, Lattice};
 use rayon::prelude::*;
 use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums, turns};
@@ -57,6 +68,7 @@ use sastrugi_schemas::{Kind, ParameterError};
 use schemars::{JsonSchema, Schema};
 use serde::{Deserialize, Serialize};
 use spectrum::Spectrum;
+use std::borrow::Cow;
 
 /// Largest negative share of the spectrum that is set to 0; more is refused.
 pub const CLIP_SHARE_MAX: f64 = 1e-6;
@@ -76,7 +88,7 @@ const CONTINUED_SHARE_NOTE: f64 = 0.5;
 /// Bytes per torus cell during the synthesis of a field: an upper bound of the 10 or 16 of the module header.
 const BYTES_PER_CELL: u64 = 18;
 
-/// The same during the computation of the spectrum of a residual or of a measured covariance.
+/// The same for each cell on which the spectrum of a residual or of a measured covariance is computed.
 const AIM_BYTES_PER_CELL: u64 = 40;
 
 /// Operations of a texture with such a spectrum, relative to any other.
@@ -147,8 +159,8 @@ impl Default for FftMaParameters {
 pub struct FftMa {
     parameters: FftMaParameters,
     covariance: Covariance,
-    /// The target, if it is not the model of the surface.
-    aim: Option<Aim>,
+    /// The target on the torus, if it is not the model of the surface.
+    aimed: Option<Aimed>,
     tile: Geometry,
     /// Rows and columns of the torus, or of the first that is tried.
     torus: [usize; 2],
@@ -216,7 +228,8 @@ impl MethodParameters for FftMaParameters {
         let cell_m = tile.geometry.cell;
         let aims = prospect.is_measured || self.covariance == CovarianceOf::Residual;
         let memory_bytes = if aims {
-            let oversampling = prospect.cell_m.map_or(1, |fitted_m| aim::finest(cell_m, fitted_m));
+            let finest = prospect.cell_m.map_or([1, 1], |fitted_m| aim::finest(cell_m, fitted_m));
+            let oversampling = (finest[0] as u64).saturating_mul(finest[1] as u64);
             // More cells would be refused.
             let most = (CELLS_MAX / (rows * cols).max(1) as u64).max(1);
             cost(rows * cols, tile.geometry.len(), oversampling.min(most)).memory_bytes
@@ -241,11 +254,7 @@ impl MethodParameters for FftMaParameters {
     /// Refuses Eq. 10 for anything but an isotropic exponential, a residual if the fit has no window, and cells that are not
     /// multiples of the measured ones.
     fn kernel(&self, tile: &Tile, wanted: &Covariance, fitted: &Wanted) -> Result<FftMa, ParameterError> {
-        let purpose = match self.covariance {
-            CovarianceOf::Surface => Purpose::Surface,
-            CovarianceOf::Residual => Purpose::Residual,
-        };
-        let aim = Aim::of(fitted, purpose, tile.geometry.cell)?;
+        let aim = Aim::of(fitted, self.purpose(), tile.geometry.cell)?;
         if self.spectrum == SpectrumOf::Eq10 && aim.is_some() {
             return Err(not_of_a_surface());
         }
@@ -260,28 +269,45 @@ impl MethodParameters for FftMaParameters {
         if let Some(aim) = aim.as_ref().filter(|_| self.periodic) {
             aim.check_tile(&tile.geometry)?;
         }
-        let torus = self.torus(tile, wanted, aim.as_ref())?;
-        Ok(FftMa { parameters: self.clone(), covariance: wanted.clone(), aim, tile: tile.geometry, torus })
+        let torus = self.torus(tile, wanted, aim.as_ref().map(Aim::lattice))?;
+        let aimed = aim.map(|aim| aim.on_torus(wanted, torus, tile.geometry.cell));
+        Ok(FftMa { parameters: self.clone(), covariance: wanted.clone(), aimed, tile: tile.geometry, torus })
     }
 }
 
 impl FftMaParameters {
+    fn purpose(&self) -> Purpose {
+        match self.covariance {
+            CovarianceOf::Surface => Purpose::Surface,
+            CovarianceOf::Residual => Purpose::Residual,
+        }
+    }
+
     /// Rows and columns of the smallest torus for a tile, whatever the covariance.
     fn torus_of_any(&self, tile: &Tile) -> [usize; 2] {
         let least = [tile.geometry.rows, tile.geometry.cols];
         if self.periodic { least } else { least.map(|n| 2 * n) }
     }
 
-    /// Rows and columns of the torus for a tile with a given covariance.
-    fn torus(&self, tile: &Tile, wanted: &Covariance, aim: Option<&Aim>) -> Result<[usize; 2], ParameterError> {
-        let [dx, dy] = tile.geometry.cell;
-        let [width_m, height_m] = aim.map_or_else(|| reach::torus_m(wanted), |aim| aim.torus_m(tile.geometry.cell));
-        let [rows, cols] = self.torus_of_any(tile).map(|n| n as f64);
-        let enough = [(rows, height_m, dy), (cols, width_m, dx)].map(|(n, side_m, cell_m)| match self.periodic {
+    /// Fewest rows and columns of the torus for a tile, for a covariance that needs a torus of `least_m`, east-west and north-south.
+    fn enough(&self, tile: &Tile, [width_m, height_m]: [f64; 2]) -> [f64; 2] {
+        let ([dx, dy], [rows, cols]) = (tile.geometry.cell, self.torus_of_any(tile).map(|n| n as f64));
+        [(rows, height_m, dy), (cols, width_m, dx)].map(|(n, side_m, cell_m)| match self.periodic {
             true => n,
             false => n.max((side_m / cell_m).ceil()),
-        });
-        let cells = aim.map_or(1, Aim::oversampling) as f64 * enough[0] * enough[1];
+        })
+    }
+
+    /// Rows and columns of the torus of which these are enough: a periodic tile, or lengths that transform fast.
+    fn rounded(&self, enough: [f64; 2]) -> [usize; 2] {
+        enough.map(|n| if self.periodic { n as usize } else { smooth_length(n as usize) })
+    }
+
+    /// Rows and columns of the torus for a tile with a given covariance.
+    fn torus(&self, tile: &Tile, wanted: &Covariance, aim: Option<Lattice>) -> Result<[usize; 2], ParameterError> {
+        let least_m = aim.map_or_else(|| reach::torus_m(wanted), |lattice| lattice.torus_m(tile.geometry.cell));
+        let enough = self.enough(tile, least_m);
+        let cells = aim.map_or(1.0, |lattice| lattice.oversampling()) * enough[0] * enough[1];
         if cells > CELLS_MAX as f64 {
             let (whose, advice) = match aim {
                 // The range of a fit may be the bound of its search.
@@ -294,7 +320,7 @@ impl FftMaParameters {
             let needed = format!("needs a torus of {cells:.1e} cells; the limit is {CELLS_MAX}");
             return Err(ParameterError::new("periodic", format!("is false, {whose} {needed}: {advice}")));
         }
-        Ok(enough.map(|n| if self.periodic { n as usize } else { smooth_length(n as usize) }))
+        Ok(self.rounded(enough))
     }
 }
 
@@ -313,15 +339,13 @@ fn cost(torus: usize, tile: usize, oversampling: u64) -> Cost {
 }
 
 impl FftMa {
-    /// The spectrum on a torus of `[rows, cols]`.
-    fn spectrum(&self, torus: [usize; 2]) -> Spectrum {
+    /// The spectrum on a torus of `[rows, cols]`; that of a residual or of a measured covariance is known on one torus only.
+    fn spectrum(&self, torus: [usize; 2]) -> Cow<'_, Spectrum> {
         let term = &self.covariance.structures[0];
-        match self.parameters.spectrum {
-            SpectrumOf::Covariance if let Some(aim) = &self.aim => {
-                aim.spectrum(&self.covariance, torus, self.tile.cell).0
-            }
-            SpectrumOf::Covariance => Spectrum::of(&self.covariance, torus, self.tile.cell),
-            SpectrumOf::Eq10 => Spectrum::eq10(term.sigma_m, term.range_m, torus, self.tile.cell),
+        match (self.parameters.spectrum, &self.aimed) {
+            (SpectrumOf::Covariance, Some(aimed)) => Cow::Borrowed(&aimed.spectrum),
+            (SpectrumOf::Covariance, None) => Cow::Owned(Spectrum::of(&self.covariance, torus, self.tile.cell)),
+            (SpectrumOf::Eq10, _) => Cow::Owned(Spectrum::eq10(term.sigma_m, term.range_m, torus, self.tile.cell)),
         }
     }
 
@@ -334,7 +358,7 @@ impl FftMa {
     ///
     /// # Errors
     /// A periodic tile on which it is not; none of the sizes tried.
-    fn embedding(&self) -> Result<([usize; 2], Spectrum), SynthesisError> {
+    fn embedding(&self) -> Result<([usize; 2], Cow<'_, Spectrum>), SynthesisError> {
         let mut torus = self.torus;
         loop {
             let spectrum = self.spectrum(torus);
@@ -353,7 +377,7 @@ impl FftMa {
         let larger = torus.map(|n| smooth_length((ENLARGEMENT * n as f64).ceil() as usize));
         let cells = |[rows, cols]: [usize; 2]| rows as f64 * cols as f64;
         let most = (ENLARGED_CELLS * cells(self.torus)).min(CELLS_MAX as f64);
-        (!self.parameters.periodic && self.aim.is_none() && cells(larger) <= most).then_some(larger)
+        (!self.parameters.periodic && self.aimed.is_none() && cells(larger) <= most).then_some(larger)
     }
 
     /// The torus to state the cost for. A small one is tried; a larger one with an oblique covariance is assumed to be enlarged once.
@@ -369,22 +393,21 @@ impl FftMa {
 
     /// Notes on a residual or measured covariance.
     fn aim_notes(&self) -> Vec<String> {
-        let Some(aim) = &self.aim else { return Vec::new() };
-        let (spectrum, made) = aim.spectrum(&self.covariance, self.torus, self.tile.cell);
+        let Some(Aimed { spectrum, shares, .. }) = &self.aimed else { return Vec::new() };
         let rms_m = (spectrum.total() / (self.torus[0] * self.torus[1]) as f64).sqrt();
         let of = match self.parameters.covariance {
             CovarianceOf::Surface => "the surface",
             CovarianceOf::Residual => "the part of the surface that a background over the fit's window lacks",
         };
         let mut notes = vec![format!("covariance of {of}: RMS {rms_m:.3e} m")];
-        if let Aim::Empirical { .. } = aim {
+        if let Some(shares) = shares {
             notes.push(format!(
                 "measured covariance: {:.2} % of its spectrum was negative and set to 0, {:.1} % of the variance is extrapolated by \
                  the model",
-                100.0 * made.clip_share,
-                100.0 * made.continued_share
+                100.0 * shares.clipped,
+                100.0 * shares.continued
             ));
-            if made.continued_share > CONTINUED_SHARE_NOTE {
+            if shares.continued > CONTINUED_SHARE_NOTE {
                 notes.push(MOSTLY_EXTRAPOLATED.to_owned());
             }
         }
@@ -433,7 +456,7 @@ pub(super) fn size_notes(covariance: &Covariance, tile: &Geometry, periodic: boo
 
 impl Kernel for FftMa {
     fn cost(&self) -> Cost {
-        let oversampling = self.aim.as_ref().map_or(0, |aim| aim.oversampling() as u64);
+        let oversampling = self.aimed.as_ref().map_or(0, |aimed| aimed.lattice.oversampling() as u64);
         let [rows, cols] = self.expected_torus();
         cost(rows * cols, self.tile.len(), oversampling)
     }
@@ -441,7 +464,7 @@ impl Kernel for FftMa {
     fn notes(&self) -> Vec<String> {
         let FftMaParameters { phase, periodic, spectrum, .. } = self.parameters;
         let mut notes =
-            if self.aim.is_none() { size_notes(&self.covariance, &self.tile, periodic) } else { Vec::new() };
+            if self.aimed.is_none() { size_notes(&self.covariance, &self.tile, periodic) } else { Vec::new() };
         if !periodic && phase == Phase::Unit {
             notes.push(
                 "unit phases are exact only on the complete torus; the covariance of this crop scatters between realisations".to_owned(),
@@ -459,7 +482,7 @@ impl Kernel for FftMa {
     }
 
     fn achieved(&self) -> Box<dyn Fn([f64; 2]) -> f64 + '_> {
-        if self.parameters.spectrum == SpectrumOf::Covariance && self.aim.is_none() {
+        if self.parameters.spectrum == SpectrumOf::Covariance && self.aimed.is_none() {
             return Box::new(|lag_m| self.covariance.at(lag_m));
         }
         let ([rows, cols], [dx, dy]) = (self.torus, self.tile.cell);
@@ -469,7 +492,7 @@ impl Kernel for FftMa {
     }
 
     fn aims_at_a_model(&self) -> bool {
-        self.aim.is_none()
+        self.aimed.is_none()
     }
 
     fn make(&self, streams: &Streams) -> Result<Made, SynthesisError> {
@@ -478,7 +501,7 @@ impl Kernel for FftMa {
         let cells = (rows * cols) as f64;
         let exact = self.parameters.spectrum == SpectrumOf::Covariance;
         let covariance_error_max_m2 = exact.then(|| spectrum.negative() / cells);
-        let amplitudes = spectrum.amplitudes();
+        let amplitudes = spectrum.into_owned().amplitudes();
         let field = RealFft2::new(rows, cols).inverse_of(|kx, column| {
             random_column(kx, cols, |ky| amplitudes.at(kx, ky), self.parameters.phase, streams, column);
         });

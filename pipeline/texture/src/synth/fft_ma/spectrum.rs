@@ -11,6 +11,7 @@ use std::f64::consts::PI;
 const NEGLIGIBLE: f64 = 1e-20;
 
 /// The eigenvalues `lambda(kx, ky)` of a covariance on a torus, m2, for `kx <= cols / 2`.
+#[derive(Clone)]
 pub struct Spectrum {
     rows: usize,
     cols: usize,

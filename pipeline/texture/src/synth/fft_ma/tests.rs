@@ -590,6 +590,23 @@ fn val_empirical_refusals() {
     assert!(refused("fft_ma", size.clone(), &broken).contains("map.covariance_m2"));
 }
 
+/// A spectrum is computed once: a texture has the bits of any other with the same parameters, however often it was asked for notes and covariances.
+#[test]
+fn prop_one_spectrum_serves_all() {
+    let raw = json!({ "size_px": [150, 120], "cell_m": 0.12, "covariance": "residual", "marginal": "measured" });
+    let asked = of_site(raw.clone());
+    let (notes, lags) = (asked.notes(), asked.covariance());
+    assert!(notes.iter().any(|note| note.starts_with("measured covariance: ")), "{notes:?}");
+    let bits = |texture: &dyn Synthesis| {
+        let made = texture.generate(&streams(4)).unwrap().grid;
+        made.values.into_iter().map(f64::to_bits).collect::<Vec<u64>>()
+    };
+    let first = bits(asked.as_ref());
+    assert_eq!(first, bits(asked.as_ref()));
+    assert_eq!((asked.notes(), asked.covariance()), (notes, lags));
+    assert_eq!(first, bits(of_site(raw).as_ref()));
+}
+
 /// On cells comparable to the window, or larger, the residual has the same variance as on the fit's cells.
 #[test]
 fn val_a_residual_on_coarse_cells_keeps_its_variance() {
