@@ -42,8 +42,9 @@ pub fn check_memory(method: &str, parameters: &Value, fit: &FitFile) -> Result<(
         torus_m: 0.0,
         cell_m: fit.cell_m,
         cells: None,
-        window_m: fit.window_m.map_or(0.0, |[x, y]| x.max(y)),
+        window_m: fit.window_m.unwrap_or_default(),
         is_measured: fit.map.is_some(),
+        max_lag: fit.map.as_ref().map_or([0; 2], |map| map.max_lag),
         has_statistics: fit.statistics.is_some(),
     };
     let method = sastrugi_texture::method(method, parameters)?;

@@ -31,6 +31,16 @@ pub struct Case<'a> {
     pub bins: LagBins,
 }
 
+/// Lags of up to `max_lag_m` on cells of `cell_m` (east-west and north-south), north-south and east-west, cells.
+pub(super) fn lag_cells(max_lag_m: f64, cell_m: [f64; 2]) -> [usize; 2] {
+    [1, 0].map(|axis| (max_lag_m / cell_m[axis] * (1.0 + 1e-9)) as usize)
+}
+
+/// Largest lags of a measured covariance, north-south and east-west, cells, for bins that end at `binned`.
+pub(super) fn measured_lags(binned: [usize; 2], window: BoxWindow) -> [usize; 2] {
+    [0, 1].map(|axis| binned[axis].max((REACH_WINDOWS * window.cells()[axis] as f64) as usize))
+}
+
 impl<'a> Case<'a> {
     /// Detrends, trims and bins the covariance.
     pub fn new(heights: &'a dyn Heights, settings: &'a FitSettings) -> Result<Self, FitError> {
@@ -42,18 +52,15 @@ impl<'a> Case<'a> {
         }
         let window = settings.window(&geometry, profiles)?;
         let max_lag_m = settings.max_lag_m(&geometry, profiles)?;
-        let cells = |axis: usize| (max_lag_m / geometry.cell[axis] * (1.0 + 1e-9)) as usize;
-        let max_lag = [if profiles { 0 } else { cells(1) }, cells(0)];
+        let [rows, cols] = lag_cells(max_lag_m, geometry.cell);
+        let max_lag = [if profiles { 0 } else { rows }, cols];
         if settings.empirical && profiles {
             let message = "is `empirical`, which needs covariances in two directions, but a transect has only one";
             return Err(ParameterError::new("model", message).into());
         }
         // These lags stay below half of the DEM, which is at least three windows wide.
-        let measured = |axis: usize| match settings.empirical {
-            true => max_lag[axis].max((REACH_WINDOWS * window.cells()[axis] as f64) as usize),
-            false => max_lag[axis],
-        };
-        let survey = Survey::new(heights, settings, window, [measured(0), measured(1)])?;
+        let surveyed = if settings.empirical { measured_lags(max_lag, window) } else { max_lag };
+        let survey = Survey::new(heights, settings, window, surveyed)?;
         let bins = LagBins::of(&survey.covariance, geometry.cell, max_lag_m, Layout::ISOTROPIC);
         if bins.len() < BINS_MIN {
             return Err(FitError::TooFewLags { found: bins.len(), needed: BINS_MIN });

@@ -17,12 +17,13 @@
 //! one core; the predictions were within a factor of 1.5 of the measured times. With replicates of the best of nine forms they were within a factor of 2.5:
 //! the best costs as much as an exponential, or twenty times as much.
 
-use super::FitSettings;
 use super::params::Mode;
 use super::resampling::CELLS_MAX;
+use super::{FitSettings, case};
 use crate::covariance::Form;
 use crate::synth::Prospect;
 use sastrugi_numeric::Geometry;
+use sastrugi_roughness::background::BoxWindow;
 
 /// Fixed cost of a fit, s.
 const BASE_S: f64 = 0.3;
@@ -58,19 +59,25 @@ const PAPER_CELL_S: f64 = 4e-7;
 const STATISTICS_S: [f64; 2] = [3.0, 6e-6];
 /// Windows assumed across a surface of unknown cell size.
 const WINDOWS_ACROSS: f64 = 10.0;
-/// Windows along the torus of a non-periodic texture: sixteen ranges of an exponential, each assumed as long as the window. A fit may find a
+/// Windows along the torus of a non-periodic texture of a model: sixteen ranges of an exponential, each assumed as long as the window. A fit may find a
 /// longer range, up to the bound of its search; if that were planned for, most textures would run alone or not at all.
 const TORUS_WINDOWS: f64 = 16.0;
 
 impl FitSettings {
     /// What is known before the fit of a surface with this number of cells, for planning.
     pub fn prospect(&self, cell_m: Option<[f64; 2]>, cells: u64) -> Prospect {
+        let window = |cell_m: [f64; 2]| BoxWindow::nearest(self.outer_scale_m(), cell_m);
+        let lags = |cell_m: [f64; 2]| {
+            let binned = case::lag_cells(self.wanted_lag_m(cell_m), cell_m);
+            case::measured_lags(binned, window(cell_m))
+        };
         Prospect {
             torus_m: TORUS_WINDOWS * self.outer_scale_m(),
             cell_m,
             cells: Some(cells),
-            window_m: self.outer_scale_m(),
+            window_m: cell_m.map_or([self.outer_scale_m(); 2], |cell_m| window(cell_m).size_m(cell_m)),
             is_measured: self.is_empirical(),
+            max_lag: cell_m.filter(|_| self.is_empirical()).map_or([0; 2], lags),
             has_statistics: self.has_statistics(),
         }
     }

@@ -364,10 +364,15 @@ impl FitSettings {
         self.max_lag_m(dem, false).map(drop)
     }
 
+    /// Largest lag on cells of `cell_m`, m, whatever the shape of the DEM.
+    pub(super) fn wanted_lag_m(&self, cell_m: [f64; 2]) -> f64 {
+        let least = LAG_CELLS_MIN * cell_m[0].max(cell_m[1]);
+        self.parameters.max_lag_m.unwrap_or(0.5 * self.parameters.outer_scale_m).max(least)
+    }
+
     /// Largest lag on a DEM of this shape, m; for transects, along them.
     pub(super) fn max_lag_m(&self, dem: &Geometry, profiles: bool) -> Result<f64, FitError> {
-        let least = LAG_CELLS_MIN * dem.cell[0].max(dem.cell[1]);
-        let max_lag_m = self.parameters.max_lag_m.unwrap_or(0.5 * self.parameters.outer_scale_m).max(least);
+        let max_lag_m = self.wanted_lag_m(dem.cell);
         let [width_m, height_m] = dem.size();
         let half_m = 0.5 * if profiles { width_m } else { width_m.min(height_m) };
         if max_lag_m > half_m {

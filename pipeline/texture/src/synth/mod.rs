@@ -81,10 +81,12 @@ pub struct Prospect {
     pub cell_m: Option<[f64; 2]>,
     /// Number of these cells.
     pub cells: Option<u64>,
-    /// Window of the fit, m.
-    pub window_m: f64,
+    /// Window of the fit, east-west and north-south, m.
+    pub window_m: [f64; 2],
     /// Whether the measured covariance is stored.
     pub is_measured: bool,
+    /// Its largest lags, north-south and east-west, cells; 0 if it is not stored or its cells are unknown.
+    pub max_lag: [usize; 2],
     /// Whether the statistics of the residual are stored.
     pub has_statistics: bool,
 }

@@ -210,9 +210,9 @@ impl Site {
     /// The site of a fit; without one, as large as the tile, with the longest lags.
     fn of(tile: &Tile, prospect: Option<&Prospect>) -> Self {
         let cells = prospect.and_then(|p| p.cells).unwrap_or(tile.geometry.len() as u64);
-        let [dx, dy] = tile.geometry.cell;
-        let lags = |side_m: f64| prospect.map_or(lags::LAG_MAX, |p| reach_cells(p.window_m, side_m));
-        Self { cells, reach: [dy, dx].map(lags) }
+        let cell_m = tile.geometry.cell;
+        let lags = |k: usize| prospect.map_or(lags::LAG_MAX, |p| reach_cells(p.window_m[k], cell_m[k]));
+        Self { cells, reach: [1, 0].map(lags) }
     }
 }
 
@@ -255,7 +255,7 @@ pub(crate) fn check_keys(method: &str, raw: &Value) -> Result<(), ParameterError
 impl<P: ResidualParameters> Checked<P> {
     fn cost(&self, prospect: Option<&Prospect>) -> Cost {
         // What is refused for its size is refused when the fit is known.
-        let made = self.raised(prospect.map(|fit| [fit.window_m; 2])).unwrap_or_default();
+        let made = self.raised(prospect.map(|fit| fit.window_m)).unwrap_or_default();
         let tile = made.as_ref().map_or(&self.tile, |(_, widened)| widened);
         let cost = self.own.cost_of(tile, &Site::of(tile, prospect));
         self.tile.repeated_cost(if made.is_some() { Raised::cost(cost, tile) } else { cost })

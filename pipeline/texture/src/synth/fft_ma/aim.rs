@@ -5,7 +5,7 @@
 use super::spectrum::Spectrum;
 use crate::covariance::Covariance;
 use crate::covariance::empirical::{self, Composition, Purpose};
-use crate::synth::{Wanted, tidy, window_on};
+use crate::synth::{Prospect, Wanted, tidy, window_on};
 use sastrugi_numeric::Geometry;
 use sastrugi_numeric::fft::HalfSpectrum;
 use sastrugi_roughness::background::BoxWindow;
@@ -44,7 +44,7 @@ pub struct Shares {
     pub continued: f64,
 }
 
-/// The cells on which the spectrum of a target is computed.
+/// The cells on which the spectrum of a target is computed. They are known before the fit.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub struct Lattice {
     /// How many make up one of the texture's, north-south and east-west.
@@ -62,6 +62,19 @@ impl Lattice {
     /// For a covariance measured at lags of up to `max_lag` cells.
     fn of_lags(max_lag: [usize; 2], times: [usize; 2]) -> Self {
         Self { times, least: max_lag.map(|lag| lag.saturating_mul(2).saturating_add(2)) }
+    }
+
+    /// What is known before the fit about a texture with cells of `cell_m`; `None` if its target will be the model of the surface.
+    pub fn planned(prospect: &Prospect, purpose: Purpose, cell_m: [f64; 2]) -> Option<Self> {
+        let fitted_m = prospect.cell_m.unwrap_or(cell_m);
+        if prospect.is_measured {
+            // Cells that are not whole multiples are refused elsewhere.
+            let times = multiples(cell_m, fitted_m).unwrap_or_else(|_| finest(cell_m, fitted_m));
+            return Some(Self::of_lags(prospect.max_lag, times));
+        }
+        let of_window = || residual_window(Some(prospect.window_m), cell_m, fitted_m).ok();
+        let (window, times) = (purpose == Purpose::Residual).then(of_window).flatten()?;
+        Some(Self::of_window(window, times))
     }
 
     /// Number of cells per cell of the texture.
@@ -163,7 +176,7 @@ fn residual_window(
 }
 
 /// How many cells, each no larger than the fit's, make up one cell of the texture, north-south and east-west.
-pub fn finest(cell_m: [f64; 2], fitted_m: [f64; 2]) -> [usize; 2] {
+fn finest(cell_m: [f64; 2], fitted_m: [f64; 2]) -> [usize; 2] {
     [1, 0].map(|k| (cell_m[k] / fitted_m[k] * (1.0 - MULTIPLE_TOLERANCE)).ceil().max(1.0) as usize)
 }
 

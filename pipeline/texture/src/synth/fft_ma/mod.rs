@@ -45,7 +45,7 @@
 //! Cost: a quarter of a complex transform for the spectrum (half of one if the axes of anisotropy are not the grid's),
 //! half of one for the field, a square root and a phase per mode. For what a background lacks or a measured covariance: half a transform of the finer cells for
 //! each of measured covariance and model. If the model reaches across the torus, 81 aliases for each mode that takes it instead of its transform: all modes if the
-//! covariance is a model's, long waves if it was measured.
+//! covariance is a model's, long waves if it was measured. Sides that are no product of 2, 3 and 5 take some five times as long.
 //!
 //! Peak memory per torus cell: 10 bytes, 2 for a quarter of the spectrum and 8 for the field, which is transformed in place; 16 if the axes
 //! of anisotropy are not the grid's, while both the covariance (8) and its half transform (8) are held. Including thread buffers, 175 MB
@@ -62,7 +62,7 @@ use crate::covariance::Covariance;
 use crate::covariance::empirical::Purpose;
 use aim::{Aim, Aimed, Lattice};
 use rayon::prelude::*;
-use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
+use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, is_smooth, smooth_length};
 use sastrugi_numeric::{Geometry, Grid, Stream, Streams, sums, turns};
 use sastrugi_schemas::{Kind, ParameterError};
 use schemars::{JsonSchema, Schema};
@@ -90,9 +90,6 @@ const BYTES_PER_CELL: u64 = 18;
 
 /// The same for each cell on which the spectrum of a residual or of a measured covariance is computed.
 const AIM_BYTES_PER_CELL: u64 = 40;
-
-/// Operations of a texture with such a spectrum, relative to any other.
-const AIM_SPECTRA: f64 = 3.0;
 
 /// Random part of the spectrum.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -218,33 +215,32 @@ impl MethodParameters for FftMaParameters {
     }
 
     fn cost(&self, tile: &Tile) -> Cost {
-        let [rows, cols] = self.torus_of_any(tile);
         // As for a measured covariance or a residual, which costs most.
-        cost(rows * cols, tile.geometry.len(), 1)
+        cost(self.rounded(self.enough(tile, [0.0; 2])), tile.geometry.len(), Some([1, 1]))
     }
 
     fn cost_of(&self, tile: &Tile, prospect: &Prospect) -> Cost {
-        let (least, [rows, cols]) = (self.cost(tile), self.torus_of_any(tile));
-        let cell_m = tile.geometry.cell;
-        let aims = prospect.is_measured || self.covariance == CovarianceOf::Residual;
-        let memory_bytes = if aims {
-            let finest = prospect.cell_m.map_or([1, 1], |fitted_m| aim::finest(cell_m, fitted_m));
-            let oversampling = (finest[0] as u64).saturating_mul(finest[1] as u64);
-            // More cells would be refused.
-            let most = (CELLS_MAX / (rows * cols).max(1) as u64).max(1);
-            cost(rows * cols, tile.geometry.len(), oversampling.min(most)).memory_bytes
-        } else if self.periodic {
-            least.memory_bytes
-        } else {
-            let side = |n: usize, cell_m: f64| (prospect.torus_m / cell_m).ceil().max(n as f64);
+        let cells = tile.geometry.len();
+        let within = |sides: [f64; 2], oversampling: f64| oversampling * sides[0] * sides[1] <= CELLS_MAX as f64;
+        if let Some(lattice) = Lattice::planned(prospect, self.purpose(), tile.geometry.cell) {
+            let sides = self.enough(tile, lattice.torus_m(tile.geometry.cell));
+            return match within(sides, lattice.oversampling()) {
+                true => cost(self.rounded(sides), cells, Some(lattice.times)),
+                // Refused when it is bound to its fit.
+                false => self.cost(tile),
+            };
+        }
+        let (least, sides) = (self.enough(tile, [0.0; 2]), self.enough(tile, [prospect.torus_m; 2]));
+        let memory_bytes = match within(sides, 1.0) {
+            true => cost(self.rounded(sides), cells, None).memory_bytes,
             // A larger torus would be refused.
-            let cells = (side(rows, cell_m[1]) * side(cols, cell_m[0])).min(CELLS_MAX as f64);
-            cost(cells as usize, tile.geometry.len(), 0).memory_bytes
+            false => BYTES_PER_CELL * CELLS_MAX + 8 * cells as u64,
         };
-        // Time is estimated for the usual, shorter range. The spectrum of a residual or of a measured covariance is filtered, and computed
-        // once more for the notes.
-        let operations = if aims { AIM_SPECTRA * least.operations } else { least.operations };
-        Cost { memory_bytes: memory_bytes.max(least.memory_bytes), operations }
+        Cost {
+            memory_bytes: memory_bytes.max(self.cost(tile).memory_bytes),
+            // Time is estimated for the usual, shorter range.
+            operations: cost(self.rounded(least), cells, None).operations,
+        }
     }
 
     fn check_measured(&self, tile: &Tile, measured_m: [f64; 2]) -> Result<(), ParameterError> {
@@ -329,13 +325,40 @@ fn not_of_a_surface() -> ParameterError {
     ParameterError::new("spectrum", "is `eq10`, which supports only the exponential covariance of a surface")
 }
 
-/// Cost of a tile from a torus; `oversampling` is that of the spectrum of a residual or of a measured covariance, 0 for others.
-fn cost(torus: usize, tile: usize, oversampling: u64) -> Cost {
+/// Cost of a tile from a torus of `[rows, cols]`; with `times`, for the spectrum of a residual or of a measured covariance on cells so much finer,
+/// north-south and east-west.
+fn cost([rows, cols]: [usize; 2], tile: usize, times: Option<[usize; 2]>) -> Cost {
     /// Operations for covariance, root and phase of one cell.
     const PER_CELL: f64 = 60.0;
-    let memory_bytes = (BYTES_PER_CELL + AIM_BYTES_PER_CELL * oversampling) * torus as u64 + 8 * tile as u64;
-    let cells = torus as f64;
-    Cost { memory_bytes, operations: cells * (3.75 * libm::log2(cells) + PER_CELL) }
+    /// Operations for rings, responses and folding of one fine cell.
+    const PER_FINE_CELL: f64 = 80.0;
+    let torus = rows * cols;
+    let (fine, spectrum) = match times {
+        None => (0, 0.0),
+        Some([down, across]) => {
+            let shape = [down * rows, across * cols];
+            let fine = shape[0] * shape[1];
+            // The measured covariance is transformed, and usually that of the model.
+            (fine, fine as f64 * (5.0 * octaves(shape) + PER_FINE_CELL))
+        }
+    };
+    Cost {
+        memory_bytes: BYTES_PER_CELL * torus as u64 + AIM_BYTES_PER_CELL * fine as u64 + 8 * tile as u64,
+        operations: torus as f64 * (3.75 * octaves([rows, cols]) + PER_CELL) + spectrum,
+    }
+}
+
+/// Base-2 logarithm of the number of cells, to which the operations of a transform of one cell are proportional, and more for sides that are no product of 2, 3
+/// and 5: their transform takes two of a length at least twice as long (Bluestein).
+fn octaves([rows, cols]: [usize; 2]) -> f64 {
+    let more = |n: usize| {
+        if is_smooth(n) {
+            return 0.0;
+        }
+        let padded = smooth_length(2 * n - 1) as f64;
+        2.0 * padded / n as f64 * libm::log2(padded) - libm::log2(n as f64)
+    };
+    libm::log2((rows * cols) as f64) + (more(rows) + more(cols))
 }
 
 impl FftMa {
@@ -456,9 +479,7 @@ pub(super) fn size_notes(covariance: &Covariance, tile: &Geometry, periodic: boo
 
 impl Kernel for FftMa {
     fn cost(&self) -> Cost {
-        let oversampling = self.aimed.as_ref().map_or(0, |aimed| aimed.lattice.oversampling() as u64);
-        let [rows, cols] = self.expected_torus();
-        cost(rows * cols, self.tile.len(), oversampling)
+        cost(self.expected_torus(), self.tile.len(), self.aimed.as_ref().map(|aimed| aimed.lattice.times))
     }
 
     fn notes(&self) -> Vec<String> {

@@ -416,7 +416,7 @@ fn val_an_oblique_covariance_gets_a_larger_torus() {
     };
     let cropped = texture(&raw(12.0, false), &fitted);
     assert_eq!((cropped.kernel.torus, cropped.kernel.expected_torus()), ([960; 2], [1440; 2]));
-    assert_eq!(cropped.cost(), cost(1440 * 1440, 240 * 240, 0));
+    assert_eq!(cropped.cost(), cost([1440; 2], 240 * 240, None));
     let made = cropped.generate(&streams(1)).unwrap();
     assert_eq!((made.grid.rows(), made.grid.cols(), made.clip_share), (240, 240, 0.0));
     // No more than 16 times the cells of the first torus, and no more than a texture may have.
@@ -588,6 +588,59 @@ fn val_empirical_refusals() {
         map.covariance_m2.pop();
     }
     assert!(refused("fft_ma", size.clone(), &broken).contains("map.covariance_m2"));
+}
+
+/// What a plan states about a texture of a measured covariance, or of what a background lacks, is what is stated once it is bound to its fit: the same
+/// torus, on the same cells. By hand, a crop of 10 x 12 cells needs a torus of 100 x 100 cells for lags of up to 49 cells (1.5 windows of 33 cells).
+#[test]
+fn val_a_plan_has_the_torus_of_the_synthesis() {
+    let measured = &SITE.1.fit;
+    let modelled = FitFile { model: "exponential".to_owned(), map: None, ..measured.clone() };
+    let prospect = |model: &str, fit: &FitFile| {
+        let parameters =
+            crate::FitParameters { model: model.to_owned(), bootstrap: 0, ..crate::FitParameters::default() };
+        crate::FitSettings::try_from(parameters).unwrap().prospect(fit.cell_m, 160_000)
+    };
+    let [of_measured, of_modelled] = [prospect("empirical", measured), prospect("exponential", &modelled)];
+    assert_eq!((Some(of_measured.window_m), Some(of_modelled.window_m)), (measured.window_m, measured.window_m));
+    assert_eq!(Some(of_measured.max_lag), measured.map.as_ref().map(|map| map.max_lag));
+    let crop = json!({ "size_px": [10, 12], "cell_m": 0.06, "periodic": false });
+    let planned = crate::method("fft_ma", &crop).unwrap().cost_of(&of_measured);
+    assert_eq!(planned.memory_bytes, (18 + 40) * 100 * 100 + 8 * 120);
+    let tiles = [
+        (json!([300, 240]), json!(0.06), true),
+        (json!([97, 113]), json!([0.12, 0.06]), true),
+        (json!([10, 12]), json!(0.06), false),
+        (json!([150, 40]), json!([0.06, 0.18]), false),
+        (json!([83, 61]), json!(0.12), false),
+    ];
+    // A model is computed on cells of any size.
+    let others = [(json!([30, 20]), json!([0.1, 0.07]), false), (json!([31, 20]), json!(0.5), true)];
+    for (covariance, size_px, cell_m, periodic) in
+        ["surface", "residual"].iter().flat_map(|covariance| tiles.iter().map(move |(s, c, p)| (covariance, s, c, p)))
+    {
+        let raw = json!({ "size_px": size_px, "cell_m": cell_m, "periodic": periodic, "covariance": covariance });
+        let planned = crate::method("fft_ma", &raw).unwrap().cost_of(&of_measured);
+        assert_eq!(planned, crate::prepare("fft_ma", &raw, measured).unwrap().cost(), "{raw}");
+    }
+    for (size_px, cell_m, periodic) in tiles.iter().chain(&others) {
+        let raw = json!({ "size_px": size_px, "cell_m": cell_m, "periodic": periodic, "covariance": "residual" });
+        let planned = crate::method("fft_ma", &raw).unwrap().cost_of(&of_modelled);
+        assert_eq!(planned, crate::prepare("fft_ma", &raw, &modelled).unwrap().cost(), "{raw}");
+    }
+}
+
+/// By hand: 1126 is twice a prime, so that a transform along it takes two of 2304 (2^8 3^2) points.
+#[test]
+fn val_sides_that_transform_slowly_cost_more() {
+    assert_eq!(octaves([64, 32]), 11.0);
+    let along = 2.0 * 2304.0 / 1126.0 * libm::log2(2304.0);
+    assert!((octaves([1126, 1126]) - 2.0 * along).abs() < 1e-9, "{}", octaves([1126, 1126]));
+    assert!((octaves([1126, 64]) - along - 6.0).abs() < 1e-9, "{}", octaves([1126, 64]));
+    let operations = |side: usize, times: Option<[usize; 2]>| cost([side; 2], side * side, times).operations;
+    assert!(operations(1126, None) > 2.5 * operations(1125, None));
+    // Four fine cells for each, whose covariance and model are transformed.
+    assert!(operations(1125, Some([2, 2])) > 4.0 * operations(1125, None));
 }
 
 /// A spectrum is computed once: a texture has the bits of any other with the same parameters, however often it was asked for notes and covariances.
