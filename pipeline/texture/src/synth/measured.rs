@@ -126,6 +126,18 @@ pub(super) fn correlation_bytes(cells: u64) -> u64 {
     8 * cells + 150 * cells.min(1 << 20)
 }
 
+/// Operations of [`Measured::correlation_cells`], and of any covariance at lags of up to a quarter of the sides and [`LAG_MAX`]: transforms of heights and mask
+/// on tiles that are padded to 2.25 times their cells. Overlaps of several tiles add 1.75 times the cells.
+pub(super) fn correlation_operations(cells: u64) -> f64 {
+    /// Most cells of a tile.
+    const TILE: u64 = 1 << 20;
+    /// Operations for padding and power of one padded cell.
+    const PER_CELL: f64 = 10.0;
+    let padding = if cells > TILE { 4.0 } else { 2.25 };
+    let octaves = libm::log2(2.25 * cells.clamp(1, TILE) as f64);
+    padding * cells as f64 * 2.0 * (2.5 * octaves + PER_CELL)
+}
+
 /// Refuses a residual that is not the fit's, by quantiles of its heights; a fit may state none.
 fn check_quantiles(found_m: &[f64], fitted_m: &[f64]) -> Result<(), ParameterError> {
     let squares: Vec<f64> = fitted_m.iter().map(|q| q * q).collect();

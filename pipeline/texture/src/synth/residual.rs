@@ -16,7 +16,7 @@
 //! Size, cells, repetition and seams are those of [`Tile`].
 
 use super::fft_ma::CovarianceOf;
-use super::measured::Measured;
+use super::measured::{self, Measured};
 use super::raised::Raised;
 use super::statistics::lags;
 use super::tile::{self, OF_COVARIANCE, Tile};
@@ -66,6 +66,12 @@ pub trait Source: Send + Sync + Sized + 'static {
     /// Cells of the site, east-west and north-south, m.
     fn cell_m(&self) -> [f64; 2];
 
+    /// Number of cells of the site.
+    fn cells(&self) -> u64;
+
+    /// Operations of [`Self::covariances_m2`] for a site of `cells` cells.
+    fn covariances_operations(cells: u64) -> f64;
+
     /// Covariance of the residual at lags of 0, 1, 2 ... cells along rows, m2: `most` lags beyond 0, or as many as are known.
     fn along_rows_m2(&self, most: usize) -> Vec<f64>;
 
@@ -87,6 +93,15 @@ impl Source for Statistics {
 
     fn cell_m(&self) -> [f64; 2] {
         self.cell_m
+    }
+
+    fn cells(&self) -> u64 {
+        self.cells
+    }
+
+    /// None: they are stored.
+    fn covariances_operations(_: u64) -> f64 {
+        0.0
     }
 
     fn along_rows_m2(&self, most: usize) -> Vec<f64> {
@@ -117,6 +132,14 @@ impl Source for Measured {
 
     fn cell_m(&self) -> [f64; 2] {
         self.residual.geometry.cell
+    }
+
+    fn cells(&self) -> u64 {
+        self.residual.geometry.len() as u64
+    }
+
+    fn covariances_operations(cells: u64) -> f64 {
+        measured::correlation_operations(cells)
     }
 
     fn along_rows_m2(&self, most: usize) -> Vec<f64> {
@@ -257,8 +280,9 @@ impl<P: ResidualParameters> Checked<P> {
         // What is refused for its size is refused when the fit is known.
         let made = self.raised(prospect.map(|fit| fit.window_m)).unwrap_or_default();
         let tile = made.as_ref().map_or(&self.tile, |(_, widened)| widened);
-        let cost = self.own.cost_of(tile, &Site::of(tile, prospect));
-        self.tile.repeated_cost(if made.is_some() { Raised::cost(cost, tile) } else { cost })
+        let site = Site::of(tile, prospect);
+        let cost = self.own.cost_of(tile, &site);
+        self.tile.repeated_cost(if made.is_some() { raised_cost::<P::Source>(cost, tile, site.cells) } else { cost })
     }
 
     /// The filter of a texture for a background over a window, and the tile that is synthesised for it; `None` for the residual as measured.
@@ -338,6 +362,12 @@ impl<P: ResidualParameters> Method for Checked<P> {
     }
 }
 
+/// Cost of a texture for the background of a fit, whose widened tile costs `made`, from a site of `cells` cells.
+fn raised_cost<S: Source>(made: Cost, widened: &Tile, cells: u64) -> Cost {
+    let Cost { memory_bytes, operations } = Raised::cost(made, widened);
+    Cost { memory_bytes, operations: operations + S::covariances_operations(cells) }
+}
+
 /// A note on a texture for the background of a fit; `copied` if it is made of copied cells.
 fn raised_note(window_m: f64, copied: bool) -> String {
     let heights = if copied {
@@ -401,7 +431,7 @@ impl<S: Source, K: ResidualKernel> Synthesis for Repeated<S, K> {
         let cost = self.kernel.cost();
         self.tile.repeated_cost(match &self.raised {
             None => cost,
-            Some(raised) => Raised::cost(cost, &raised.widened),
+            Some(raised) => raised_cost::<S>(cost, &raised.widened, self.source.cells()),
         })
     }
 
@@ -636,5 +666,41 @@ mod tests {
             let memory = |cells: u64| of(name, 0.1).cost_of(&prospect(true, cells)).memory_bytes;
             assert_eq!(memory(10_000_000) > memory(10_000), copies, "{name}");
         }
+    }
+
+    /// A method that copies cells takes the covariances of the site to make a texture for a background: a plan counts them, and states what the texture does
+    /// once it is bound to its site.
+    #[test]
+    fn val_covariances_of_the_site_are_planned() {
+        let z = site();
+        let fit = fitted(&z, false);
+        let measured = Arc::new(Measured::of_fit(&z, &fit).unwrap());
+        let parameters = FitParameters { outer_scale_m: 2.0, bootstrap: 0, ..FitParameters::default() };
+        let settings = FitSettings::try_from(parameters).unwrap();
+        let planned = |name: &str, covariance: &str, periodic: bool, cells: u64| {
+            let raw = json!({ "size_px": [64, 60], "cell_m": 0.1, "covariance": covariance, "periodic": periodic });
+            let cost = method(name, &raw).unwrap().cost_of(&settings.prospect(Some([0.1; 2]), cells));
+            (cost, raw)
+        };
+        for name in ["quilting", "exemplar"] {
+            for (covariance, periodic) in [("surface", true), ("residual", true), ("residual", false)] {
+                let (cost, raw) = planned(name, covariance, periodic, 140 * 140);
+                let bound = prepare_from(name, &raw, &fit, Some(&measured)).unwrap();
+                assert_eq!(cost, bound.cost(), "{name}, {raw}");
+            }
+            // A larger site has more of it.
+            let more = |covariance: &str| {
+                let [small, large] =
+                    [10_000, 90_000_000].map(|cells| planned(name, covariance, true, cells).0.operations);
+                large - small
+            };
+            let expected = measured::correlation_operations(90_000_000) - measured::correlation_operations(10_000);
+            let found = more("residual") - more("surface");
+            assert!((found / expected - 1.0).abs() < 1e-9, "{name}: {found} {expected}");
+        }
+        // By hand, of a million cells: 2.25 million padded ones, twice, with 2.5 operations for each of 21.2 octaves, and 10.
+        let found = measured::correlation_operations(1 << 20);
+        let expected = 2.0 * 2.25 * f64::from(1 << 20) * (2.5 * (20.0 + libm::log2(2.25)) + 10.0);
+        assert!((found / expected - 1.0).abs() < 1e-12, "{found}");
     }
 }
