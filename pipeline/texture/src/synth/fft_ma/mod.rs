@@ -37,7 +37,7 @@
 //! The spectrum of what a background lacks, or of a measured covariance, is `lambda` itself, computed once for each texture on cells no larger than the fit's.
 //! `periodic = true`: the tile is the torus. `periodic = false`: the torus is at least twice as wide as the tile, and as two windows of the
 //! background or twice the measured lags, whatever the range of the model. What a background lacks is not confined to the window: a spectrum that falls as
-//! `k^-(2 + 2 nu)`, times `1 - D^2 ~ k^2`, leaves a correlation that falls as `h^-(2 - 2 nu)` up to the range b, and as the model beyond. Of an exponential with b of 20
+//! `k^-(2 + 2 nu)`, times `1 - D^2 ~ k^2`, leaves a correlation that falls as `h^-(2 - 2 nu)` (nu < 1) up to the range b, and as the model beyond. Of an exponential with b of 20
 //! windows 9.5 % of the variance are left at 1.5 windows, 2.7 % at 4 and 0.8 % at 8, with b of 0.56 windows 1.9, 0.03 and 0.00003 %. A torus of a crop and 1.5
 //! windows, the reach of a measured covariance, would give the longest lags of the crop errors of 2 to 7 % of the variance
 //! (`val_what_a_background_lacks_reaches_beyond_the_window`).
@@ -45,7 +45,7 @@
 //! Cost: a quarter of a complex transform for the spectrum (half of one if the axes of anisotropy are not the grid's),
 //! half of one for the field, a square root and a phase per mode. For what a background lacks or a measured covariance: half a transform of the finer cells for
 //! each of measured covariance and model. If the model reaches across the torus, 81 aliases for each mode that takes it instead of its transform: all modes if the
-//! covariance is a model's, long waves if it was measured. Sides that are no product of 2, 3 and 5 take some five times as long.
+//! covariance is a model's, long waves if it was measured. Transforms along sides that are no product of 2, 3 and 5 take some five times as long.
 //!
 //! Peak memory per torus cell: 10 bytes, 2 for a quarter of the spectrum and 8 for the field, which is transformed in place; 16 if the axes
 //! of anisotropy are not the grid's, while both the covariance (8) and its half transform (8) are held. Including thread buffers, 175 MB
