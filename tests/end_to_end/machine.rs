@@ -193,6 +193,39 @@ fn val_pipes_devices_and_links_are_not_replaced() {
     assert_eq!(fs::read(path.join("kept.tif")).unwrap(), b"kept");
 }
 
+/// A link to a folder, such as one on a large disk, is followed: the release is in that folder, and the link stays.
+#[cfg(unix)]
+#[test]
+fn val_a_release_goes_where_a_link_leads() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    assert_eq!(run(path, &[]).code, 0);
+    fs::create_dir_all(path.join("scratch/x")).unwrap();
+    std::os::unix::fs::symlink("scratch/x", path.join("results")).unwrap();
+    for output in ["results", "results/", "results"] {
+        let call = sastrugi_in(path, &["run", "study.toml", "-o", output, "--work", "release.work", "--quiet"]);
+        assert_eq!(call.code, 0, "{output}: {}", call.stderr);
+        assert_eq!(fs::read_link(path.join("results")).unwrap(), Path::new("scratch/x"));
+        assert_eq!(sums(&path.join("scratch/x")), sums(&path.join("release")));
+        assert_eq!(sastrugi_in(path, &["verify", output, "--quiet"]).code, 0);
+    }
+    fs::create_dir(path.join("scratch/page")).unwrap();
+    std::os::unix::fs::symlink("scratch/page", path.join("page")).unwrap();
+    for _ in 0..2 {
+        let call = sastrugi_in(path, &["report", "results", "-o", "page", "--quiet"]);
+        assert_eq!(call.code, 0, "{}", call.stderr);
+        assert!(path.join("page").is_symlink() && path.join("scratch/page/index.html").is_file());
+    }
+    let expected = ["d.asc", "page", "release", "release.work", "results", "scratch", "study.toml"];
+    assert_eq!(names(path), expected);
+    assert_eq!(names(&path.join("scratch")), ["page", "x"]);
+    // Nothing is there to be followed.
+    std::os::unix::fs::symlink("scratch/y", path.join("later")).unwrap();
+    let call = sastrugi_in(path, &["run", "study.toml", "-o", "later", "--work", "release.work", "--quiet"]);
+    assert!(call.code == 2 && call.stderr.contains("later: is a symbolic link"), "{} {}", call.code, call.stderr);
+}
+
 /// A folder in place of a DEM is called a folder, on the command line and in a study.
 #[test]
 fn val_folders_are_refused_as_input() {

@@ -360,11 +360,19 @@ fn check_dest(dest: &Path) -> Result<(), ReleaseError> {
     }
 }
 
-/// `.sastrugi-<role>-<name of dest>` in the same folder: a name that no user's folder should have.
+/// `.sastrugi-<role>-<name of dest>` in the same folder, for a link to a folder beside that folder: a name that no user's folder should have.
 pub fn beside(dest: &Path, role: &str) -> PathBuf {
+    let dest = behind_link(dest);
     let mut name = OsString::from(format!(".sastrugi-{role}-"));
     name.push(dest.file_name().unwrap_or_else(|| "release".as_ref()));
     dest.with_file_name(name)
+}
+
+/// The destination itself, or the folder that it links to: the link stays, and that folder is replaced.
+fn behind_link(dest: &Path) -> PathBuf {
+    // Without a final `/`, behind which the system sees the folder, not the link.
+    let dest: PathBuf = dest.components().collect();
+    if dest.is_symlink() { dest.canonicalize().unwrap_or(dest) } else { dest }
 }
 
 fn remove_folder(folder: &Path) -> Result<(), ReleaseError> {
@@ -411,11 +419,13 @@ impl Staging {
         &self.0
     }
 
-    /// Renames the finished folder to its final name, replacing a previous one, which stays until then.
+    /// Renames the finished folder to its final name, replacing a previous one, which stays until then. Of a link to a folder, that folder is
+    /// replaced.
     ///
     /// # Errors
     /// The file system failed.
     pub fn put_in_place(&self, dest: &Path) -> Result<(), ReleaseError> {
+        let dest = &behind_link(dest);
         let aside = beside(dest, "replaced");
         remove_folder(&aside)?;
         if dest.exists() {

@@ -273,6 +273,27 @@ fn val_other_folders_are_left_untouched() {
     assert!(refused(&file).ends_with("it is a file, not a folder"));
 }
 
+/// A release is written into the folder that a link leads to, also where it replaces another; the link stays, and nothing is left beside it or
+/// beside the folder.
+#[cfg(unix)]
+#[test]
+fn val_a_link_to_a_folder_stays_and_is_followed() {
+    let [home, scratch] = [(), ()].map(|()| tempfile::tempdir().unwrap());
+    let (link, dest) = (home.path().join("release"), scratch.path().join("x"));
+    fs::create_dir(&dest).unwrap();
+    std::os::unix::fs::symlink(&dest, &link).unwrap();
+    for named in [link.clone(), link.join(""), link.clone()] {
+        sealed(&named);
+        assert!(link.is_symlink() && !dest.is_symlink());
+        assert_eq!(verify(&dest).unwrap().problems, vec![]);
+        for folder in [&home, &scratch] {
+            assert_eq!(fs::read_dir(folder.path()).unwrap().count(), 1, "{}", named.display());
+        }
+        let mut readme = OpenOptions::new().append(true).open(dest.join("README.md")).unwrap();
+        readme.write_all(b"changed").unwrap();
+    }
+}
+
 #[test]
 fn val_a_changed_table_description_is_found() {
     let folder = tempfile::tempdir().unwrap();
