@@ -193,6 +193,45 @@ fn val_pipes_devices_and_links_are_not_replaced() {
     assert_eq!(fs::read(path.join("kept.tif")).unwrap(), b"kept");
 }
 
+/// The files beside an output are outputs too, as are links to folders: refused before anything is read, made or written.
+#[cfg(unix)]
+#[test]
+fn val_links_beside_an_output_are_not_replaced() {
+    let folder = area();
+    let path = folder.path();
+    study(path);
+    write(path, "e.asc", DEM);
+    write(path, "images.toml", "images = [\"a.json\"]\n");
+    fs::create_dir(path.join("fits")).unwrap();
+    for (link, call) in [
+        ("new.tif", "terrain gap -o new.tif"),
+        ("new.flux.tif", "terrain cascade -o new.tif"),
+        ("new.json", "render d.asc -o new.tif"),
+        ("new.lit.tif", "photoclinometry images.toml -o new.tif"),
+        ("maps.sigma.tif", "fit d.asc -o fit.json --local maps"),
+        ("plot.svg", "fit d.asc -o fit.json --plot plot.svg"),
+        ("fits/e.json", "fit d.asc e.asc -o fits --table fits.csv"),
+        ("way.svg", "navigate d.asc --start 0,0 --goal 1,1 -o way.svg"),
+    ] {
+        for target in ["d.asc", "fits", "nothing"] {
+            let target = path.join(target);
+            std::os::unix::fs::symlink(&target, path.join(link)).unwrap();
+            let before = names(path);
+            let called = sastrugi_in(path, &call.split(' ').collect::<Vec<_>>());
+            let words = format!("{link}: is a symbolic link, which the output would replace");
+            assert!(called.code == 2 && called.stderr.contains(&words), "{call}: {} {}", called.code, called.stderr);
+            assert!(fs::read_link(path.join(link)).unwrap() == target && names(path) == before, "{call}");
+            fs::remove_file(path.join(link)).unwrap();
+        }
+    }
+    for call in ["terrain gap -o folder.tif", "convert d.asc folder.tif"] {
+        fs::create_dir_all(path.join("folder.tif")).unwrap();
+        let called = sastrugi_in(path, &call.split(' ').collect::<Vec<_>>());
+        let is_told = called.stderr.contains("folder.tif is a folder; name a file");
+        assert!(called.code == 2 && is_told, "{call}: {} {}", called.code, called.stderr);
+    }
+}
+
 /// A link to a folder, such as one on a large disk, is followed: the release is in that folder, and the link stays.
 #[cfg(unix)]
 #[test]

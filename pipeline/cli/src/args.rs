@@ -296,6 +296,18 @@ impl Verb {
         let more = more.into_iter().flatten().map(PathBuf::as_path);
         self.output_file().into_iter().chain(study).chain(more).collect()
     }
+
+    /// True for an output that is a folder, or with which the names of files begin.
+    pub fn is_folder(&self, output: &Path) -> bool {
+        match self {
+            Self::Fit(args) => {
+                let of_several = if args.dems.len() > 1 { args.output.as_deref() } else { None };
+                [of_several, args.shown.local.as_deref()].contains(&Some(output))
+            }
+            Self::Convert(args) => args.target.is_some(),
+            _ => false,
+        }
+    }
 }
 
 /// Release folder and work area.

@@ -8,7 +8,7 @@ use pyo3::types::PyType;
 use sastrugi_numeric::{Geometry, Grid};
 use sastrugi_stages::Error;
 use sastrugi_stages::arrays::Raster;
-use sastrugi_stages::remote::check_local;
+use sastrugi_stages::remote::check_file;
 use sastrugi_stages::verbs::{self, Read, Reading};
 use sastrugi_store::dem::{self, Compression, DemError, Format, GeoKey, WriteOptions};
 use std::path::PathBuf;
@@ -137,7 +137,7 @@ pub fn write(
     compress: &str,
     cog: bool,
 ) -> PyResult<Vec<String>> {
-    check_local(&path).map_err(refused)?;
+    check_file(&path).map_err(refused)?;
     let compression = match compress {
         "none" => Compression::None,
         "deflate" => Compression::Deflate,

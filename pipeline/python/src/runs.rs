@@ -8,7 +8,7 @@ use sastrugi_schemas::Record;
 use sastrugi_schemas::kind::read_parameters;
 use sastrugi_stages::Error;
 use sastrugi_stages::loaded::load;
-use sastrugi_stages::remote::check_local;
+use sastrugi_stages::remote::check_file;
 use sastrugi_stages::runner::execute::Limits;
 use sastrugi_stages::studies::{self, RunRequest, RunSummary};
 use sastrugi_stages::verbs::navigate::{self as navigation, is_route_file};
@@ -209,7 +209,7 @@ fn analyzed(paths: &[PathBuf], dem: Option<&Path>, settings: &Value, output: Opt
         offset_m: read(settings, "offset_m", [0.0; 3])?,
         group: read(settings, "group", None)?,
     };
-    output.map_or(Ok(()), check_local)?;
+    output.map_or(Ok(()), check_file)?;
     let ground = request.prepare()?;
     let judged = paths.iter().map(|path| request.judge(path, ground.as_ref())).collect::<Result<Vec<_>, _>>()?;
     if let Some(output) = output {

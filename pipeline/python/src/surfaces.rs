@@ -9,7 +9,7 @@ use sastrugi_schemas::fit::{FitFile, Quoted, SILL_OVER_RANGE};
 use sastrugi_stages::Error;
 use sastrugi_stages::arrays::{self, Generated, Raster, Registered, Textured};
 use sastrugi_stages::operations::fits::{of_json, to_json};
-use sastrugi_stages::remote::check_local;
+use sastrugi_stages::remote::check_file;
 use sastrugi_stages::verbs::fit::{Done, Request, fit as fit_dem};
 use sastrugi_stages::verbs::roughness::{Bumps, Detrender, RideRequest};
 use sastrugi_stages::verbs::{Reading, texture as verb};
@@ -98,7 +98,7 @@ pub fn load_fit(path: PathBuf) -> PyResult<String> {
 /// Writes a fit file: complete, or not at all.
 #[pyfunction]
 pub fn save_fit(path: PathBuf, fit: &str) -> PyResult<()> {
-    check_local(&path).map_err(refused)?;
+    check_file(&path).map_err(refused)?;
     atomic::write(&path, fit.as_bytes()).map_err(|e| refused(Error::at(&path, e)))
 }
 

@@ -1,7 +1,7 @@
 //! Packs a release into one archive with reproducible bytes.
 
 use crate::error::Error;
-use crate::remote::check_local;
+use crate::remote::check_file;
 use crate::runner::progress::Progress;
 use crate::studies::{check_outside, head_of};
 use crate::verification::{Difference, checked, differences};
@@ -53,12 +53,9 @@ pub fn pack(folder: &Path, output: &Path, progress: &dyn Progress) -> Result<Pac
 }
 
 fn check_output(folder: &Path, output: &Path) -> Result<(), Error> {
-    check_local(output)?;
+    check_file(output)?;
     let refusal = "the archive cannot be written into the release, which is sealed; choose a file outside it with -o";
     check_outside(folder, output, refusal)?;
-    if output.is_dir() {
-        return Err(Error::Usage(format!("{} is a folder; -o must be a file", output.display())));
-    }
     if output.exists() && output.extension().is_none_or(|ending| ending != "tar") {
         let advice = "already exists and is not a .tar; choose another file with -o";
         return Err(Error::Usage(format!("{} {advice}", output.display())));

@@ -40,11 +40,34 @@ pub fn check_place(place: &Path) -> Result<(), Error> {
     }
 }
 
-/// Refuses an output that is not a path on this machine, or that is a link, a pipe or a device.
+/// Refuses an output that is not a path on this machine, or that is a pipe, a device or a link to something other than a folder. A link to a
+/// folder is followed, so that it suits only outputs that are folders; see [`check_file`].
 ///
 /// # Errors
 /// An address, an empty path, or the name of something other than a file or a folder.
 pub fn check_local(output: &Path) -> Result<(), Error> {
+    check_path(output)?;
+    if output.is_dir() { Ok(()) } else { check_replaced(output) }
+}
+
+/// Refuses an output file that is not a path on this machine, or whose name belongs to a folder, a link, a pipe or a device.
+///
+/// # Errors
+/// An address, an empty path, or the name of something other than a file.
+pub fn check_file(output: &Path) -> Result<(), Error> {
+    check_path(output)?;
+    check_replaced(output)?;
+    match output.is_dir() {
+        true => Err(Error::Usage(format!("{} is a folder; name a file", output.display()))),
+        false => Ok(()),
+    }
+}
+
+fn check_replaced(output: &Path) -> Result<(), Error> {
+    sastrugi_store::atomic::check_replaced(output).map_err(|e| Error::Usage(format!("{}: {e}", output.display())))
+}
+
+fn check_path(output: &Path) -> Result<(), Error> {
     if output.as_os_str().is_empty() {
         return Err(Error::Usage("the path is empty; name a file or folder".to_owned()));
     }
@@ -52,10 +75,7 @@ pub fn check_local(output: &Path) -> Result<(), Error> {
         let advice = "this output must be a path on this machine (only the program's `run` and `merge` write to an object store, s3://bucket/prefix)";
         return Err(Error::Usage(format!("{}: {advice}", output.display())));
     }
-    if output.is_dir() {
-        return Ok(());
-    }
-    sastrugi_store::atomic::check_replaced(output).map_err(|e| Error::Usage(format!("{}: {e}", output.display())))
+    Ok(())
 }
 
 /// Makes a release: in its folder, or in the work area and then in an object store. `make` gets the folder, the work area, and whether to

@@ -112,3 +112,22 @@ fn val_all_outputs_of_verbs() {
     assert_eq!(outputs("sastrugi roughness a.tif --classes c --band 1:2 --rms-map r"), "c r");
     assert_eq!(outputs("sastrugi run study.toml -o s3://b/c"), "");
 }
+
+/// Folders are allowed where a verb makes one, and where names of files only begin with the output.
+#[test]
+fn val_outputs_that_may_be_folders() {
+    let folders = |call: &str| {
+        let arguments = Arguments::try_parse_from(words(call)).unwrap_or_else(|e| panic!("{call}: {e}"));
+        let verb = &arguments.verb;
+        let names =
+            verb.outputs().into_iter().filter(|path| verb.is_folder(path)).map(|path| path.display().to_string());
+        names.collect::<Vec<_>>().join(" ")
+    };
+    assert_eq!(folders("sastrugi fit a.tif -o o --table t --local l"), "l");
+    assert_eq!(folders("sastrugi fit a.tif b.tif -o o --table t"), "o");
+    assert_eq!(folders("sastrugi convert a.tif o --for gazebo"), "o");
+    assert_eq!(folders("sastrugi convert a o --for lerobot"), "o");
+    for call in ["sastrugi convert a.tif o", "sastrugi terrain gap -o o", "sastrugi init -o o"] {
+        assert_eq!(folders(call), "", "{call}");
+    }
+}

@@ -23,7 +23,7 @@ use crate::Verdict;
 use crate::args::{self, Arguments, Compress, Verb, Writing};
 use crate::failure::Failure;
 use sastrugi_stages::Error;
-use sastrugi_stages::remote::check_local;
+use sastrugi_stages::remote::{check_file, check_local};
 use sastrugi_stages::verbs::{Reading, numbers};
 use sastrugi_store::atomic;
 use sastrugi_store::dem::points::GridSettings;
@@ -34,7 +34,10 @@ use std::path::Path;
 pub fn dispatch(arguments: &Arguments) -> Verdict {
     let common = &arguments.common;
     // Before any work, which a wrong output would waste.
-    arguments.verb.outputs().into_iter().try_for_each(check_local)?;
+    for output in arguments.verb.outputs() {
+        let check = if arguments.verb.is_folder(output) { check_local } else { check_file };
+        check(output)?;
+    }
     arguments.verb.output_file().into_iter().for_each(atomic::clear_leftovers);
     match &arguments.verb {
         Verb::Init(args) => init::init(args, common),

@@ -8,6 +8,7 @@ use crate::jobs::fit::STAGE;
 use crate::operations::coregistration::{self, coregistered};
 use crate::operations::dem::{input_error, metres_note};
 use crate::operations::fits::{check_noise_reference, covariance_rows, noise_reference, to_json, with_source};
+use crate::remote::check_file;
 use sastrugi_numeric::resample::in_metres;
 use sastrugi_numeric::{Geometry, Grid, Streams};
 use sastrugi_schemas::coregistration::Minus;
@@ -127,13 +128,14 @@ fn bins(fit: &FitFile) -> impl Iterator<Item = Vec<Cell>> {
     })
 }
 
-/// Refuses rasters of unknown format, and outputs that would replace another file of this fit.
+/// Refuses rasters of unknown format, and outputs that would replace another file of this fit, or something other than a file.
 fn check_outputs(request: &Request<'_>) -> Result<(), Error> {
     let rasters = [request.map, request.difference, request.background];
     rasters.into_iter().flatten().try_for_each(super::check_output)?;
     let local = request.local.as_ref().map(Local::files).unwrap_or_default();
     let beside = request.beside.iter().copied().chain(local.iter().map(PathBuf::as_path));
     let outputs: Vec<&Path> = request.output.into_iter().chain(rasters.into_iter().flatten()).chain(beside).collect();
+    outputs.iter().try_for_each(|path| check_file(path))?;
     let inputs: Vec<&Path> = inputs(request).collect();
     super::check_distinct(&outputs, &inputs)
 }

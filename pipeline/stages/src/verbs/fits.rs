@@ -5,6 +5,7 @@ use super::fit::{self, Done};
 use super::{Reading, check_distinct};
 use crate::error::Error;
 use crate::operations::fits::fit_row;
+use crate::remote::check_file;
 use sastrugi_schemas::fit::{FitFile, Source};
 use sastrugi_schemas::tables::{BesideFit, DemFitRow, FitRow};
 use sastrugi_store::parquet::{TableMetadata, write_table};
@@ -66,7 +67,7 @@ pub fn fits(
     Ok(rows)
 }
 
-/// The fit file of each DEM; refuses names that would replace another or an input.
+/// The fit file of each DEM; refuses names that would replace another, an input, or something other than a file.
 fn fit_files(request: &Request<'_>) -> Result<Vec<Option<PathBuf>>, Error> {
     let mut owners: BTreeMap<PathBuf, &Path> = BTreeMap::new();
     let single = request.dems.len() == 1;
@@ -91,6 +92,7 @@ fn fit_files(request: &Request<'_>) -> Result<Vec<Option<PathBuf>>, Error> {
         }
     }
     let outputs: Vec<&Path> = files.iter().flatten().map(PathBuf::as_path).chain(request.table).collect();
+    outputs.iter().try_for_each(|path| check_file(path))?;
     let dems: Vec<&Path> = request.dems.iter().map(PathBuf::as_path).collect();
     let masks = request.reading.masks.iter().map(|(path, _)| path.as_path());
     let others = masks.chain(request.minus).chain(request.reading.noise_reference.as_deref());

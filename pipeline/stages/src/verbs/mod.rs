@@ -26,15 +26,15 @@ pub use reading::{Read, Reading, read, read_as_it_is, transects};
 pub use sastrugi_mobility::metrics::log::LogSettings;
 
 use crate::error::Error;
-use crate::remote::check_local;
+use crate::remote::check_file;
 use sastrugi_numeric::Grid;
 use sastrugi_store::dem::{DemError, Format, WRITTEN_ENDINGS};
 use serde_json::{Value, json};
 use std::path::Path;
 
-/// Refuses an output of unknown format, or that is not on this machine, before any work is done.
+/// Refuses an output of unknown format, or that cannot be a file on this machine, before any work is done.
 fn check_output(path: &Path) -> Result<(), Error> {
-    check_local(path)?;
+    check_file(path)?;
     if Format::of_name(path).is_some() {
         return Ok(());
     }

@@ -9,7 +9,7 @@ use crate::operations::dem::to_metres;
 use crate::operations::masks;
 use crate::operations::place::Place;
 use crate::operations::routes::{Given, Outcome, Site};
-use crate::remote::check_local;
+use crate::remote::check_file;
 use crate::runner::progress::Progress;
 use crate::studies::{RunRequest, RunSummary, run_text};
 use sastrugi_mobility::registry;
@@ -60,7 +60,7 @@ pub fn route(request: &Request<'_>, output: &Path) -> Result<Value, Error> {
         let message = format!("{}: a team is written as a release; name a folder with `-o DIR`", output.display());
         return Err(Error::Usage(message));
     }
-    check_local(output)?;
+    check_file(output)?;
     let parameters: RouteParameters = read_parameters(&request.route)?;
     parameters.check()?;
     parameters.check_given(request.vehicle.is_some(), false)?;

@@ -6,6 +6,7 @@ use crate::jobs::photoclinometry::STAGE;
 use crate::operations::photoclinometry::{
     self, Beside, Described, MAPS, Made, Map, read_description, read_image, read_points, refusal,
 };
+use crate::remote::check_file;
 use sastrugi_imaging::ImageDescription;
 use sastrugi_imaging::photoclinometry::{Coarse, RecoverError, Settings};
 use sastrugi_numeric::{Streams, sums};
@@ -70,6 +71,7 @@ pub fn photoclinometry(request: &Request<'_>) -> Result<Value, Error> {
         .into_iter()
         .chain(MAPS.iter().map(|(ending, ..)| request.output.with_extension(ending)))
         .collect();
+    outputs.iter().try_for_each(|path| check_file(path))?;
     let folder = request.images.parent().unwrap_or(Path::new("."));
     let (images, mut inputs) = described(&file, folder)?;
     let others = [&file.coarse, &file.altimetry, &file.truth].into_iter().flatten();

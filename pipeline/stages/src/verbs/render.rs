@@ -4,6 +4,7 @@ use super::{Reading, parameters, read, terrain};
 use crate::error::Error;
 use crate::jobs::image::STAGE;
 use crate::operations::images::{self, Files, Ground, Made};
+use crate::remote::check_file;
 use sastrugi_imaging::{RenderError, RenderParameters};
 use sastrugi_numeric::Streams;
 use sastrugi_schemas::kind::read_parameters;
@@ -53,17 +54,20 @@ pub fn render(request: &Request<'_>) -> Result<Value, Error> {
     let parameters: RenderParameters = read_parameters(&request.parameters)?;
     parameters.check()?;
     let output = output_of(request.output)?;
-    let description = request.output.with_extension("json");
-    let (ground, seed, notes) = ground(request, [request.output, &description])?;
+    let description = (output == Output::Tiff).then(|| request.output.with_extension("json"));
+    let outputs: Vec<&Path> = [request.output].into_iter().chain(description.as_deref()).collect();
+    outputs.iter().try_for_each(|path| check_file(path))?;
+    let (ground, seed, notes) = ground(request, &outputs)?;
     let streams = Streams::for_seed(seed, STAGE);
     let file = request.output.file_name().unwrap_or_default().to_string_lossy().into_owned();
     let made = images::make(&ground, &parameters, &streams, &file).map_err(|e| refused(request.surface, e))?;
     let files = match output {
-        Output::Tiff => Files { tif: Some(request.output.into()), json: Some(description.as_path().into()), png: None },
+        Output::Tiff => {
+            Files { tif: Some(request.output.into()), json: description.as_deref().map(Into::into), png: None }
+        }
         Output::Png => Files { tif: None, json: None, png: Some(request.output.into()) },
     };
     made.write(files, &ground.crs, &request.options)?;
-    let description = (output == Output::Tiff).then_some(description);
     let mut said = described(request, &made, description.as_deref());
     said["seed"] = json!(seed);
     said["notes"] = json!(notes);
@@ -80,14 +84,14 @@ fn output_of(path: &Path) -> Result<Output, Error> {
 }
 
 /// The surface with its albedo, the seed, and notes on how it was read.
-fn ground(request: &Request<'_>, outputs: [&Path; 2]) -> Result<(Ground, u64, Vec<String>), Error> {
+fn ground(request: &Request<'_>, outputs: &[&Path]) -> Result<(Ground, u64, Vec<String>), Error> {
     let (mut ground, seed, notes) =
         if is_generator(request.surface) { generated(request)? } else { measured(request, outputs)? };
     if request.one_albedo {
         (ground.albedo, ground.albedo_name) = (None, None);
     }
     if let Some(path) = request.albedo {
-        super::check_distinct(&outputs, &[path])?;
+        super::check_distinct(outputs, &[path])?;
         ground.albedo = Some(read(path, &Reading::default())?.dem.grid);
         ground.albedo_name = Some(path.display().to_string());
     }
@@ -114,9 +118,9 @@ fn generated(request: &Request<'_>) -> Result<(Ground, u64, Vec<String>), Error>
     ))
 }
 
-fn measured(request: &Request<'_>, outputs: [&Path; 2]) -> Result<(Ground, u64, Vec<String>), Error> {
+fn measured(request: &Request<'_>, outputs: &[&Path]) -> Result<(Ground, u64, Vec<String>), Error> {
     let path = Path::new(request.surface);
-    super::check_distinct(&outputs, &[path])?;
+    super::check_distinct(outputs, &[path])?;
     if !request.set_surface.is_empty() {
         return Err(Error::Usage(format!("`--set-surface` applies to generators only; {} is a DEM", request.surface)));
     }

@@ -7,9 +7,10 @@ use crate::jobs::terrain::STAGE;
 use crate::memory;
 use crate::operations::inputs::{self, Loaded};
 use crate::operations::terrains::{generate, values_of, write_png16};
+use crate::remote::check_file;
 use sastrugi_numeric::Streams;
 use sastrugi_store::dem::{self, Crs, Format, WriteOptions};
-use sastrugi_terrain::{Generator, Holds, Input, Terrain};
+use sastrugi_terrain::{Generator, Holds, Input, MAPS, Terrain};
 use serde_json::{Map, Value, json};
 use std::collections::BTreeMap;
 use std::path::Path;
@@ -32,10 +33,14 @@ pub struct Request<'a> {
 /// Returns a description of the result.
 ///
 /// # Errors
-/// Unknown kinds and parameters, parameters out of range, too little memory, files that cannot be written.
+/// Unknown kinds and parameters, parameters out of range, too little memory, files that cannot be written, a link in place of the output or of
+/// any map beside it.
 pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     let prepared = prepare(request.spec, request.set, request.seed)?;
     super::check_output(request.output)?;
+    // Which of the maps there are is known only when they are made.
+    let map_file = |name: &str| request.output.with_extension(format!("{name}.tif"));
+    MAPS.iter().try_for_each(|map| check_file(&map_file(map.name)))?;
     let (made, crs) = prepared.make()?;
     let mut notes = prepared.notes();
     let Prepared { kind, generator, seed, streams } = prepared;
@@ -48,7 +53,7 @@ pub fn terrain(request: &Request<'_>) -> Result<Value, Error> {
     }
     let mut maps = Map::new();
     for map in &made.maps {
-        let path = request.output.with_extension(format!("{}.tif", map.name));
+        let path = map_file(map.name);
         let options = WriteOptions { values: values_of(map), ..request.options.clone() };
         dem::write(&path, &map.values, &crs, &options).map_err(super::write_error)?;
         let kind = map.kind();

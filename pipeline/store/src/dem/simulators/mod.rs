@@ -214,7 +214,7 @@ fn holds(folder: &Path, simulator: Simulator) -> bool {
 /// on disk before the first appears, so an export that fails leaves an earlier one as it was.
 ///
 /// # Errors
-/// [`DemError::Io`] if a file cannot be written, or a folder has its name.
+/// [`DemError::Io`] if a file cannot be written, or a folder has its name; [`DemError::Unfit`] if a link, a pipe or a device has it.
 pub fn write(folder: &Path, export: &Export) -> Result<(), DemError> {
     atomic::clear_leftovers(&folder.join(IMPORT));
     let is_new = !folder.exists();
@@ -241,6 +241,7 @@ fn finish(folder: &Path, name: &str, bytes: &[u8]) -> Result<FinishedFile, DemEr
             "is a folder, but the export has a file of that name; move the folder, or choose a new one for the export";
         return Err(failed(&path)(io::Error::new(io::ErrorKind::IsADirectory, reason)));
     }
+    atomic::check_replaced(&path).map_err(|e| Refusal::new(e.to_string()).unfit(&path))?;
     // The folder is synced once, after all files.
     let file = AtomicFile::create(&Draft(folder).file(name)).and_then(|mut file| {
         file.write_all(bytes)?;

@@ -271,6 +271,26 @@ fn val_failed_exports_leave_the_earlier_one() {
     assert_eq!(fs::read_dir(&out).unwrap().count(), new.files.len() + 1);
 }
 
+/// A link in place of a file of an export stays, and so does the earlier export.
+#[cfg(unix)]
+#[test]
+fn val_links_in_an_export_are_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let [out, kept] = ["out", "kept"].map(|name| folder.path().join(name));
+    let [old, new] = [4, 5].map(|side| resampled(&slanted(side, side), Simulator::Mujoco).unwrap());
+    write(&out, &old).unwrap();
+    fs::write(&kept, "kept").unwrap();
+    fs::remove_file(out.join(README)).unwrap();
+    std::os::unix::fs::symlink(&kept, out.join(README)).unwrap();
+    let refused = write(&out, &new).unwrap_err();
+    let words = "README.md: is a symbolic link, which the output would replace";
+    assert!(matches!(refused, DemError::Unfit { .. }) && refused.to_string().contains(words), "{refused}");
+    assert!(out.join(README).is_symlink() && fs::read_to_string(&kept).unwrap() == "kept");
+    assert_eq!(fs::read_dir(&out).unwrap().count(), old.files.len(), "nothing else is left");
+    let others = old.files.iter().filter(|(name, _)| name != README);
+    others.for_each(|(name, bytes)| assert!(fs::read(out.join(name)).unwrap() == *bytes, "{name}"));
+}
+
 /// A pipe in place of the description of an export is not read, which could block for ever.
 #[cfg(unix)]
 #[test]
