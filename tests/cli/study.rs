@@ -66,6 +66,25 @@ fn val_pipes_and_folders_are_not_schemas() {
     assert!(std::fs::metadata(&pipe).unwrap().file_type().is_fifo());
 }
 
+/// A link of the schema's name stays, whether it leads to nothing or to a schema of the program.
+#[cfg(unix)]
+#[test]
+fn val_a_link_is_not_replaced_by_the_schema() {
+    let folder = area();
+    let path = folder.path();
+    assert_eq!(sastrugi_in(path, &["init"]).code, 0);
+    for target in ["nothing.json", "../study.schema.json"] {
+        std::fs::create_dir_all(path.join("sub")).unwrap();
+        let link = path.join("sub/study.schema.json");
+        std::os::unix::fs::symlink(target, &link).unwrap();
+        let call = sastrugi_in(path, &["init", "-o", "sub/study.toml"]);
+        let words = "sub/study.schema.json: is a symbolic link, which the output would replace";
+        assert!(call.code == 2 && call.stderr.contains(words), "{target}: {} {}", call.code, call.stderr);
+        assert!(std::fs::read_link(&link).unwrap() == Path::new(target) && !path.join("sub/study.toml").exists());
+        std::fs::remove_file(&link).unwrap();
+    }
+}
+
 /// The terrains of the first study have a relief that a vehicle would notice and could drive on.
 #[test]
 fn val_the_first_study_gives_plausible_terrains() {

@@ -5,6 +5,7 @@ use crate::args::{Common, Init};
 use crate::failure::{Code, Failure};
 use crate::output::print;
 use sastrugi_stages::Error;
+use sastrugi_stages::remote::check_file;
 use sastrugi_stages::schema::{is_own, study_schema};
 use sastrugi_stages::starting::{SCHEMA, STARTING};
 use sastrugi_store::{atomic, file};
@@ -36,6 +37,7 @@ pub fn init(args: &Init, common: &Common) -> Verdict {
         let message = "is not a schema of this program; move it, or write the study to another folder with -o";
         return Err(Failure::usage(format!("{} {message}", schema.display())));
     }
+    check_file(&schema)?;
     let published = serde_json::to_string_pretty(&study_schema()).map_err(Failure::failed)? + "\n";
     for (path, text) in [(&schema, published), (path, starting.text.replace("study.toml", &name))] {
         atomic::write(path, text.as_bytes()).map_err(|e| Error::at(path, e))?;
