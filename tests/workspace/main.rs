@@ -7,7 +7,9 @@ mod notice;
 mod pages;
 mod walk;
 
+use sastrugi_tests::{area, called};
 use std::collections::{BTreeMap, BTreeSet};
+use std::path::Path;
 use std::process::Command;
 
 /// Rooms, and what each may import; `any` is one of these words.
@@ -203,4 +205,25 @@ fn val_modules_named_tests_are_compiled_for_tests_only() {
         }
     }
     assert!(count > 100, "{count}");
+}
+
+/// Without a browser, `.ci/look` says that it looked at nothing, and fails where a page was to be looked at.
+#[test]
+fn val_a_look_without_a_browser_fails_if_it_is_wanted() {
+    let path = area();
+    let found = called(Command::new("bash").args(["-c", "command -v bash dirname"]));
+    for program in found.stdout.lines().map(Path::new) {
+        std::os::unix::fs::symlink(program, path.path().join(program.file_name().unwrap())).unwrap();
+    }
+    let script = sastrugi_fixtures::workspace_root().join(".ci/look");
+    let look = |reports: &[&str], wanted: &str| {
+        let mut bash = Command::new(path.path().join("bash"));
+        called(bash.arg(&script).args(reports).env("PATH", path.path()).env("LOOK", wanted))
+    };
+    let words = "no Chromium is on the path, so no page was looked at";
+    let skipped = look(&[], "");
+    assert!(skipped.code == 0 && skipped.stdout.starts_with(&format!("SKIPPED: {words}")), "{}", skipped.stdout);
+    for call in [look(&["report"], ""), look(&[], "required")] {
+        assert!(call.code == 1 && call.stderr.contains(words), "{} {}", call.code, call.stderr);
+    }
 }
