@@ -420,6 +420,11 @@ impl<'a> Builder<'a> {
         !self.refused.errors.is_empty() || !self.refused.inputs.is_empty()
     }
 
+    /// True if an item of that id may be missing because its table is refused.
+    pub fn may_be_refused(&self, id: &str) -> bool {
+        self.refused.holds(id)
+    }
+
     /// Returns all errors at once.
     ///
     /// # Errors

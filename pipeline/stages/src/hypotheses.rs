@@ -3,6 +3,7 @@
 
 use crate::builder::{BuildError, Builder, Heightfield};
 use crate::jobs::traverse;
+use crate::registry;
 use crate::study::keys::nearest;
 use crate::study::{Entry, StudyError};
 use sastrugi_schemas::study::{HypothesisItem, HypothesisTest, TraverseItem};
@@ -21,45 +22,81 @@ pub const SECTION: &str = "hypothesis";
 /// # Errors
 /// A section that is not an array of tables.
 pub fn check(builder: &mut Builder<'_>) -> Result<(), BuildError> {
-    // In a study with errors, a missing group may belong to a refused table.
-    let groups_are_known = !builder.has_refused();
+    // In a study with errors, missions and traverses may be missing because of a refused table.
+    let is_complete = !builder.has_refused();
     let mut families = BTreeMap::new();
-    builder.each(SECTION, |builder, entry| check_table(builder, entry, &mut families, groups_are_known))
+    builder.each(SECTION, |builder, entry| check_table(builder, entry, &mut families, is_complete))
 }
 
 fn check_table(
     builder: &mut Builder<'_>,
     entry: &Entry<'_>,
     families: &mut BTreeMap<String, f64>,
-    groups_are_known: bool,
+    is_complete: bool,
 ) -> Result<(), BuildError> {
     let (item, rest): (HypothesisItem, Value) = entry.read()?;
     entry.check_keys::<HypothesisItem>(&rest, &json!({}))?;
     builder.claim(entry, SECTION, &item.id)?;
     item.check().map_err(|e| entry.refuse(e))?;
     check_level(families, entry, &item)?;
-    if !groups_are_known {
-        return Ok(());
-    }
-    let known = groups(builder);
-    let unknown = item.groups.iter().enumerate().find(|(_, group)| !known.contains(group.as_str()));
-    if let Some((k, group)) = unknown {
+    let known = if is_complete { groups(builder) } else { labels(builder) };
+    let is_unknown = |group: &str| !known.contains(group) && (is_complete || !may_be_driven(builder, group));
+    if let Some((k, group)) = item.groups.iter().enumerate().find(|(_, group)| is_unknown(group.as_str())) {
         let error = entry.error(&format!("groups.{k}"), format!("no missions are driven in group \"{group}\""));
-        return Err(suggesting(error, group, &known).into());
+        return Err(suggesting(error, group, &known, is_complete).into());
     }
-    check_run(builder, entry, &item)
+    if is_complete { check_run(builder, entry, &item) } else { Ok(()) }
 }
 
-fn suggesting(error: StudyError, group: &str, known: &BTreeSet<&str>) -> StudyError {
+fn suggesting(error: StudyError, group: &str, known: &BTreeSet<&str>, is_complete: bool) -> StudyError {
     let list = || match known.len() {
-        0 => "no missions are driven in this study".to_owned(),
-        _ => format!("known: {}", known.iter().copied().collect::<Vec<_>>().join(", ")),
+        0 => is_complete.then(|| "no missions are driven in this study".to_owned()),
+        _ => Some(format!("known: {}", known.iter().copied().collect::<Vec<_>>().join(", "))),
     };
-    let help = nearest(group, known.iter().copied()).map_or_else(list, |n| format!("did you mean \"{n}\"?"));
-    error.with_help(Some(help))
+    let near = nearest(group, known.iter().copied()).map(|n| format!("did you mean \"{n}\"?"));
+    error.with_help(near.or_else(list))
 }
 
-/// Groups of the missions, as in the report: the label of the heightfield or, without one, its kind.
+/// True if missions may be driven in a group that no surface has so far, once the study's errors are mended: a refused table has the id or
+/// sweeps, the group is a kind, which may be what a misspelt one means, or any table has the word.
+fn may_be_driven(builder: &Builder<'_>, group: &str) -> bool {
+    let is_stated = |entry: Entry<'_>| {
+        let is_swept = entry.table().contains_key("sweep") && entry.id().is_some_and(|id| builder.may_be_refused(id));
+        is_swept || entry.table().values().any(|value| has_word(value, group))
+    };
+    builder.may_be_refused(group)
+        || registry::kinds().iter().any(|kind| kind.kind == group)
+        || tables(builder).any(is_stated)
+}
+
+fn has_word(value: &Value, word: &str) -> bool {
+    match value {
+        Value::String(text) => text == word,
+        Value::Array(list) => list.iter().any(|value| has_word(value, word)),
+        Value::Object(table) => table.values().any(|value| has_word(value, word)),
+        Value::Null | Value::Bool(_) | Value::Number(_) => false,
+    }
+}
+
+/// The tables of all other sections.
+fn tables<'s>(builder: &Builder<'s>) -> impl Iterator<Item = Entry<'s>> {
+    let study = builder.study;
+    let others = registry::section_names().into_iter().filter(|section| *section != SECTION);
+    others.flat_map(move |section| study.entries(section).unwrap_or_default())
+}
+
+/// Labels of all surfaces, also of those in refused tables that state one.
+fn labels<'b>(builder: &'b Builder<'_>) -> BTreeSet<&'b str> {
+    let stated = tables(builder).filter_map(|entry| entry.table().get("group").and_then(Value::as_str));
+    builder.heightfields.values().map(label).chain(stated).collect()
+}
+
+/// Group of a surface, as in the report: its label or, without one, its kind.
+fn label(field: &Heightfield) -> &str {
+    field.group.as_deref().unwrap_or(&field.kind)
+}
+
+/// Groups of the missions.
 fn groups<'b>(builder: &'b Builder<'_>) -> BTreeSet<&'b str> {
     driven(builder).map(|(_, group)| group).collect()
 }
@@ -69,7 +106,7 @@ fn driven<'b>(builder: &'b Builder<'_>) -> impl Iterator<Item = (&'b str, &'b st
     let items = builder.graph.nodes().iter().map(|node| &node.item).filter(|item| item.stage == traverse::STAGE);
     items.filter_map(|item| {
         let field = builder.heightfields.get(traverse::terrain_of(&item.id))?;
-        Some((traverse::run_of(&item.id), field.group.as_deref().unwrap_or(&field.kind)))
+        Some((traverse::run_of(&item.id), label(field)))
     })
 }
 
@@ -156,8 +193,7 @@ impl Units {
         let runs: Vec<TraverseItem> = runs.filter(|run| run.sweep.is_empty() && named(run)).collect();
         let lines = || runs.iter().filter_map(|run| builder.missions.get(&run.missions)).flat_map(|drawn| &drawn.lines);
         let of_group = |group: &String| -> BTreeMap<&str, Option<u64>> {
-            let of =
-                |field: &Heightfield| field.variant.is_none() && field.group.as_ref().unwrap_or(&field.kind) == group;
+            let of = |field: &Heightfield| field.variant.is_none() && label(field) == group;
             let fields = &builder.heightfields;
             let chosen = lines().filter(|one| fields.get(&one.heightfield).is_some_and(of));
             chosen.map(|one| (one.heightfield.as_str(), one.shared)).collect()
@@ -242,4 +278,67 @@ fn check_level(
     }
     let message = format!("is {}; a family shares one level, and others of this family have {alpha}", item.alpha);
     Err(entry.refuse(ParameterError::new("alpha", message)).into())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::error::Error;
+    use crate::loaded::load_text;
+    use std::path::Path;
+
+    /// A study whose second terrain has an error, with a hypothesis on these groups.
+    fn study(terrain: &str, groups: [&str; 2]) -> String {
+        let head = "[study]\nname = \"x\"\nseed = 1\ndate = \"2026-01-01\"\n";
+        let rough = "[[terrain]]\nid = \"t\"\nkind = \"multifractal\"\ngroup = \"rough\"\nsize_px = [64, 64]\n";
+        let drives = "[[missions]]\nid = \"m\"\nterrains = [\"t\", \"u\"]\nlength_m = 2.0\nborder_m = 0.5\n\
+            [[traverse]]\nid = \"d\"\nmissions = \"m\"\n";
+        let claim = "[[hypothesis]]\nid = \"h\"\nstatistic = \"success\"\ntest = \"difference\"\n";
+        format!("{head}{rough}[[terrain]]\n{terrain}{drives}{claim}groups = {groups:?}\n")
+    }
+
+    fn refusals(text: &str) -> Vec<StudyError> {
+        match load_text(text, "study.toml", Path::new("")) {
+            Err(Error::Study { refusals, .. }) => refusals.0,
+            Err(other) => panic!("{other}\n{text}"),
+            Ok(_) => panic!("not refused:\n{text}"),
+        }
+    }
+
+    const WRONG: &str = "id = \"u\"\nkind = \"gap\"\ngroup = \"smooth\"\ncell_m = -1.0\n";
+
+    /// An unknown group is told with the other errors of the study.
+    #[test]
+    fn val_unknown_groups_are_told_with_other_errors() {
+        for (group, help) in [("smoth", "did you mean \"smooth\"?"), ("level", "known: rough, smooth")] {
+            let found = refusals(&study(WRONG, ["rough", group]));
+            let [cell, unknown] = found.as_slice() else { panic!("{group}: {found:?}") };
+            assert!(cell.message.starts_with("terrain \"u\": `cell_m`"), "{cell:?}");
+            assert_eq!(unknown.message, format!("hypothesis \"h\": no missions are driven in group \"{group}\""));
+            assert_eq!(unknown.help.as_deref(), Some(help));
+        }
+    }
+
+    /// A group that a refused table has, or may have once its errors are mended, is not called unknown.
+    #[test]
+    fn val_groups_of_refused_tables_are_not_called_unknown() {
+        for (terrain, group) in [
+            (WRONG, "smooth"),
+            // Its id, and that of a replicate.
+            ("id = \"u\"\nkind = \"gap\"\ncell_m = -1.0\n", "u"),
+            ("id = \"u\"\nkind = \"gap\"\ncell_m = -1.0\ncount = 2\n", "u-0002"),
+            // Its kind, also if that is missing or misspelt.
+            ("id = \"u\"\nkind = \"gap\"\ncell_m = -1.0\n", "gap"),
+            ("id = \"u\"\n", "gap"),
+            ("id = \"u\"\nkind = \"gapp\"\n", "gap"),
+            // A key that may have been meant to be `group`, the values of a sweep, and anything if the table has no id.
+            ("id = \"u\"\nkind = \"gap\"\ngruop = \"smooth\"\n", "smooth"),
+            ("id = \"u\"\nkind = \"gap\"\nsweep.cell_m = [-1.0, 0.1]\n", "smooth"),
+            ("kind = \"gap\"\ncell_m = -1.0\n", "smooth"),
+        ] {
+            let found = refusals(&study(terrain, ["rough", group]));
+            let is_of_groups = |error: &StudyError| error.message.contains("no missions are driven");
+            assert!(!found.is_empty() && !found.iter().any(is_of_groups), "{terrain}{group}: {found:?}");
+        }
+    }
 }
