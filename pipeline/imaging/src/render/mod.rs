@@ -173,12 +173,12 @@ pub fn render(scene: &Scene<'_>, parameters: &RenderParameters, streams: &Stream
     let view = View::new(&relief, scene.albedo, parameters, &pose);
     let noise = Counter::new(&mut streams.stream(NOISE));
     let [image_rows, image_cols] = view.camera.shape();
-    let row = |row: usize| (0..image_cols).map(move |col| (row, col));
-    let pixels: Vec<Pixel> = (0..image_rows)
-        .into_par_iter()
-        .flat_map_iter(row)
-        .map(|(row, col)| view.exposed(view.pixel(row, col), noise.at(row as i64).at(col as i64)))
-        .collect();
+    let pixel = |k: usize| {
+        let (row, col) = (k / image_cols, k % image_cols);
+        view.exposed(view.pixel(row, col), noise.at(row as i64).at(col as i64))
+    };
+    // One range, so that every pixel is written in its place: lists of rows would have to be joined, and are in memory twice.
+    let pixels: Vec<Pixel> = (0..image_rows * image_cols).into_par_iter().with_min_len(image_cols).map(pixel).collect();
     if pixels.iter().all(|p| p.ground == 0.0) {
         return Err(RenderError::NothingSeen);
     }
