@@ -12,6 +12,8 @@ use sastrugi_numeric::{Geometry, Ground, GroundClass, NoGround};
 const BLOCK_M: f64 = 0.5;
 /// Cells of the map along the side of such a block.
 const CELLS: usize = 5;
+/// Side of a cell of the map, m.
+pub const CELL_M: f64 = BLOCK_M / CELLS as f64;
 
 /// Limits beyond which ground is an obstacle.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -40,11 +42,10 @@ impl Task {
 pub fn map_geometry([west, south, east, north]: [f64; 4]) -> Geometry {
     let first = |at: f64| libm::floor(at / BLOCK_M);
     let count = |low: f64, high: f64| ((libm::ceil(high / BLOCK_M) - first(low)).max(1.0)) as usize;
-    let cell = BLOCK_M / CELLS as f64;
     Geometry {
         rows: CELLS * count(south, north),
         cols: CELLS * count(west, east),
-        cell: [cell; 2],
+        cell: [CELL_M; 2],
         origin: [first(west) * BLOCK_M, first(south) * BLOCK_M],
     }
 }
@@ -110,7 +111,7 @@ impl<'a> Blocked<'a> {
 
 /// Centres of the cells of a block with this south-west corner.
 fn centres([west, south]: [f64; 2]) -> impl Iterator<Item = [f64; 2]> {
-    let at = |k: usize| (k as f64 + 0.5) * (BLOCK_M / CELLS as f64);
+    let at = |k: usize| (k as f64 + 0.5) * CELL_M;
     (0..CELLS * CELLS).map(move |k| [west + at(k % CELLS), south + at(k / CELLS)])
 }
 

@@ -484,7 +484,8 @@ impl Job for RoverJob {
         // Without a spacing every cycle is a sample.
         let samples_each = (task.distance_limit_m / self.trial.sample_m).min(f64::from(task.cycle_limit));
         let samples = at_once().min(self.trial.parameters.rovers as usize) as f64 * samples_each * BYTES_PER_SAMPLE;
-        (Grounds::memory_bytes(&self.field) + recordings + maps).saturating_add(samples as u64)
+        let oracles = rovers::oracle_bytes(&self.trial.parameters);
+        (Grounds::memory_bytes(&self.field) + recordings + maps).saturating_add(samples as u64).saturating_add(oracles)
     }
 
     fn estimate(&self) -> Estimate {

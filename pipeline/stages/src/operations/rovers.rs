@@ -23,6 +23,10 @@ use std::path::Path;
 const TILES: usize = 400;
 /// Margin of the map of an oracle beyond all starts and goals, m.
 const BEYOND_M: f64 = 10.0;
+/// Memory of a cell of this map, bytes: height, steps and block, and its number in the list of blocked cells.
+const BYTES_PER_MAP_CELL: f64 = 24.0;
+/// Memory of a cell in one search on it, bytes: cost, parent and state, and the queue.
+const BYTES_PER_SEARCHED_CELL: f64 = 32.0;
 /// Rounding error of places, m.
 const ROUNDING_M: f64 = 1e-6;
 /// Slope limit of a flat map on which steep cells are blocked already, deg.
@@ -155,9 +159,7 @@ impl Oracle {
 /// # Errors
 /// A map on which no path can be planned.
 pub fn oracles(grounds: &Grounds, task: &Task, starts: &[Start]) -> Result<Vec<Oracle>, JobError> {
-    let places = || starts.iter().flat_map(|s| [s.start_m, s.goal_m]);
-    let end = |axis: usize, sign: f64| places().map(|at| sign * at[axis]).fold(f64::NEG_INFINITY, f64::max) + BEYOND_M;
-    let geometry = obstacles::map_geometry([-end(0, -1.0), -end(1, -1.0), end(0, 1.0), end(1, 1.0)]);
+    let geometry = map_around(starts);
     let limits = task.obstacle_limits();
     let row = |n: usize| match grounds {
         Grounds::World(world) => obstacles::blocked(&world.view(), &geometry, n, &limits),
@@ -181,6 +183,25 @@ pub fn oracles(grounds: &Grounds, task: &Task, starts: &[Start]) -> Result<Vec<O
         }
     };
     starts.par_iter().map(one).collect()
+}
+
+/// The map that extends beyond all starts and goals.
+fn map_around(starts: &[Start]) -> Geometry {
+    let places = || starts.iter().flat_map(|s| [s.start_m, s.goal_m]);
+    let end = |axis: usize, sign: f64| places().map(|at| sign * at[axis]).fold(f64::NEG_INFINITY, f64::max) + BEYOND_M;
+    obstacles::map_geometry([-end(0, -1.0), -end(1, -1.0), end(0, 1.0), end(1, 1.0)])
+}
+
+/// Peak memory of [`oracles`] for all starts of a trial, bytes: the map around them, and a search on it in every thread.
+pub fn oracle_bytes(parameters: &RoverParameters) -> u64 {
+    let reach_m = match parameters.starts {
+        Starts::Circle => parameters.radius_m,
+        Starts::Drawn => parameters.radius_m + parameters.distance_m,
+    };
+    // The map is extended to whole blocks of cells.
+    let side = 2.0 * (reach_m + BEYOND_M) / obstacles::CELL_M + 10.0;
+    let searches = rayon::current_num_threads().min(parameters.rovers as usize) as f64;
+    (side * side * (BYTES_PER_MAP_CELL + searches * BYTES_PER_SEARCHED_CELL)) as u64
 }
 
 /// The world of a planetary terrain; `None` for other terrains.
@@ -301,5 +322,30 @@ pub fn note(drive: &Drive, task: &Task) -> Option<String> {
             Some(format!("reached the limit of {limit}, {residual_m:.2} m from the goal"))
         }
         Ending::OffGround(nowhere) => Some(nowhere.to_string()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// The map for which memory is stated is as large as that around any starts and goals, and that of a circle hardly larger.
+    #[test]
+    fn val_the_map_around_starts_and_goals_is_counted() {
+        for (starts, slack) in [(Starts::Circle, 1.1), (Starts::Drawn, 3.0)] {
+            for (radius_m, centre_m) in [(25.0, [0.0; 2]), (3.7, [0.26, -1000.13])] {
+                let parameters = RoverParameters { starts, radius_m, centre_m, ..RoverParameters::default() };
+                let cells = map_around(&unchecked_starts(&parameters, &Streams::for_seed(1, "rover"))).len() as f64;
+                let searches = rayon::current_num_threads().min(100) as f64;
+                let bytes = cells * (BYTES_PER_MAP_CELL + searches * BYTES_PER_SEARCHED_CELL);
+                let stated = oracle_bytes(&parameters) as f64;
+                assert!(
+                    stated >= bytes && stated <= slack * bytes,
+                    "{starts:?} {radius_m} m: {stated} of {bytes} bytes"
+                );
+            }
+        }
+        let huge = RoverParameters { radius_m: 1e300, ..RoverParameters::default() };
+        assert_eq!(oracle_bytes(&huge), u64::MAX);
     }
 }
