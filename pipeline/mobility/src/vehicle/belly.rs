@@ -141,31 +141,15 @@ pub(crate) struct Load {
     pub undefined: bool,
 }
 
-impl Belly {
-    /// Forces of all points over a time step; updates the bristles.
-    pub(crate) fn press(
-        &self,
-        ground: &Ground,
-        motion: &Motion,
-        parameters: &BellyParameters,
-        friction: f64,
-        step_s: f64,
-        bristles: &mut Bristles,
-    ) -> Load {
-        bristles.clearance.moved(ground, motion.position, &motion.axes);
-        ground.vectors().run(Press { belly: self, ground, motion, parameters, friction, step_s, bristles })
-    }
-}
-
-/// The points of the chassis on the ground, over a time step.
-struct Press<'a> {
-    belly: &'a Belly,
-    ground: &'a Ground,
-    motion: &'a Motion,
-    parameters: &'a BellyParameters,
-    friction: f64,
-    step_s: f64,
-    bristles: &'a mut Bristles,
+/// The points of the chassis on the ground, over a time step, which give their forces and update the bristles.
+pub(crate) struct Press<'a> {
+    pub belly: &'a Belly,
+    pub ground: &'a Ground,
+    pub motion: &'a Motion,
+    pub parameters: &'a BellyParameters,
+    pub friction: f64,
+    pub step_s: f64,
+    pub bristles: &'a mut Bristles,
 }
 
 impl WithSimd for Press<'_> {
@@ -174,6 +158,7 @@ impl WithSimd for Press<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Load {
         let Self { belly, ground, motion, parameters, friction, step_s, bristles } = self;
+        bristles.clearance.moved(ground, motion.position, &motion.axes);
         let mut load = Load::default();
         let Bristles { deflections, bent, clearance } = bristles;
         for (index, (tile, bent)) in belly.tiles.iter().zip(bent).enumerate() {
@@ -255,6 +240,7 @@ fn turned<S: Simd>(simd: S, axes: &Axes, points: &Quad, axis: usize) -> S::f64s 
 impl Tile {
     /// Lower bound on the height of the tile's points above the highest ground near them, m; minus infinity where the ground
     /// is unknown.
+    #[inline(always)]
     fn above_ceiling_m(&self, ground: &Ground, motion: &Motion) -> f64 {
         let centre = add(motion.position, motion.axes.to_map(self.centre));
         let Axes { x, y, z } = motion.axes;
@@ -420,7 +406,15 @@ mod tests {
                 let load = pressed_one_by_one(&vehicle.belly, &ground, &motion, &mut reference);
                 let bits = |load: &Load| [load.force, load.moment].map(|v| v.map(f64::to_bits));
                 for (ground, bristles) in grounds.iter().zip(&mut bristles) {
-                    let found = vehicle.belly.press(ground, &motion, &CONTACT, 0.5, 0.002, bristles);
+                    let found = ground.vectors().run(Press {
+                        belly: &vehicle.belly,
+                        ground,
+                        motion: &motion,
+                        parameters: &CONTACT,
+                        friction: 0.5,
+                        step_s: 0.002,
+                        bristles,
+                    });
                     assert_eq!((bits(&found), found.undefined), (bits(&load), load.undefined), "step {step}");
                     assert_eq!(bristles.deflections, reference, "step {step}");
                 }

@@ -19,6 +19,7 @@ pub(crate) struct Body {
 impl Body {
     /// Advances by one step under a force and a moment about the centre of mass (both without gravity). The gyroscopic term
     /// is explicit; velocities are updated first.
+    #[inline(always)]
     pub(crate) fn step(&mut self, vehicle: &Vehicle, axes: &Axes, force: Vec3, moment: Vec3, step_s: f64) {
         let acceleration = sub(scale(force, 1.0 / vehicle.mass_kg), [0.0, 0.0, super::model::GRAVITY_M_S2]);
         self.velocity = add_scaled(self.velocity, acceleration, step_s);
@@ -30,6 +31,7 @@ impl Body {
     }
 
     /// Advances position and orientation by one step with the current velocities.
+    #[inline(always)]
     pub(crate) fn advance(&mut self, step_s: f64) {
         self.position = add_scaled(self.position, self.velocity, step_s);
         self.orientation = turned(self.orientation, scale(self.rate, step_s));
@@ -42,6 +44,7 @@ impl Body {
     }
 
     /// Axes of the body.
+    #[inline(always)]
     pub(crate) fn axes(&self) -> Axes {
         Axes::of(self.orientation)
     }

@@ -77,9 +77,13 @@ impl Tyre {
     }
 
     /// Ray tips from the hub in the middle plane of a wheel, in the map frame.
+    #[inline(always)]
     pub(crate) fn rim(&self, axes: &Axes, rim: &mut Vec<Tips>) {
         rim.clear();
-        rim.extend(self.rays.iter().map(|rays| rays.tips(axes)));
+        // Unlike `extend`, a loop is compiled into the step.
+        for rays in &self.rays {
+            rim.push(rays.tips(axes));
+        }
     }
 
     /// All ray tips of a wheel with its hub at `hub`.
@@ -88,15 +92,6 @@ impl Tyre {
             let centre = add_scaled(hub, left, offset);
             rim.iter().flat_map(|tips| tips.points.points()).map(move |ray| add(centre, ray))
         })
-    }
-
-    /// Normal force of the ground on a wheel with its hub at `hub`; `rim` comes from [`Self::rim`] for the same axes.
-    pub(crate) fn press(&self, ground: &Ground, hub: Vec3, axes: &Axes, rim: &[Tips]) -> Pressing {
-        let ceiling = ground.ceiling(hub[0], hub[1]);
-        if hub[2] - self.reach_m - CULLING_MARGIN_M > ceiling {
-            return Pressing::default();
-        }
-        ground.vectors().run(Press { tyre: self, ground, hub, left: axes.y, rim, ceiling })
     }
 }
 
@@ -141,14 +136,15 @@ pub(crate) struct Tips {
     low_m: f64,
 }
 
-/// The rays of one wheel on the ground.
-struct Press<'a> {
-    tyre: &'a Tyre,
-    ground: &'a Ground,
-    hub: Vec3,
-    left: Vec3,
-    rim: &'a [Tips],
-    ceiling: f64,
+/// The rays of one wheel on the ground, which give its normal force.
+pub(crate) struct Press<'a> {
+    pub tyre: &'a Tyre,
+    pub ground: &'a Ground,
+    pub hub: Vec3,
+    /// Direction of the axle.
+    pub left: Vec3,
+    /// [`Tyre::rim`] of the axes of the wheel.
+    pub rim: &'a [Tips],
 }
 
 impl WithSimd for Press<'_> {
@@ -156,8 +152,12 @@ impl WithSimd for Press<'_> {
 
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Pressing {
-        let Self { tyre, ground, hub, left, rim, ceiling } = self;
+        let Self { tyre, ground, hub, left, rim } = self;
         let mut total = Pressing::default();
+        let ceiling = ground.ceiling(hub[0], hub[1]);
+        if hub[2] - tyre.reach_m - CULLING_MARGIN_M > ceiling {
+            return total;
+        }
         for &offset in &tyre.discs {
             let centre = add_scaled(hub, left, offset);
             for tips in rim {
@@ -231,6 +231,7 @@ impl Pressing {
     }
 
     /// The resultant contact; `None` off the ground, or when the wheel lies on its side.
+    #[inline(always)]
     pub(crate) fn touch(&self, hub: Vec3, axes: &Axes, radius_m: f64) -> Option<Touch> {
         let elastic_n = norm(self.force);
         if elastic_n <= 0.0 {
@@ -290,7 +291,7 @@ mod tests {
     fn pressed(tyre: &Tyre, ground: &Ground, hub: Vec3) -> Pressing {
         let mut rim = Vec::new();
         tyre.rim(&LEVEL, &mut rim);
-        tyre.press(ground, hub, &LEVEL, &rim)
+        ground.vectors().run(Press { tyre, ground, hub, left: LEVEL.y, rim: &rim })
     }
 
     /// The force on a wheel, one ray after the other.
@@ -344,7 +345,8 @@ mod tests {
                 let reference = pressed_one_by_one(&vehicle.tyre, &ground, hub, &axes);
                 let bits = |p: &Pressing| (p.force.map(f64::to_bits), p.offset_moment.to_bits(), p.undefined);
                 for ground in &grounds {
-                    let found = vehicle.tyre.press(ground, hub, &axes, &rim);
+                    let press = Press { tyre: &vehicle.tyre, ground, hub, left: axes.y, rim: &rim };
+                    let found = ground.vectors().run(press);
                     assert_eq!(bits(&found), bits(&reference), "{discs} {rays} {hub:?} {axes:?}");
                 }
                 touching += usize::from(reference.force[2] > 0.0);

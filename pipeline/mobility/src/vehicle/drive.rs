@@ -62,6 +62,7 @@ pub(crate) struct Grip {
 impl Grip {
     /// Friction from the bristle's `deflection` and the wheel's `spin` at the start of the step, on ground with friction
     /// `ground`.
+    #[inline(always)]
     pub(crate) fn new(
         tread: &Tread,
         ground: Friction,
@@ -102,6 +103,7 @@ impl Grip {
     }
 
     /// Forward and left force, N, and the deflection of the bristle at the end of the step.
+    #[inline(always)]
     pub(crate) fn settle(&self, tread: &Tread, spin: f64) -> ([f64; 2], [f64; 2]) {
         let (force, _) = self.forces(spin);
         let clipped = force[0] != self.free_n[0] + self.slope * spin || force[1] != self.free_n[1];
@@ -148,6 +150,7 @@ pub(crate) struct Channel<'a> {
 
 impl Channel<'_> {
     /// Spin at the end of the step, rad/s, given the wheels of the channel that touch the ground.
+    #[inline(always)]
     pub(crate) fn solve(&self, start: f64, grips: &[Grip]) -> f64 {
         let (mut low, mut high) = (f64::NEG_INFINITY, f64::INFINITY);
         let mut spin = start;

@@ -1,9 +1,12 @@
 //! Time stepping of one vehicle on the ground.
+//!
+//! A step runs as a whole with the vectors of the ground ([`Ground::vectors`]): entering them once for every wheel and for the
+//! chassis costs more than what is gained there on one number at a time.
 
 use super::articulated;
-use super::belly::{Bristles, Load, Motion};
+use super::belly::{self, Bristles, Load, Motion};
 use super::body::Body;
-use super::contact::{Tips, Touch};
+use super::contact::{self, Tips, Touch};
 use super::drive::{Channel, Grip, Servo, Tread};
 use super::ground::Ground;
 use super::linkage::{Carrier, Joints};
@@ -12,6 +15,7 @@ use super::params::DriveParameters;
 use super::settings::TraverseSettings;
 use super::surface::Friction;
 use super::vector::{Axes, Vec3, add, add_scaled, cross, dot, norm, scale, sub};
+use pulp::{Simd, WithSimd};
 use sastrugi_schemas::topics::WheelState;
 
 /// State of a simulation.
@@ -70,6 +74,22 @@ struct Roll {
     ground_speed: f64,
 }
 
+/// A time step of a simulation.
+struct Step<'s, 'a> {
+    simulation: &'s mut Simulation<'a>,
+    /// One per channel.
+    servos: &'s [Servo],
+}
+
+impl WithSimd for Step<'_, '_> {
+    type Output = ();
+
+    #[inline(always)]
+    fn with_simd<S: Simd>(self, simd: S) {
+        self.simulation.step_with(simd, self.servos);
+    }
+}
+
 impl<'a> Simulation<'a> {
     pub(crate) fn new(ground: &'a Ground, vehicle: &'a Vehicle, settings: &'a TraverseSettings, body: Body) -> Self {
         let tyre = &vehicle.parameters().tyre;
@@ -114,6 +134,11 @@ impl<'a> Simulation<'a> {
 
     /// Advances by one time step, with one servo per channel.
     pub(crate) fn step(&mut self, servos: &[Servo]) {
+        self.ground.vectors().run(Step { simulation: self, servos });
+    }
+
+    #[inline(always)]
+    fn step_with<S: Simd>(&mut self, simd: S, servos: &[Servo]) {
         let axes = self.body.axes();
         let motion = Motion {
             position: self.body.position,
@@ -122,10 +147,10 @@ impl<'a> Simulation<'a> {
             axes,
         };
         self.steer();
-        self.find_touches(&motion);
+        self.find_touches(simd, &motion);
         self.turn_wheels(servos);
         self.vehicle.linkage.push(&self.joints, &mut self.joint_forces);
-        let belly = self.press_belly(&motion);
+        let belly = self.press_belly(simd, &motion);
         let (force, moment) = self.roll(&motion);
         let (force, moment) = (add(force, belly.force), add(moment, belly.moment));
         std::mem::swap(&mut self.spin, &mut self.spun);
@@ -136,6 +161,7 @@ impl<'a> Simulation<'a> {
     }
 
     /// Advances body and joints under a force and a moment about the reference point, both without gravity.
+    #[inline(always)]
     fn advance(&mut self, axes: &Axes, force: Vec3, moment: Vec3) {
         if self.joints.rate.is_empty() {
             self.body.step(self.vehicle, axes, force, moment, self.tread.step_s);
@@ -159,6 +185,7 @@ impl<'a> Simulation<'a> {
     }
 
     /// Moves the steering angles towards their targets.
+    #[inline(always)]
     fn steer(&mut self) {
         for (angle, target) in self.steering.iter_mut().zip(&self.steering_target) {
             *angle += (target - *angle).clamp(-self.steering_step_rad, self.steering_step_rad);
@@ -166,7 +193,8 @@ impl<'a> Simulation<'a> {
     }
 
     /// Normal forces and friction data of all wheels.
-    fn find_touches(&mut self, motion: &Motion) {
+    #[inline(always)]
+    fn find_touches<S: Simd>(&mut self, simd: S, motion: &Motion) {
         let (tyre, axes) = (&self.vehicle.tyre, &motion.axes);
         tyre.rim(axes, &mut self.rim);
         let damping = self.vehicle.parameters().tyre.damping_n_s_m;
@@ -180,7 +208,7 @@ impl<'a> Simulation<'a> {
                 (*axes, &self.rim)
             };
             let hub = add(motion.position, axes.to_map(carrier.hub));
-            let pressing = tyre.press(self.ground, hub, &frame, rim);
+            let pressing = contact::Press { tyre, ground: self.ground, hub, left: frame.y, rim }.with_simd(simd);
             self.undefined |= pressing.undefined;
             let mount_rate = add_scaled(motion.rate, axes.y, carrier.turning(&self.joints.rate));
             let mount_spin = dot(mount_rate, frame.y);
@@ -208,6 +236,7 @@ impl<'a> Simulation<'a> {
     }
 
     /// Solves for the spin of every channel at the end of the step.
+    #[inline(always)]
     fn turn_wheels(&mut self, servos: &[Servo]) {
         for (channel, (spun, servo)) in self.spun.iter_mut().zip(servos).enumerate() {
             let of_channel = self.vehicle.wheels.iter().zip(&self.rolls).filter(|(wheel, _)| wheel.channel == channel);
@@ -226,6 +255,7 @@ impl<'a> Simulation<'a> {
     }
 
     /// Force and moment of all wheels and their generalised forces on the joints; updates the tread deflections.
+    #[inline(always)]
     fn roll(&mut self, motion: &Motion) -> (Vec3, Vec3) {
         let (mut force, mut moment) = ([0.0; 3], [0.0; 3]);
         let wheel_inertia = self.vehicle.parameters().wheels.spin_inertia_kg_m2;
@@ -258,10 +288,19 @@ impl<'a> Simulation<'a> {
         (force, moment)
     }
 
-    fn press_belly(&mut self, motion: &Motion) -> Load {
-        let (belly, parameters) = (&self.vehicle.belly, &self.vehicle.parameters().belly);
+    #[inline(always)]
+    fn press_belly<S: Simd>(&mut self, simd: S, motion: &Motion) -> Load {
         let here = self.ground.friction(motion.position[0], motion.position[1]).unwrap_or(self.friction);
-        let load = belly.press(self.ground, motion, parameters, here.belly, self.tread.step_s, &mut self.bristles);
+        let press = belly::Press {
+            belly: &self.vehicle.belly,
+            ground: self.ground,
+            motion,
+            parameters: &self.vehicle.parameters().belly,
+            friction: here.belly,
+            step_s: self.tread.step_s,
+            bristles: &mut self.bristles,
+        };
+        let load = press.with_simd(simd);
         self.undefined |= load.undefined;
         self.chassis_force = load.force;
         load
@@ -314,6 +353,7 @@ impl<'a> Simulation<'a> {
 }
 
 /// Axes rotated about their z axis.
+#[inline(always)]
 fn turned_about_z(axes: &Axes, angle: f64) -> Axes {
     let (sin, cos) = libm::sincos(angle);
     Axes { x: add_scaled(scale(axes.x, cos), axes.y, sin), y: add_scaled(scale(axes.y, cos), axes.x, -sin), z: axes.z }

@@ -43,12 +43,14 @@ pub(crate) fn norm(a: Vec3) -> f64 {
 pub(crate) type Quaternion = [f64; 4];
 
 /// The unit quaternion in the direction of `q`.
+#[inline(always)]
 pub(crate) fn normalised(q: Quaternion) -> Quaternion {
     let inverse = 1.0 / (q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]).sqrt();
     q.map(|c| c * inverse)
 }
 
 /// `q` rotated by the rotation vector `turn` (in the frame described by `q`), to first order in `turn`.
+#[inline(always)]
 pub(crate) fn turned(q: Quaternion, turn: Vec3) -> Quaternion {
     let [x, y, z, w] = q;
     let [a, b, c] = scale(turn, 0.5);
