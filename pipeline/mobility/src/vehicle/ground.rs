@@ -6,10 +6,10 @@
 //! and can be skipped; the result is bit for bit the same. Where a centre within reach has no data, or lies beyond the
 //! terrain, the ceiling is infinite and nothing is skipped.
 //!
-//! Heights of four points are computed side by side ([`Ground::cells`]), with the bits of one at a time. Each height is stored with the
-//! one north of it, so that the four corners of a bilinear cell are neighbours in memory: 16 bytes, found with one check.
+//! Heights of four points are computed side by side ([`Ground::cells`]), with the bits of one at a time. The four corners of a bilinear
+//! cell are stored together: 16 bytes, found with one check.
 //!
-//! Memory: twelve bytes per cell and a rim of one vehicle length. Cost of building: two running maxima over the grid.
+//! Memory: twenty bytes per cell and a rim of one vehicle length. Cost of building: two running maxima over the grid.
 
 use super::Vehicle;
 use super::lanes::LANES;
@@ -66,8 +66,9 @@ pub struct Ground {
     inverse_cell: [f64; 2],
     /// Outermost cell centres of the terrain: west, south, east, north, m.
     bounds: [f64; 4],
-    /// Heights of each cell centre and of the one north of it, south row first, NaN in the rim and where there is no data.
-    pairs: Vec<[f32; 2]>,
+    /// Heights at the corners of each bilinear cell, in the order of [`Ground::corners`], south row first; NaN in the rim and where
+    /// there is no data.
+    heights: Vec<[f32; 4]>,
     /// Upper bound on the heights within reach of the bilinear cell whose south-west corner is here.
     ceiling: Vec<f32>,
     /// See [`Ground::steepness`].
@@ -140,7 +141,7 @@ impl Ground {
             inverse_cell: geometry.cell.map(|cell| 1.0 / cell),
             bounds: [geometry.x(0), geometry.y(geometry.rows - 1), geometry.x(geometry.cols - 1), geometry.y(0)],
             ceiling: ceiling(&heights, cols, reach),
-            pairs: paired(&heights, cols),
+            heights: cornered(&heights, cols),
             steepness: steepness(dem),
             reach_m: vehicle.reach_m(),
             extent_m: vehicle.extent_m(),
@@ -187,7 +188,7 @@ impl Ground {
     #[inline(always)]
     pub(crate) fn height(&self, x: f64, y: f64) -> f64 {
         let (k, fx, fy) = self.locate(x, y);
-        let [sw, se, nw, ne] = self.corners(k);
+        let [sw, nw, se, ne] = self.corners(k);
         let (low, high) = (sw + (se - sw) * fx, nw + (ne - nw) * fx);
         low + (high - low) * fy
     }
@@ -205,16 +206,20 @@ impl Ground {
         let u = simd.mul_f64s(simd.sub_f64s(x, simd.splat_f64s(x0)), simd.splat_f64s(per_x));
         let v = simd.mul_f64s(simd.sub_f64s(y, simd.splat_f64s(y0)), simd.splat_f64s(per_y));
         let ((i, west), (j, south)) = (floors(simd, u), floors(simd, v));
-        let a = self.corners(self.index(i[0], j[0]));
-        let b = self.corners(self.index(i[1], j[1]));
-        let c = self.corners(self.index(i[2], j[2]));
-        let d = self.corners(self.index(i[3], j[3]));
+        let corners: [S::f64s; LANES] = [
+            cast(self.corners(self.index(i[0], j[0]))),
+            cast(self.corners(self.index(i[1], j[1]))),
+            cast(self.corners(self.index(i[2], j[2]))),
+            cast(self.corners(self.index(i[3], j[3]))),
+        ];
+        // Of four vectors, this is the transposition.
+        let [south_west, north_west, south_east, north_east] = simd.deinterleave_shfl_f64s(corners);
         Cells {
             simd,
-            south_west: cast([a[0], b[0], c[0], d[0]]),
-            south_east: cast([a[1], b[1], c[1], d[1]]),
-            north_west: cast([a[2], b[2], c[2], d[2]]),
-            north_east: cast([a[3], b[3], c[3], d[3]]),
+            south_west,
+            south_east,
+            north_west,
+            north_east,
             fx: simd.sub_f64s(u, west),
             fy: simd.sub_f64s(v, south),
             per_cell: [simd.splat_f64s(per_x), simd.splat_f64s(per_y)],
@@ -225,7 +230,7 @@ impl Ground {
     #[cfg(test)]
     pub(crate) fn gradient(&self, x: f64, y: f64) -> (f64, f64) {
         let (k, fx, fy) = self.locate(x, y);
-        let [sw, se, nw, ne] = self.corners(k);
+        let [sw, nw, se, ne] = self.corners(k);
         let (low, high) = (se - sw, ne - nw);
         let dx = (low + (high - low) * fy) * self.inverse_cell[0];
         let dy = ((nw + high * fx) - (sw + low * fx)) * self.inverse_cell[1];
@@ -274,12 +279,12 @@ impl Ground {
         (row as u32 as usize).wrapping_mul(self.cols).wrapping_add(col as u32 as usize)
     }
 
-    /// Heights south-west, south-east, north-west, north-east of a bilinear cell; NaN beyond the rim.
+    /// Heights south-west, north-west, south-east, north-east of a bilinear cell; NaN beyond the rim.
     #[inline(always)]
     fn corners(&self, k: usize) -> [f64; 4] {
-        match self.pairs.get(k..k.wrapping_add(2)) {
-            Some(&[[sw, nw], [se, ne]]) => [f64::from(sw), f64::from(se), f64::from(nw), f64::from(ne)],
-            _ => [f64::NAN; 4],
+        match self.heights.get(k) {
+            Some(&[sw, nw, se, ne]) => [f64::from(sw), f64::from(nw), f64::from(se), f64::from(ne)],
+            None => [f64::NAN; 4],
         }
     }
 }
@@ -369,12 +374,13 @@ fn framed(dem: &Grid, rim: [usize; 2]) -> (Vec<f32>, usize) {
     (heights, cols)
 }
 
-/// Each height with the one a row further north; NaN in the northernmost row, which belongs to the rim.
-fn paired(heights: &[f32], cols: usize) -> Vec<[f32; 2]> {
-    let mut pairs = Vec::with_capacity(heights.len());
-    pairs.extend(heights.iter().zip(&heights[cols..]).map(|(&south, &north)| [south, north]));
-    pairs.resize(heights.len(), [f32::NAN; 2]);
-    pairs
+/// Each height with those north, east and north-east of it; NaN in the northernmost row, which belongs to the rim.
+fn cornered(heights: &[f32], cols: usize) -> Vec<[f32; 4]> {
+    let mut corners = Vec::with_capacity(heights.len());
+    let cells = heights.windows(2).zip(heights[cols..].windows(2));
+    corners.extend(cells.map(|(south, north)| [south[0], north[0], south[1], north[1]]));
+    corners.resize(heights.len(), [f32::NAN; 4]);
+    corners
 }
 
 /// `sqrt(1 + L^2)` with the steepest slopes of the bilinear surface along either axis, `L^2 = Lx^2 + Ly^2`: both are slopes
