@@ -196,6 +196,7 @@ impl WithSimd for Press<'_> {
                 }
                 let [arm_x, arm_y, arm_z]: [[f64; LANES]; 3] = [cast(arm_x), cast(arm_y), cast(arm_z)];
                 let [hx, hy] = cells.gradients();
+                let [hx, hy]: [[f64; LANES]; 2] = [cast(hx), cast(hy)];
                 for (lane, deflection) in deflections.iter_mut().enumerate() {
                     let overlap = overlaps[lane];
                     if overlap > 0.0 {

@@ -18,10 +18,11 @@
 //! by the summed depths of all tips at that sag, whatever their number.
 //!
 //! Symbols: `x`, `y`, `z` body axes; `r` wheel radius, m. Cost: one height lookup per four neighbouring rays, unless all of them end
-//! above the ceiling of the ground around the wheel.
+//! above the ceiling of the ground around the wheel. Rays that touch are summed in their order, without a branch for each: those that
+//! do not touch add zeros, which change no bit of a sum that starts at `+0`.
 
 use super::ground::Ground;
-use super::lanes::{LANES, Quad, all_clear};
+use super::lanes::{LANES, Quad, all_clear, any_unknown};
 use super::params::VehicleParameters;
 use super::vector::{Axes, Vec3, add, add_scaled, cross, norm, scale};
 use pulp::{Simd, WithSimd, cast};
@@ -120,7 +121,8 @@ impl Rays {
             let (forward, down) = (self.forward[lane], self.down[lane]);
             points.x[lane] = axes.x[0] * forward + axes.z[0] * -down;
             points.y[lane] = axes.x[1] * forward + axes.z[1] * -down;
-            points.z[lane] = axes.x[2] * forward + axes.z[2] * -down;
+            let height = axes.x[2] * forward + axes.z[2] * -down;
+            points.z[lane] = if lane < self.len { height } else { f64::INFINITY };
         }
         // NaN, which no comparison excludes, counts as the lowest.
         let lower = |low: f64, z: f64| if z < low || z.is_nan() { z } else { low };
@@ -128,7 +130,8 @@ impl Rays {
     }
 }
 
-/// Tips of up to four neighbouring rays in the middle plane of a wheel, relative to its hub, in the map frame.
+/// Tips of up to four neighbouring rays in the middle plane of a wheel, relative to its hub, in the map frame. Vacant lanes lie infinitely
+/// high, where they never touch.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Tips {
     points: Quad,
@@ -153,11 +156,12 @@ impl WithSimd for Press<'_> {
     #[inline(always)]
     fn with_simd<S: Simd>(self, simd: S) -> Pressing {
         let Self { tyre, ground, hub, left, rim } = self;
-        let mut total = Pressing::default();
         let ceiling = ground.ceiling(hub[0], hub[1]);
         if hub[2] - tyre.reach_m - CULLING_MARGIN_M > ceiling {
-            return total;
+            return Pressing::default();
         }
+        let zero = simd.splat_f64s(0.0);
+        let (mut total, mut undefined) = (zero, false);
         for &offset in &tyre.discs {
             let centre = add_scaled(hub, left, offset);
             for tips in rim {
@@ -169,27 +173,39 @@ impl WithSimd for Press<'_> {
                 let y = simd.add_f64s(simd.splat_f64s(centre[1]), cast(tips.points.y));
                 let z = simd.add_f64s(simd.splat_f64s(centre[2]), cast(tips.points.z));
                 let cells = ground.cells(simd, x, y);
-                let overlaps: [f64; LANES] = cast(simd.sub_f64s(cells.heights(), z));
+                let overlap = simd.sub_f64s(cells.heights(), z);
+                let overlaps: [f64; LANES] = cast(overlap);
                 if all_clear(&overlaps) {
                     continue;
                 }
-                let heights: [f64; LANES] = cast(z);
-                let [hx, hy] = cells.gradients();
-                for lane in 0..tips.points.len {
-                    if heights[lane] > ceiling {
-                        continue;
-                    }
-                    let overlap = overlaps[lane];
-                    if overlap > 0.0 {
-                        total.add(tyre.ray_stiffness_n_m * overlap, (hx[lane], hy[lane]), offset);
-                    } else if overlap.is_nan() {
-                        total.undefined = true;
-                    }
-                }
+                undefined |= any_unknown(&overlaps);
+                let below = simd.less_than_or_equal_f64s(z, simd.splat_f64s(ceiling));
+                let overlap = simd.select_f64s(below, overlap, zero);
+                let [a, b, c, d] = pushes(simd, tyre.ray_stiffness_n_m, overlap, cells.gradients(), offset);
+                total = simd.add_f64s(simd.add_f64s(simd.add_f64s(simd.add_f64s(total, a), b), c), d);
             }
         }
-        total
+        let [x, y, z, offset_moment]: [f64; LANES] = cast(total);
+        Pressing { force: [x, y, z], offset_moment, undefined }
     }
+}
+
+/// What four rays of a disc add to a [`Pressing`], ray by ray: `k (h - z)` projected on the plane's normal, `k (h - z) n_z n`, and disc
+/// offset times vertical force. Zeros for a ray that does not touch.
+#[inline(always)]
+fn pushes<S: Simd>(simd: S, stiffness: f64, overlap: S::f64s, [hx, hy]: [S::f64s; 2], offset: f64) -> [S::f64s; LANES] {
+    let (zero, one) = (simd.splat_f64s(0.0), simd.splat_f64s(1.0));
+    let touching = simd.greater_than_f64s(overlap, zero);
+    let squared = simd.add_f64s(simd.add_f64s(one, simd.mul_f64s(hx, hx)), simd.mul_f64s(hy, hy));
+    let vertical = simd.div_f64s(simd.mul_f64s(simd.splat_f64s(stiffness), overlap), squared);
+    let vertical = simd.select_f64s(touching, vertical, zero);
+    let down = simd.mul_f64s(simd.splat_f64s(-1.0), vertical);
+    // Gradients next to ground without data are NaN.
+    let x = simd.select_f64s(touching, simd.mul_f64s(down, hx), zero);
+    let y = simd.select_f64s(touching, simd.mul_f64s(down, hy), zero);
+    let moment = simd.mul_f64s(vertical, simd.splat_f64s(offset));
+    // Of four vectors, this is the transposition.
+    simd.deinterleave_shfl_f64s([x, y, vertical, moment])
 }
 
 #[cfg(test)]
@@ -220,16 +236,6 @@ pub(crate) struct Pressing {
 }
 
 impl Pressing {
-    /// Adds a ray: `k (h - z)` projected on the plane's normal, `k (h - z) n_z n`.
-    #[inline(always)]
-    fn add(&mut self, stiff_overlap: f64, (hx, hy): (f64, f64), offset: f64) {
-        let vertical = stiff_overlap / (1.0 + hx * hx + hy * hy);
-        self.force[0] -= vertical * hx;
-        self.force[1] -= vertical * hy;
-        self.force[2] += vertical;
-        self.offset_moment += vertical * offset;
-    }
-
     /// The resultant contact; `None` off the ground, or when the wheel lies on its side.
     #[inline(always)]
     pub(crate) fn touch(&self, hub: Vec3, axes: &Axes, radius_m: f64) -> Option<Touch> {
@@ -292,6 +298,17 @@ mod tests {
         let mut rim = Vec::new();
         tyre.rim(&LEVEL, &mut rim);
         ground.vectors().run(Press { tyre, ground, hub, left: LEVEL.y, rim: &rim })
+    }
+
+    impl Pressing {
+        /// Adds a ray: `k (h - z)` projected on the plane's normal, `k (h - z) n_z n`.
+        fn add(&mut self, stiff_overlap: f64, (hx, hy): (f64, f64), offset: f64) {
+            let vertical = stiff_overlap / (1.0 + hx * hx + hy * hy);
+            self.force[0] -= vertical * hx;
+            self.force[1] -= vertical * hy;
+            self.force[2] += vertical;
+            self.offset_moment += vertical * offset;
+        }
     }
 
     /// The force on a wheel, one ray after the other.

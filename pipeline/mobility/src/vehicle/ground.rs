@@ -313,7 +313,7 @@ impl<S: Simd> Cells<S> {
 
     /// Derivatives of the heights along x and along y; NaN where undefined.
     #[inline(always)]
-    pub(crate) fn gradients(&self) -> [[f64; LANES]; 2] {
+    pub(crate) fn gradients(&self) -> [S::f64s; 2] {
         let simd = self.simd;
         let low = simd.sub_f64s(self.south_east, self.south_west);
         let high = simd.sub_f64s(self.north_east, self.north_west);
@@ -321,7 +321,7 @@ impl<S: Simd> Cells<S> {
         let north = simd.add_f64s(self.north_west, simd.mul_f64s(high, self.fx));
         let south = simd.add_f64s(self.south_west, simd.mul_f64s(low, self.fx));
         let rise_y = simd.sub_f64s(north, south);
-        [cast(simd.mul_f64s(rise_x, self.per_cell[0])), cast(simd.mul_f64s(rise_y, self.per_cell[1]))]
+        [simd.mul_f64s(rise_x, self.per_cell[0]), simd.mul_f64s(rise_y, self.per_cell[1])]
     }
 }
 

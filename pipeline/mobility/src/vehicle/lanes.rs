@@ -40,6 +40,12 @@ pub(crate) fn all_clear(overlaps: &[f64; LANES]) -> bool {
     (overlaps[0] <= 0.0) & (overlaps[1] <= 0.0) & (overlaps[2] <= 0.0) & (overlaps[3] <= 0.0)
 }
 
+/// True if any point lies over ground without data.
+#[inline(always)]
+pub(crate) fn any_unknown(overlaps: &[f64; LANES]) -> bool {
+    overlaps[0].is_nan() | overlaps[1].is_nan() | overlaps[2].is_nan() | overlaps[3].is_nan()
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -65,6 +71,7 @@ mod tests {
                 let mut overlaps = [-1.0; LANES];
                 overlaps[lane] = overlap;
                 assert!(!all_clear(&overlaps), "{lane} {overlap}");
+                assert_eq!(any_unknown(&overlaps), overlap.is_nan(), "{lane} {overlap}");
             }
         }
     }

@@ -106,7 +106,7 @@ impl WithSimd for FourPoints<'_> {
     fn with_simd<S: Simd>(self, simd: S) -> Self::Output {
         let cells = self.ground.cells(simd, cast(self.x), cast(self.y));
         let [dx, dy] = cells.gradients();
-        [cast(cells.heights()), dx, dy]
+        [cast(cells.heights()), cast(dx), cast(dy)]
     }
 }
 
