@@ -22,9 +22,9 @@
 //! do not touch add zeros, which change no bit of a sum that starts at `+0`.
 
 use super::ground::Ground;
-use super::lanes::{LANES, Quad, all_clear, any_unknown};
+use super::lanes::{Four, LANES, Quad, all_clear, any_unknown, apart};
 use super::params::VehicleParameters;
-use super::vector::{Axes, Vec3, add, add_scaled, cross, norm, scale};
+use super::vector::{Axes, Number, Vec3, add, add_scaled, cross, norm, scale, sub};
 use pulp::{Simd, WithSimd, cast};
 use sastrugi_schemas::ParameterError;
 
@@ -230,54 +230,77 @@ pub(crate) struct Pressing {
     /// Elastic force, N.
     pub force: Vec3,
     /// Sum of disc offset times vertical force, N m.
-    offset_moment: f64,
+    pub offset_moment: f64,
     /// A ray met ground without data.
     pub undefined: bool,
-}
-
-impl Pressing {
-    /// The resultant contact; `None` off the ground, or when the wheel lies on its side.
-    #[inline(always)]
-    pub(crate) fn touch(&self, hub: Vec3, axes: &Axes, radius_m: f64) -> Option<Touch> {
-        let elastic_n = norm(self.force);
-        if elastic_n <= 0.0 {
-            return None;
-        }
-        let normal = scale(self.force, 1.0 / elastic_n);
-        let along = cross(axes.y, normal);
-        let in_plane = norm(along);
-        if in_plane < IN_PLANE_MIN {
-            return None;
-        }
-        let forward = scale(along, 1.0 / in_plane);
-        let outward = cross(forward, axes.y);
-        let middle = add_scaled(hub, axes.y, self.offset_moment / self.force[2]);
-        let point = add_scaled(middle, outward, -radius_m);
-        Some(Touch { elastic_n, normal, forward, left: cross(normal, forward), point })
-    }
 }
 
 /// Sine of the smallest angle between contact normal and axle at which a wheel still rolls.
 const IN_PLANE_MIN: f64 = 0.05;
 
-/// The resultant contact of a wheel.
+/// The resultant contact of a wheel, or of wheels side by side.
 #[derive(Clone, Copy, Debug)]
-pub(crate) struct Touch {
+pub(crate) struct Touch<T = f64> {
     /// Elastic part of the normal force, N.
-    pub elastic_n: f64,
+    pub elastic_n: T,
     /// Contact normal, out of the ground.
-    pub normal: Vec3,
+    pub normal: Vec3<T>,
     /// Rolling direction in the contact plane.
-    pub forward: Vec3,
+    pub forward: Vec3<T>,
     /// Left of the rolling direction in the contact plane.
-    pub left: Vec3,
+    pub left: Vec3<T>,
     /// Point of action in the map frame, m.
-    pub point: Vec3,
+    pub point: Vec3<T>,
+    /// Sine of the angle between contact normal and axle.
+    in_plane: T,
+}
+
+impl<T: Number> Touch<T> {
+    /// The resultant of the [`Pressing`] of a wheel with its hub at `hub` and its axle along `axle`.
+    #[inline(always)]
+    pub(crate) fn of(force: Vec3<T>, offset_moment: T, hub: Vec3<T>, axle: Vec3<T>, radius_m: T) -> Self {
+        let elastic_n = norm(force);
+        let normal = scale(force, elastic_n.recip());
+        let along = cross(axle, normal);
+        let in_plane = norm(along);
+        let forward = scale(along, in_plane.recip());
+        let outward = cross(forward, axle);
+        let middle = add_scaled(hub, axle, offset_moment / force[2]);
+        let point = sub(middle, scale(outward, radius_m));
+        Self { elastic_n, normal, forward, left: cross(normal, forward), point, in_plane }
+    }
+}
+
+impl Touch {
+    /// True for a wheel off the ground, or on its side; the contact is meaningless then.
+    #[inline(always)]
+    pub(crate) fn is_missing(&self) -> bool {
+        self.elastic_n <= 0.0 || self.in_plane < IN_PLANE_MIN
+    }
+}
+
+impl<S: Simd> Touch<Four<S>> {
+    /// The contacts one by one.
+    #[inline(always)]
+    pub(crate) fn apart(self) -> [Touch; LANES] {
+        let (elastic_n, in_plane) = (self.elastic_n.apart(), self.in_plane.apart());
+        let (normal, forward) = (apart(self.normal), apart(self.forward));
+        let (left, point) = (apart(self.left), apart(self.point));
+        std::array::from_fn(|lane| Touch {
+            elastic_n: elastic_n[lane],
+            normal: normal[lane],
+            forward: forward[lane],
+            left: left[lane],
+            point: point[lane],
+            in_plane: in_plane[lane],
+        })
+    }
 }
 
 #[cfg(test)]
 mod tests {
     use super::super::TraverseParameters;
+    use super::super::lanes::beside;
     use super::super::vector::normalised;
     use super::*;
     use sastrugi_numeric::simd::Vectors;
@@ -301,6 +324,11 @@ mod tests {
     }
 
     impl Pressing {
+        /// The contact of a wheel of the Husky on level axes.
+        fn touch(&self, hub: Vec3) -> Touch {
+            Touch::of(self.force, self.offset_moment, hub, LEVEL.y, 0.1651)
+        }
+
         /// Adds a ray: `k (h - z)` projected on the plane's normal, `k (h - z) n_z n`.
         fn add(&mut self, stiff_overlap: f64, (hx, hy): (f64, f64), offset: f64) {
             let vertical = stiff_overlap / (1.0 + hx * hx + hy * hy);
@@ -373,6 +401,59 @@ mod tests {
         }
     }
 
+    /// Force and moment, hub and axle of four wheels.
+    struct FourTouches<'a>(&'a [(Pressing, Vec3, Vec3); LANES]);
+
+    impl WithSimd for FourTouches<'_> {
+        type Output = [Touch; LANES];
+
+        #[inline(always)]
+        fn with_simd<S: Simd>(self, simd: S) -> [Touch; LANES] {
+            let wheels = *self.0;
+            let force = beside(simd, wheels.map(|(pressing, _, _)| pressing.force));
+            let offset_moment = Four::new(simd, wheels.map(|(pressing, _, _)| pressing.offset_moment));
+            let (hub, axle) = (beside(simd, wheels.map(|wheel| wheel.1)), beside(simd, wheels.map(|wheel| wheel.2)));
+            Touch::of(force, offset_moment, hub, axle, Four::repeated(simd, 0.1651)).apart()
+        }
+    }
+
+    /// The contacts of four wheels have the bits of one at a time, with the vectors of this CPU and with those of every CPU: on the ground, off
+    /// it, and on their side.
+    #[test]
+    fn prop_four_contacts_have_the_bits_of_one() {
+        let mut stream = Streams::for_seed(7, "test").stream("contacts");
+        let bits = |touch: &Touch| -> Vec<u64> {
+            let parts = [[touch.elastic_n, touch.in_plane, 0.0], touch.normal, touch.forward, touch.left, touch.point];
+            parts.concat().into_iter().map(f64::to_bits).collect()
+        };
+        let (mut touching, mut missing) = (0, 0);
+        for round in 0..500 {
+            let wheels: [(Pressing, Vec3, Vec3); LANES] = std::array::from_fn(|lane| {
+                let mut random = |low: f64, high: f64| stream.uniform_in(low, high);
+                let share = if (round + lane) % 5 == 0 { 0.0 } else { 1.0 };
+                let force = [-90.0, -90.0, 10.0].map(|low| share * random(low, 400.0));
+                let axes = Axes::of(normalised([0.0, 1.0, 2.0, 3.0].map(|w| w + random(-1.0, 1.0))));
+                let axle = if (round + lane) % 7 == 3 { scale(force, 1.0 / norm(force)) } else { axes.y };
+                let pressing = Pressing { force, offset_moment: random(-9.0, 9.0), undefined: false };
+                (pressing, [0, 1, 2].map(|_| random(-50.0, 50.0)), axle)
+            });
+            for vectors in [Vectors::best(), Vectors::Baseline] {
+                let found = vectors.run(FourTouches(&wheels));
+                for (found, &(pressing, hub, axle)) in found.iter().zip(&wheels) {
+                    let one = Touch::of(pressing.force, pressing.offset_moment, hub, axle, 0.1651);
+                    assert_eq!(found.is_missing(), one.is_missing(), "{one:?}");
+                    if one.is_missing() {
+                        missing += 1;
+                    } else {
+                        assert_eq!(bits(found), bits(&one), "{one:?}");
+                        touching += 1;
+                    }
+                }
+            }
+        }
+        assert!(touching > 2000 && missing > 1000, "{touching} {missing}");
+    }
+
     /// At the static sag of 3.468 mm on level ground a wheel carries a quarter of the vehicle, straight up, on the point below its hub.
     /// Rays 13.3 deg to either side end 4.5 mm higher, so the middle ray of each disc carries all of it, and half at half the sag;
     /// above the ground there is no force.
@@ -382,7 +463,7 @@ mod tests {
         let load_n = 56.582 * 9.80665 / 4.0;
         let sag_m = load_n / 40_000.0;
         let at = |sag_m: f64| pressed(&vehicle.tyre, &ground, [3.01, 3.02, 0.1651 - sag_m]);
-        let touch = at(sag_m).touch([3.01, 3.02, 0.1651 - sag_m], &LEVEL, 0.1651).unwrap();
+        let touch = at(sag_m).touch([3.01, 3.02, 0.1651 - sag_m]);
         assert!((touch.elastic_n / load_n - 1.0).abs() < 1e-9, "{touch:?}");
         for (found, expected) in [(touch.normal, LEVEL.z), (touch.forward, LEVEL.x), (touch.left, LEVEL.y)] {
             assert!(norm(add_scaled(found, expected, -1.0)) < 1e-12, "{touch:?}");
@@ -390,7 +471,7 @@ mod tests {
         assert!(norm(add_scaled(touch.point, [3.01, 3.02, -sag_m], -1.0)) < 1e-12, "{touch:?}");
         let half_n = norm(at(0.5 * sag_m).force);
         assert!((half_n / load_n - 0.5).abs() < 1e-9, "{half_n}");
-        assert!(at(-1e-4).touch([3.01, 3.02, 0.1652], &LEVEL, 0.1651).is_none());
+        assert!(at(-1e-4).touch([3.01, 3.02, 0.1652]).is_missing() && !touch.is_missing());
     }
 
     /// On a plane of 3 in 4 ahead, or to the left, the force is along the normal of the plane and the wheel rolls along it.
@@ -398,14 +479,14 @@ mod tests {
     fn val_a_wheel_is_pushed_along_the_normal() {
         let (vehicle, ground) = plane(0.75, 0.0);
         let hub = [3.0, 3.0, 2.25 + 0.1651];
-        let touch = pressed(&vehicle.tyre, &ground, hub).touch(hub, &LEVEL, 0.1651).unwrap();
+        let touch = pressed(&vehicle.tyre, &ground, hub).touch(hub);
         assert!(norm(add_scaled(touch.normal, [-0.6, 0.0, 0.8], -1.0)) < 1e-4, "{touch:?}");
         assert!(norm(add_scaled(touch.forward, [0.8, 0.0, 0.6], -1.0)) < 1e-4, "{touch:?}");
         // The rim point where the normal leaves the wheel.
         assert!(norm(add_scaled(touch.point, add_scaled(hub, touch.normal, -0.1651), -1.0)) < 1e-4, "{touch:?}");
         let (vehicle, ground) = plane(0.0, 0.75);
         let hub = [3.0, 3.0, 2.25 + 0.15];
-        let touch = pressed(&vehicle.tyre, &ground, hub).touch(hub, &LEVEL, 0.1651).unwrap();
+        let touch = pressed(&vehicle.tyre, &ground, hub).touch(hub);
         assert!(norm(add_scaled(touch.normal, [0.0, -0.6, 0.8], -1.0)) < 1e-4, "{touch:?}");
         assert!(norm(add_scaled(touch.left, [0.0, 0.8, 0.6], -1.0)) < 1e-4, "{touch:?}");
         // The uphill disc, on the left, carries more.

@@ -1,9 +1,12 @@
-//! Points in groups of four, for vectors of four numbers ([`sastrugi_numeric::simd`]).
+//! Points and wheels in groups of four, for vectors of four numbers ([`sastrugi_numeric::simd`]).
 //!
 //! Heights below contact points are independent of each other, so four are computed side by side. What follows from those that
-//! touch is summed one point after the other, in their order: the result is bit for bit that of one point at a time.
+//! touch is summed one point after the other, in their order: the result is bit for bit that of one point at a time. So are the contacts of
+//! four wheels ([`Four`]).
 
-use super::vector::Vec3;
+use super::vector::{Number, Vec3};
+use pulp::{Simd, cast};
+use std::ops::{Add, Div, Mul, Sub};
 
 /// Number of points side by side.
 pub(crate) const LANES: usize = 4;
@@ -31,6 +34,86 @@ impl Quad {
     pub(crate) fn points(&self) -> impl Iterator<Item = Vec3> + '_ {
         (0..self.len).map(move |lane| [self.x[lane], self.y[lane], self.z[lane]])
     }
+}
+
+/// Four numbers with the operators of one.
+#[derive(Clone, Copy)]
+pub(crate) struct Four<S: Simd> {
+    simd: S,
+    numbers: S::f64s,
+}
+
+impl<S: Simd> Four<S> {
+    #[inline(always)]
+    pub(crate) fn new(simd: S, numbers: [f64; LANES]) -> Self {
+        Self { simd, numbers: cast(numbers) }
+    }
+
+    /// The same number four times.
+    #[inline(always)]
+    pub(crate) fn repeated(simd: S, number: f64) -> Self {
+        Self { simd, numbers: simd.splat_f64s(number) }
+    }
+
+    /// The numbers one by one.
+    #[inline(always)]
+    pub(crate) fn apart(self) -> [f64; LANES] {
+        cast(self.numbers)
+    }
+}
+
+/// Implements an operator of [`Four`].
+macro_rules! operator {
+    ($operator:ident, $method:ident, $of_four:ident) => {
+        impl<S: Simd> $operator for Four<S> {
+            type Output = Self;
+
+            #[inline(always)]
+            fn $method(self, other: Self) -> Self {
+                Self { simd: self.simd, numbers: self.simd.$of_four(self.numbers, other.numbers) }
+            }
+        }
+    };
+}
+
+operator!(Add, add, add_f64s);
+operator!(Sub, sub, sub_f64s);
+operator!(Mul, mul, mul_f64s);
+operator!(Div, div, div_f64s);
+
+impl<S: Simd> Number for Four<S> {
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        Self { simd: self.simd, numbers: self.simd.sqrt_f64s(self.numbers) }
+    }
+
+    #[inline(always)]
+    fn recip(self) -> Self {
+        Self::repeated(self.simd, 1.0) / self
+    }
+}
+
+/// Four vectors side by side.
+#[inline(always)]
+pub(crate) fn beside<S: Simd>(simd: S, [a, b, c, d]: [Vec3; LANES]) -> Vec3<Four<S>> {
+    [
+        Four::new(simd, [a[0], b[0], c[0], d[0]]),
+        Four::new(simd, [a[1], b[1], c[1], d[1]]),
+        Four::new(simd, [a[2], b[2], c[2], d[2]]),
+    ]
+}
+
+/// The same vector four times.
+#[inline(always)]
+pub(crate) fn repeated<S: Simd>(simd: S, [x, y, z]: Vec3) -> Vec3<Four<S>> {
+    [Four::repeated(simd, x), Four::repeated(simd, y), Four::repeated(simd, z)]
+}
+
+/// Four vectors one by one.
+#[inline(always)]
+pub(crate) fn apart<S: Simd>([x, y, z]: Vec3<Four<S>>) -> [Vec3; LANES] {
+    let (x, y, z) = (x.apart(), y.apart(), z.apart());
+    [[x[0], y[0], z[0]], [x[1], y[1], z[1]], [x[2], y[2], z[2]], [x[3], y[3], z[3]]]
 }
 
 /// True if no point lies below the ground or over ground without data.

@@ -6,9 +6,10 @@
 use super::articulated;
 use super::belly::{self, Bristles, Load, Motion};
 use super::body::Body;
-use super::contact::{self, Tips, Touch};
+use super::contact::{self, Pressing, Tips, Touch};
 use super::drive::{Channel, Grip, Servo, Tread};
 use super::ground::Ground;
+use super::lanes::{Four, LANES, apart, beside, repeated};
 use super::linkage::{Carrier, Joints};
 use super::model::Vehicle;
 use super::params::DriveParameters;
@@ -72,6 +73,15 @@ struct Roll {
     torque: f64,
     /// Speed of the contact point along the rolling direction if it were fixed to the mount, m/s.
     ground_speed: f64,
+}
+
+/// The ground on a wheel.
+#[derive(Clone, Copy, Debug, Default)]
+struct Pressed {
+    pressing: Pressing,
+    hub: Vec3,
+    /// Direction of the axle.
+    axle: Vec3,
 }
 
 /// A time step of a simulation.
@@ -192,47 +202,95 @@ impl<'a> Simulation<'a> {
         }
     }
 
-    /// Normal forces and friction data of all wheels.
+    /// Normal forces and friction data of all wheels, four wheels side by side.
     #[inline(always)]
     fn find_touches<S: Simd>(&mut self, simd: S, motion: &Motion) {
-        let (tyre, axes) = (&self.vehicle.tyre, &motion.axes);
-        tyre.rim(axes, &mut self.rim);
-        let damping = self.vehicle.parameters().tyre.damping_n_s_m;
-        for (index, wheel) in self.vehicle.wheels.iter().enumerate() {
-            let carrier = &self.carriers[index];
-            let (frame, rim) = if wheel.steered {
-                let frame = turned_about_z(axes, self.steering[index]);
-                tyre.rim(&frame, &mut self.steered_rim);
-                (frame, &self.steered_rim)
-            } else {
-                (*axes, &self.rim)
-            };
-            let hub = add(motion.position, axes.to_map(carrier.hub));
-            let pressing = contact::Press { tyre, ground: self.ground, hub, left: frame.y, rim }.with_simd(simd);
-            self.undefined |= pressing.undefined;
-            let mount_rate = add_scaled(motion.rate, axes.y, carrier.turning(&self.joints.rate));
-            let mount_spin = dot(mount_rate, frame.y);
-            let roll = &mut self.rolls[index];
-            *roll = Roll { axle: frame.y, mount_rate, mount_spin, ..Roll::default() };
-            let Some(touch) = pressing.touch(hub, &frame, tyre.radius_m) else {
-                self.deflections[index] = [0.0; 2];
-                continue;
-            };
-            let arm = sub(touch.point, motion.position);
-            let mut velocity = add(motion.velocity, cross(motion.rate, arm));
-            if !carrier.levers.is_empty() {
-                let moved = carrier.velocity(axes.to_body(arm), &self.joints.rate);
-                velocity = add(velocity, axes.to_map(moved));
+        self.vehicle.tyre.rim(&motion.axes, &mut self.rim);
+        let count = self.rolls.len();
+        for first in (0..count).step_by(LANES) {
+            let wheels = first..count.min(first + LANES);
+            // Vacant lanes are off the ground.
+            let mut pressed = [Pressed::default(); LANES];
+            for (index, pressed) in wheels.clone().zip(&mut pressed) {
+                *pressed = self.press_wheel(simd, motion, index);
             }
-            let normal_n = (touch.elastic_n - damping * dot(velocity, touch.normal)).max(0.0);
-            let [forward, left] = [dot(velocity, touch.forward), dot(velocity, touch.left)];
-            let without_spin = [forward + tyre.radius_m * mount_spin, left];
-            let friction = self.ground.friction(touch.point[0], touch.point[1]).unwrap_or(self.friction);
-            let spin = self.spin[wheel.channel];
-            let grip = Grip::new(&self.tread, friction, normal_n, self.deflections[index], without_spin, spin);
-            roll.touch = Some((touch, grip));
-            roll.ground_speed = forward;
+            let (touches, velocities) = self.contacts(simd, motion, first, &pressed);
+            for ((index, touch), &velocity) in wheels.zip(&touches).zip(&velocities) {
+                self.grip(index, touch, velocity);
+            }
         }
+    }
+
+    /// Presses a wheel on the ground; notes the motion of its mount.
+    #[inline(always)]
+    fn press_wheel<S: Simd>(&mut self, simd: S, motion: &Motion, index: usize) -> Pressed {
+        let (vehicle, axes) = (self.vehicle, &motion.axes);
+        let (tyre, carrier) = (&vehicle.tyre, &self.carriers[index]);
+        let (frame, rim) = if vehicle.wheels[index].steered {
+            let frame = turned_about_z(axes, self.steering[index]);
+            tyre.rim(&frame, &mut self.steered_rim);
+            (frame, &self.steered_rim)
+        } else {
+            (*axes, &self.rim)
+        };
+        let hub = add(motion.position, axes.to_map(carrier.hub));
+        let pressing = contact::Press { tyre, ground: self.ground, hub, left: frame.y, rim }.with_simd(simd);
+        self.undefined |= pressing.undefined;
+        let mount_rate = add_scaled(motion.rate, axes.y, carrier.turning(&self.joints.rate));
+        let mount_spin = dot(mount_rate, frame.y);
+        self.rolls[index] = Roll { axle: frame.y, mount_rate, mount_spin, ..Roll::default() };
+        Pressed { pressing, hub, axle: frame.y }
+    }
+
+    /// Contacts of the four wheels from `first`, and the velocity of each contact point if it were fixed to the mount: along normal, rolling
+    /// direction and left, m/s.
+    #[inline(always)]
+    fn contacts<S: Simd>(
+        &self,
+        simd: S,
+        motion: &Motion,
+        first: usize,
+        [a, b, c, d]: &[Pressed; LANES],
+    ) -> ([Touch; LANES], [Vec3; LANES]) {
+        let force = beside(simd, [a.pressing.force, b.pressing.force, c.pressing.force, d.pressing.force]);
+        let offset_moment = Four::new(simd, [a, b, c, d].map(|wheel| wheel.pressing.offset_moment));
+        let hub = beside(simd, [a.hub, b.hub, c.hub, d.hub]);
+        let axle = beside(simd, [a.axle, b.axle, c.axle, d.axle]);
+        let radius_m = Four::repeated(simd, self.vehicle.tyre.radius_m);
+        let touch = Touch::of(force, offset_moment, hub, axle, radius_m);
+        let arm = sub(touch.point, repeated(simd, motion.position));
+        let mut velocity = add(repeated(simd, motion.velocity), cross(repeated(simd, motion.rate), arm));
+        if !self.joints.rate.is_empty() {
+            velocity = add(velocity, beside(simd, self.moved(&motion.axes, first, apart(arm))));
+        }
+        let velocity = [dot(velocity, touch.normal), dot(velocity, touch.forward), dot(velocity, touch.left)];
+        (touch.apart(), apart(velocity))
+    }
+
+    /// Velocities that the joints give to one point of each wheel from `first`, in the map frame, m/s.
+    fn moved(&self, axes: &Axes, first: usize, arms: [Vec3; LANES]) -> [Vec3; LANES] {
+        let mut velocities = [[0.0; 3]; LANES];
+        for ((velocity, arm), carrier) in velocities.iter_mut().zip(arms).zip(&self.carriers[first..]) {
+            *velocity = axes.to_map(carrier.velocity(axes.to_body(arm), &self.joints.rate));
+        }
+        velocities
+    }
+
+    /// Friction data of a wheel with this contact.
+    #[inline(always)]
+    fn grip(&mut self, index: usize, touch: &Touch, [rising, forward, left]: Vec3) {
+        if touch.is_missing() {
+            self.deflections[index] = [0.0; 2];
+            return;
+        }
+        let (tyre, roll) = (&self.vehicle.parameters().tyre, &mut self.rolls[index]);
+        let normal_n = (touch.elastic_n - tyre.damping_n_s_m * rising).max(0.0);
+        let without_spin = [forward + self.tread.radius_m * roll.mount_spin, left];
+        let friction = self.ground.friction(touch.point[0], touch.point[1]).unwrap_or(self.friction);
+        let spin = self.spin[self.vehicle.wheels[index].channel];
+        let grip = Grip::new(&self.tread, friction, normal_n, self.deflections[index], without_spin, spin);
+        roll.touch = Some((*touch, grip));
+        roll.ground_speed = forward;
     }
 
     /// Solves for the spin of every channel at the end of the step.

@@ -1,41 +1,66 @@
-//! Vectors and rotations in three dimensions, using only `+ - * /` and `sqrt`.
+//! Vectors and rotations in three dimensions, using only `+ - * /` and `sqrt`. A vector consists of numbers, or of numbers side by side.
+
+use std::ops::{Add, Div, Mul, Sub};
+
+/// A number, or several side by side ([`super::lanes::Four`]), on which every operation has the bits of the same operation on each.
+pub(crate) trait Number:
+    Copy + Add<Output = Self> + Sub<Output = Self> + Mul<Output = Self> + Div<Output = Self>
+{
+    /// The square root.
+    fn sqrt(self) -> Self;
+
+    /// One divided by it.
+    fn recip(self) -> Self;
+}
+
+impl Number for f64 {
+    #[inline(always)]
+    fn sqrt(self) -> Self {
+        f64::sqrt(self)
+    }
+
+    #[inline(always)]
+    fn recip(self) -> Self {
+        1.0 / self
+    }
+}
 
 /// A vector `[x, y, z]`.
-pub(crate) type Vec3 = [f64; 3];
+pub(crate) type Vec3<T = f64> = [T; 3];
 
 #[inline(always)]
-pub(crate) fn add(a: Vec3, b: Vec3) -> Vec3 {
+pub(crate) fn add<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] + b[0], a[1] + b[1], a[2] + b[2]]
 }
 
 #[inline(always)]
-pub(crate) fn sub(a: Vec3, b: Vec3) -> Vec3 {
+pub(crate) fn sub<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[0] - b[0], a[1] - b[1], a[2] - b[2]]
 }
 
 #[inline(always)]
-pub(crate) fn scale(a: Vec3, s: f64) -> Vec3 {
+pub(crate) fn scale<T: Number>(a: Vec3<T>, s: T) -> Vec3<T> {
     [a[0] * s, a[1] * s, a[2] * s]
 }
 
 /// `a + s b`
 #[inline(always)]
-pub(crate) fn add_scaled(a: Vec3, b: Vec3, s: f64) -> Vec3 {
+pub(crate) fn add_scaled<T: Number>(a: Vec3<T>, b: Vec3<T>, s: T) -> Vec3<T> {
     [a[0] + b[0] * s, a[1] + b[1] * s, a[2] + b[2] * s]
 }
 
 #[inline(always)]
-pub(crate) fn dot(a: Vec3, b: Vec3) -> f64 {
+pub(crate) fn dot<T: Number>(a: Vec3<T>, b: Vec3<T>) -> T {
     a[0] * b[0] + a[1] * b[1] + a[2] * b[2]
 }
 
 #[inline(always)]
-pub(crate) fn cross(a: Vec3, b: Vec3) -> Vec3 {
+pub(crate) fn cross<T: Number>(a: Vec3<T>, b: Vec3<T>) -> Vec3<T> {
     [a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]]
 }
 
 #[inline(always)]
-pub(crate) fn norm(a: Vec3) -> f64 {
+pub(crate) fn norm<T: Number>(a: Vec3<T>) -> T {
     dot(a, a).sqrt()
 }
 
