@@ -12,7 +12,7 @@
 
 use rayon::prelude::*;
 use sastrugi_numeric::Grid;
-use sastrugi_numeric::fft::{Complex64, HalfSpectrum, RealFft2, smooth_length};
+use sastrugi_numeric::fft::{Complex64, RealFft2, smooth_length};
 
 /// Pair sums for lags `(drow, dcol)` with `|drow| <= max_lag[0]`, `|dcol| <= max_lag[1]`.
 #[derive(Clone, Debug)]
@@ -103,39 +103,55 @@ impl<'a> Padded<'a> {
         Self { dem, max_lag, fft: RealFft2::new(shape[0], shape[1]), shape }
     }
 
-    /// Transform of `value(z)` for the cells with data, 0 elsewhere.
-    fn spectrum(&self, value: impl Fn(f64) -> f64) -> Vec<Complex64> {
-        let mut field = vec![0.0; self.shape[0] * self.shape[1]];
-        for (r, out) in field.chunks_exact_mut(self.shape[1]).take(self.dem.rows()).enumerate() {
+    /// `value(z)` for the cells with data, 0 elsewhere: the rows of the surface, padded to the width of the transform.
+    fn field(&self, value: impl Fn(f64) -> f64) -> Vec<f64> {
+        let mut field = vec![0.0; self.dem.rows() * self.shape[1]];
+        for (r, out) in field.chunks_exact_mut(self.shape[1]).enumerate() {
             let row = self.dem.row(r);
             out.iter_mut().zip(row).for_each(|(o, &z)| *o = if z.is_finite() { value(z) } else { 0.0 });
         }
+        field
+    }
+
+    /// Transform of [`Self::field`].
+    fn spectrum(&self, value: impl Fn(f64) -> f64) -> Vec<Complex64> {
+        let mut field = self.field(value);
+        field.resize(self.shape[0] * self.shape[1], 0.0);
         self.fft.forward(&field).values
     }
 
-    /// Correlation at the stored lags, from its real spectrum.
-    fn correlation(&self, spectrum: impl Iterator<Item = f64>) -> Vec<f64> {
-        let values = spectrum.map(|v| Complex64::new(v, 0.0)).collect();
-        let [rows, cols] = self.shape;
-        let field = self.fft.inverse(HalfSpectrum { rows, cols, values });
-        let [max_row, max_col] = self.max_lag;
-        let lags = (0..=max_row).flat_map(|r| (0..=2 * max_col).map(move |c| (r, c)));
-        lags.map(|(r, c)| field[r * cols + (c + cols - max_col) % cols]).collect()
+    /// Correlation at the stored lags, from its spectrum, which is real. Rows beyond the largest lag are not transformed.
+    fn correlation(&self, spectrum: impl Fn(usize) -> f64 + Sync) -> Vec<f64> {
+        let ([rows, cols], [max_row, max_col]) = (self.shape, self.max_lag);
+        let field = self.fft.inverse_rows_of(max_row + 1, |kx, column| {
+            column.iter_mut().enumerate().for_each(|(ky, v)| *v = Complex64::new(spectrum(kx * rows + ky), 0.0));
+        });
+        let mut lags = Vec::with_capacity((max_row + 1) * (2 * max_col + 1));
+        for row in field.chunks_exact(cols) {
+            // Lags to the west are stored at the end of the row.
+            lags.extend_from_slice(&row[cols - max_col..]);
+            lags.extend_from_slice(&row[..=max_col]);
+        }
+        lags
     }
 
     fn with_holes(&self) -> Vec<PairSum> {
-        let products = self.correlation(self.spectrum(|z| z).into_iter().map(|v| v.norm_sqr()));
-        let mask = self.spectrum(|_| 1.0);
-        let squares = self.spectrum(|z| z * z);
-        let both = squares.into_iter().zip(&mask).map(|(q, m)| 2.0 * (q.re * m.re + q.im * m.im));
-        let squares = self.correlation(both);
-        let pairs = self.correlation(mask.into_iter().map(|v| v.norm_sqr()));
+        let heights = self.spectrum(|z| z);
+        let products = self.correlation(|k| heights[k].norm_sqr());
+        drop(heights);
+        let (mask, squared) = (self.spectrum(|_| 1.0), self.spectrum(|z| z * z));
+        let squares = self.correlation(|k| 2.0 * (squared[k].re * mask[k].re + squared[k].im * mask[k].im));
+        drop(squared);
+        let pairs = self.correlation(|k| mask[k].norm_sqr());
         let sum = |((pairs, products), squares): ((f64, f64), f64)| PairSum { pairs: pairs.round(), products, squares };
         pairs.into_iter().zip(products).zip(squares).map(sum).collect()
     }
 
     fn full(&self) -> Vec<PairSum> {
-        let products = self.correlation(self.spectrum(|z| z).into_iter().map(|v| v.norm_sqr()));
+        // Zeros may differ in sign from those of the complete field; their squares do not.
+        let heights = self.fft.forward_rows(&self.field(|z| z)).values;
+        let products = self.correlation(|k| heights[k].norm_sqr());
+        drop(heights);
         let table = CumulativeSquares::of(self.dem);
         let [rows, cols] = [self.dem.rows(), self.dem.cols()];
         let width = 2 * self.max_lag[1] + 1;
@@ -181,6 +197,7 @@ impl CumulativeSquares {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use sastrugi_numeric::fft::HalfSpectrum;
     use sastrugi_numeric::{Geometry, Streams};
 
     /// Reference: the definition, pair by pair.
@@ -219,6 +236,27 @@ mod tests {
                     assert!((fast.products - slow.products).abs() < 1e-12 * scale, "{drow} {dcol}");
                     assert!((fast.squares - slow.squares).abs() < 1e-12 * scale, "{drow} {dcol}");
                 }
+            }
+        }
+    }
+
+    /// Products have the bits of complete transforms, also where a spectrum is zero: noise, a board of -1 and 1, a constant, and nothing.
+    #[test]
+    fn prop_rows_left_out_change_no_bit() {
+        let mut s = Streams::for_seed(1, "lags-test").stream("rows");
+        for (rows, cols) in [(17, 23), (40, 9), (1, 14), (13, 1), (64, 64)] {
+            let noise: Vec<f64> = (0..rows * cols).map(|_| s.normal()).collect();
+            let board = (0..rows * cols).map(|k| [1.0, -1.0][(k / cols + k % cols) % 2]).collect();
+            for values in [noise, board, vec![0.5; rows * cols], vec![0.0; rows * cols]] {
+                let dem = Grid::new(Geometry::square(rows, cols, 0.1), values);
+                let padded = Padded::new(&dem, [rows / 2, cols / 2]);
+                let ([height, width], [max_row, max_col]) = (padded.shape, padded.max_lag);
+                let power = padded.spectrum(|z| z).into_iter().map(|v| Complex64::new(v.norm_sqr(), 0.0)).collect();
+                let field = padded.fft.inverse(HalfSpectrum { rows: height, cols: width, values: power });
+                let lags = (0..=max_row).flat_map(|r| (0..=2 * max_col).map(move |c| (r, c)));
+                let expected = lags.map(|(r, c)| field[r * width + (c + width - max_col) % width].to_bits());
+                let found = padded.full().into_iter().map(|sum| sum.products.to_bits());
+                assert_eq!(found.collect::<Vec<_>>(), expected.collect::<Vec<_>>(), "{rows}x{cols}");
             }
         }
     }

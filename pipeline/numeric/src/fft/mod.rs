@@ -8,7 +8,7 @@
 //!
 //! | transform of | function |
 //! |---|---|
-//! | a real field | [`RealFft2::forward`], [`RealFft2::inverse`]; [`RealFft2::inverse_rows`] for its first rows only; [`RealFft2::inverse_of`] for a spectrum that is written column by column |
+//! | a real field | [`RealFft2::forward`], [`RealFft2::inverse`]; [`RealFft2::forward_rows`] if its other rows are zero, [`RealFft2::inverse_rows`] for its first rows only; [`RealFft2::inverse_of`] for a spectrum that is written column by column |
 //! | a field that is even in both directions, such as a covariance | [`even_spectrum`] |
 //! | complex numbers in one dimension | [`Transform`] |
 
@@ -207,6 +207,20 @@ mod tests {
             for wanted in [0, 1, 7, 8, 9, rows - 1, rows, rows + 5] {
                 let expected = &all[..wanted.min(rows) * cols];
                 assert_eq!(bits(fft.inverse_rows(spectrum.clone(), wanted)), expected, "{rows}x{cols}, {wanted}");
+            }
+        }
+    }
+
+    /// Rows of zeros may be left out: the same numbers, whatever the number of rows that are left.
+    #[test]
+    fn prop_rows_of_zeros_change_no_number() {
+        for (rows, cols) in [(1, 12), (12, 1), (2, 2), (33, 40), (17, 31), (64, 24), (35, 97)] {
+            let fft = RealFft2::new(rows, cols);
+            for given in [0, 1, 7, 8, 9, rows - 1, rows] {
+                let mut field = noise(given.min(rows) * cols, "field");
+                let found = fft.forward_rows(&field);
+                field.resize(rows * cols, 0.0);
+                assert_eq!(found.values, fft.forward(&field).values, "{rows}x{cols}, {given}");
             }
         }
     }

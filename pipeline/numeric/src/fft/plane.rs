@@ -28,7 +28,7 @@ impl Plane {
         Self { rows, cols, along_row, along_col }
     }
 
-    /// The half spectrum of a field.
+    /// The half spectrum of a field of which the first rows are given; the others are zero, and so are their transforms.
     pub fn forward(&self, field: &[f64]) -> Vec<Complex64> {
         let Self { rows, cols, .. } = *self;
         let half = cols / 2 + 1;

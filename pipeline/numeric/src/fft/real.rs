@@ -75,10 +75,37 @@ impl RealFft2 {
     /// # Panics
     /// If the field does not have `rows * cols` values.
     pub fn forward(&self, field: &[f64]) -> HalfSpectrum {
+        assert_eq!(field.len(), self.rows * self.cols, "field must have the shape of the transform");
+        self.forward_rows(field)
+    }
+
+    /// Transform of a field of which only the first rows are given; the others are zero, and rows of zeros are not transformed. Equal to that of the
+    /// complete field, but zeros may differ in sign.
+    ///
+    /// ```
+    /// use sastrugi_numeric::fft::RealFft2;
+    ///
+    /// let fft = RealFft2::new(20, 6);
+    /// let mut field: Vec<f64> = (0..18).map(|k| f64::from(k % 7)).collect();
+    /// let spectrum = fft.forward_rows(&field);
+    /// field.resize(120, 0.0);
+    /// assert_eq!(spectrum.values, fft.forward(&field).values);
+    /// ```
+    ///
+    /// # Panics
+    /// If the field does not consist of at most `rows` complete rows.
+    pub fn forward_rows(&self, field: &[f64]) -> HalfSpectrum {
         let Self { rows, cols, .. } = *self;
-        assert_eq!(field.len(), rows * cols, "field must have the shape of the transform");
+        assert!(
+            field.len() <= rows * cols && field.len().is_multiple_of(cols),
+            "field must consist of rows of the transform"
+        );
         let values = match &self.kind {
-            Kind::Line(transform) => self.forward_line(transform, field),
+            Kind::Line(transform) => {
+                let mut line = field.to_vec();
+                line.resize(rows * cols, 0.0);
+                self.forward_line(transform, &line)
+            }
             Kind::Plane(plane) => plane.forward(field),
         };
         HalfSpectrum { rows, cols, values }
