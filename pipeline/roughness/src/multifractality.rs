@@ -5,6 +5,7 @@
 //! (Frisch, Turbulence, 1995, chapter 8). Two simpler statistics complement it: the flatness `S_4 / S_2^2` of increments
 //! between neighbours (3 for normal increments), and the variation of roughness between tiles.
 
+use crate::hurst::is_finite;
 use rayon::prelude::*;
 use sastrugi_numeric::{Grid, sums};
 use serde::Serialize;
@@ -94,19 +95,27 @@ impl Sums {
         let mut by_row: Vec<Self> = Vec::with_capacity(dem.rows());
         for r in 0..dem.rows() {
             let row = dem.row(r);
-            let along = row.iter().zip(row.iter().skip(lag));
+            let along = Self::default().and_increments(row, &row[lag.min(row.len())..]);
             let below = (r + lag < dem.rows()).then(|| dem.row(r + lag));
-            let across = row.iter().zip(below.unwrap_or_default());
-            by_row.push(Self::of_increments(along.chain(across).map(|(a, b)| (a - b).abs())));
+            by_row.push(along.and_increments(row, below.unwrap_or_default()));
         }
         Self::joined(&by_row)
     }
 
-    fn of_increments(increments: impl Iterator<Item = f64>) -> Self {
-        increments.filter(|d| d.is_finite()).fold(Self::default(), |s, d| Self {
-            powers: [s.powers[0] + d, s.powers[1] + d * d, s.powers[2] + d * d * d, s.powers[3] + d * d * (d * d)],
-            pairs: s.pairs + 1.0,
-        })
+    /// Adds the increments between `a` and `b`, up to the length of the shorter one.
+    fn and_increments(self, a: &[f64], b: &[f64]) -> Self {
+        let Self { powers: [mut first, mut second, mut third, mut fourth], mut pairs } = self;
+        for (a, b) in a.iter().zip(b) {
+            // An increment without data adds zeros, which change no sum.
+            let d = (a - b).abs();
+            let (d, pair) = if is_finite(d) { (d, 1.0) } else { (0.0, 0.0) };
+            first += d;
+            second += d * d;
+            third += d * d * d;
+            fourth += d * d * (d * d);
+            pairs += pair;
+        }
+        Self { powers: [first, second, third, fourth], pairs }
     }
 
     fn joined(parts: &[Self]) -> Self {
@@ -178,6 +187,32 @@ mod tests {
         for e in scaling_exponents(&lines).unwrap() {
             assert!((e.zeta - 0.5 * f64::from(e.order)).abs() < 6.0 * e.standard_error, "{e:?}");
             assert!(e.standard_error < 0.1 * f64::from(e.order), "{e:?}");
+        }
+    }
+
+    /// Sums are those of one increment after the other, by bits, with and without holes, at lags up to beyond the grid.
+    #[test]
+    fn prop_increments_are_added_in_order() {
+        let mut holed = noise(24);
+        holed.values.iter_mut().step_by(7).for_each(|z| *z = f64::NAN);
+        for (dem, lag) in [noise(24), holed].iter().flat_map(|dem| [1, 5, 23, 24, 30].map(|lag| (dem, lag))) {
+            let by_row = |r: usize| {
+                let increment = |r2: usize, c2: usize, c: usize| (dem.at(r, c) - dem.at(r2, c2)).abs();
+                let along = (0..24).filter(|c| c + lag < 24).map(|c| increment(r, c + lag, c));
+                let below = (0..24).filter(|_| r + lag < 24).map(|c| increment(r + lag, c, c));
+                along.chain(below).filter(|d| d.is_finite()).fold(Sums::default(), |s, d| Sums {
+                    powers: [
+                        s.powers[0] + d,
+                        s.powers[1] + d * d,
+                        s.powers[2] + d * d * d,
+                        s.powers[3] + d * d * (d * d),
+                    ],
+                    pairs: s.pairs + 1.0,
+                })
+            };
+            let (found, expected) = (Sums::of(dem, lag), Sums::joined(&(0..24).map(by_row).collect::<Vec<_>>()));
+            assert_eq!(found.powers.map(f64::to_bits), expected.powers.map(f64::to_bits), "{lag}");
+            assert_eq!(found.pairs, expected.pairs, "{lag}");
         }
     }
 
