@@ -21,7 +21,7 @@ const HEIGHT_STEPS_PER_M: f64 = 128.0;
 const DEPTH_M: f64 = 16.0;
 
 /// A part of the terrain's surface.
-#[derive(Clone, Debug, Default, PartialEq)]
+#[derive(Clone, Debug, PartialEq)]
 pub(super) struct Patch {
     /// Origin of its points, in the map frame, m.
     pub origin: [f64; 3],
@@ -241,23 +241,29 @@ impl Drawing<'_> {
         triangles: Vec<[u32; 3]>,
     ) -> Patch {
         let g = &self.dem.geometry;
-        let mut patch = Patch { origin: [g.x(west), g.y(south), self.base], triangles, ..Patch::default() };
+        let count = nodes.size_hint().0;
+        let (mut points, mut codes) = (Vec::with_capacity(count), Vec::with_capacity(count));
         for (row, col) in nodes {
             let [dx, dy] = [(col - west) as f64 * g.cell[0], (south - row) as f64 * g.cell[1]];
-            patch.points.push([dx, dy, self.height(row, col)]);
-            patch.codes.push(self.code(row, col));
+            points.push([dx, dy, self.height(row, col)]);
+            codes.push(self.code(row, col));
         }
-        without_holes(patch)
+        without_holes(Patch { origin: [g.x(west), g.y(south), self.base], points, codes, triangles })
     }
 
     /// A leaf drawn cell by cell.
     fn tile(&self, leaf: &Leaf) -> Patch {
-        let nodes = (leaf.row..=leaf.row_end).flat_map(|row| (leaf.col..=leaf.col_end).map(move |col| (row, col)));
-        let width = (leaf.col_end - leaf.col + 1) as u32;
-        let height = (leaf.row_end - leaf.row) as u32;
-        let cells = (0..height).flat_map(|row| (0..width - 1).map(move |col| row * width + col));
-        let halves = cells.flat_map(|nw| [[nw, nw + width, nw + width + 1], [nw, nw + width + 1, nw + 1]]);
-        self.patch((leaf.row_end, leaf.col), nodes, halves.collect())
+        let [rows, cols] = [leaf.row_end - leaf.row, leaf.col_end - leaf.col];
+        let width = cols + 1;
+        let nodes = (0..(rows + 1) * width).map(|k| (leaf.row + k / width, leaf.col + k % width));
+        // A recording has hundreds of tiles: nested iterators, which do not know their length, would grow each several times.
+        let mut triangles = Vec::with_capacity(2 * rows * cols);
+        for cell in 0..rows * cols {
+            let (nw, width) = ((cell / cols * width + cell % cols) as u32, width as u32);
+            triangles.push([nw, nw + width, nw + width + 1]);
+            triangles.push([nw, nw + width + 1, nw + 1]);
+        }
+        self.patch((leaf.row_end, leaf.col), nodes, triangles)
     }
 
     /// A leaf drawn as a fan from its centre to its outline.
