@@ -9,15 +9,22 @@ use std::io::{self, Read, Write};
 use std::path::Path;
 
 const BUFFER: usize = 1 << 18;
+/// Bytes of content that are collected before they are hashed. Most parts have one to eight, and hashing each by itself takes longer than
+/// its share of a block.
+const WAITING: usize = 1 << 12;
 
 /// Incremental hash of decoded content.
 #[derive(Clone)]
-pub struct ContentHash(Sha256);
+pub struct ContentHash {
+    hash: Sha256,
+    /// Parts that are not hashed yet.
+    waiting: Vec<u8>,
+}
 
 impl ContentHash {
     /// A hash for one kind of content, such as `heights` or `table missions`.
     pub fn new(kind: &str) -> Self {
-        let mut hash = Self(Sha256::new());
+        let mut hash = Self { hash: Sha256::new(), waiting: Vec::with_capacity(WAITING) };
         hash.text(kind);
         hash
     }
@@ -25,7 +32,7 @@ impl ContentHash {
     /// Adds bytes, preceded by their length.
     pub fn bytes(&mut self, bytes: &[u8]) {
         self.u64(bytes.len() as u64);
-        self.0.update(bytes);
+        self.raw(bytes);
     }
 
     /// Adds text, preceded by its length.
@@ -35,12 +42,20 @@ impl ContentHash {
 
     /// Adds a fixed number of bytes.
     pub fn raw(&mut self, bytes: &[u8]) {
-        self.0.update(bytes);
+        if self.waiting.len() + bytes.len() > WAITING {
+            self.hash.update(&self.waiting);
+            self.waiting.clear();
+        }
+        if bytes.len() > WAITING {
+            self.hash.update(bytes);
+        } else {
+            self.waiting.extend_from_slice(bytes);
+        }
     }
 
     /// Adds a number, little-endian.
     pub fn u64(&mut self, value: u64) {
-        self.0.update(value.to_le_bytes());
+        self.raw(&value.to_le_bytes());
     }
 
     /// Adds the bits of a float, little-endian.
@@ -49,8 +64,9 @@ impl ContentHash {
     }
 
     /// The hash in hexadecimal.
-    pub fn finish(self) -> String {
-        hex(&self.0.finalize())
+    pub fn finish(mut self) -> String {
+        self.hash.update(&self.waiting);
+        hex(&self.hash.finalize())
     }
 }
 
@@ -178,4 +194,30 @@ pub fn copy(from: &mut impl Read, to: &mut impl Write) -> io::Result<(u64, Strin
 
 fn hex(bytes: &[u8]) -> String {
     bytes.iter().map(|b| format!("{b:02x}")).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Parts of 0 to three buffers, small and large ones mixed, have the hash of all their bytes in one piece.
+    #[test]
+    fn prop_parts_have_the_hash_of_the_whole() {
+        let lengths =
+            [0, 1, 8, 1, 4000, 90, 5, WAITING, 1, WAITING + 1, 3, 2 * WAITING, WAITING - 1, 1, 7, 3 * WAITING];
+        let part = |k: usize| -> Vec<u8> { (0..lengths[k]).map(|i| (i * 31 + k) as u8).collect() };
+        for count in 0..=lengths.len() {
+            let mut hash = ContentHash::new("parts");
+            let mut whole: Vec<u8> = 5u64.to_le_bytes().into();
+            whole.extend(b"parts");
+            for k in 0..count {
+                hash.raw(&part(k));
+                whole.extend(part(k));
+            }
+            hash.bytes(b"end");
+            whole.extend(3u64.to_le_bytes());
+            whole.extend(b"end");
+            assert_eq!(hash.finish(), of_bytes(&whole), "{count}");
+        }
+    }
 }
