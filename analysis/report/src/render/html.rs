@@ -13,6 +13,9 @@ const FIGURE_ROWS_MAX: usize = 60;
 /// Most rows of a table that are printed in the page.
 const TABLE_ROWS_MAX: usize = 1500;
 
+/// A table with more rows is folded under its caption.
+const OPEN_ROWS_MAX: usize = 100;
+
 /// On a narrow screen, a table with more columns than this becomes a list of cards, unless it has more than [`CARD_ROWS_MAX`] rows.
 const CARD_COLUMNS_MIN: usize = 3;
 const CARD_ROWS_MAX: usize = 100;
@@ -83,8 +86,8 @@ fn block(block: &Block) -> String {
         Block::Warning(text) => paragraph("warning", text),
         Block::Warnings { summary, sentences } => warnings(summary, sentences),
         Block::Figures(figures) => figure_grid(figures),
-        Block::Table(t) => table_block(t),
-        Block::FoldedTable(t) => {
+        Block::Table(t) if t.numbers.rows.len() <= OPEN_ROWS_MAX => table_block(t),
+        Block::Table(t) | Block::FoldedTable(t) => {
             let rows = number::counted(t.numbers.rows.len(), "row");
             let summary = format!("{} ({rows}{})", t.caption, sampled(&t.numbers));
             folded(&summary, &t.id, &table_block(t))
@@ -361,7 +364,7 @@ fn cell(cells: &[Cell], column: &Column, decimals: Option<usize>, label: &str) -
     let (class, text) = match cells.get(column.at) {
         low if column.is_interval => ("n i", interval(low, cells.get(column.at + 1), in_column)),
         None | Some(Cell::Null) => (if column.numeric { "n" } else { "" }, number::ABSENT.to_owned()),
-        Some(Cell::Text(v)) => (class_of_text(v), set(v)),
+        Some(Cell::Text(v)) => (class_of_text(v), words(v)),
         Some(Cell::F64(v)) => ("n", in_column(*v)),
         Some(Cell::I64(v)) => ("n", v.to_string()),
         Some(Cell::Bool(v)) => ("", if *v { "yes" } else { "no" }.to_owned()),
@@ -370,6 +373,14 @@ fn cell(cells: &[Cell], column: &Column, decimals: Option<usize>, label: &str) -
     };
     let class = if class.is_empty() { String::new() } else { format!(" class=\"{class}\"") };
     format!("<td{class}{label}>{text}</td>")
+}
+
+/// Words of a cell. A single long one, such as an id, may be broken after each slash.
+fn words(text: &str) -> String {
+    match text.contains(' ') || text.len() <= CARD_TEXT {
+        true => set(text),
+        false => text.split('/').map(set).collect::<Vec<_>>().join("/<wbr>"),
+    }
 }
 
 fn in_digits(value: f64, decimals: Option<usize>) -> String {
@@ -425,6 +436,26 @@ mod tests {
         // The head is a row, too.
         assert_eq!([&whole, &cut].map(|t| t.matches("<tr>").count()), [1501; 2]);
         assert!(whole.contains(">1499<") && cut.contains(">1499<") && !cut.contains(">1500<"));
+    }
+
+    /// A table of more than 100 rows is folded, whatever its section asks for.
+    #[test]
+    fn val_long_tables_are_folded() {
+        let of_rows = |rows: usize| {
+            block(&Block::Table(TableBlock { id: "t".into(), caption: "All".into(), numbers: numbers(rows, 2) }))
+        };
+        // The query below an open table is folded, too.
+        assert!(of_rows(100).starts_with("<div class=\"scroll\""));
+        assert!(of_rows(101).starts_with("<details><summary data-file=\"data/t.json\">All (101 rows)</summary>"));
+    }
+
+    /// A long id may be broken after a slash; a unit may not, and a sentence only between its words.
+    #[test]
+    fn val_ids_are_broken_at_slashes() {
+        assert_eq!(words("d2.30-0001/husky-0001.mcap"), "d2.30-0001/<wbr>husky-0001.mcap");
+        assert!(!words("in m/s2, as measured").contains("<wbr>"));
+        assert!(words("a<b/husky-0001.mcap").starts_with("a&lt;b/<wbr>"));
+        assert!(!words("m/s2").contains("<wbr>"));
     }
 
     /// Four columns or more turn into cards with labels on a narrow screen, unless there are more than 100 rows.
