@@ -259,10 +259,17 @@ fn val_a_release_goes_where_a_link_leads() {
     let expected = ["d.asc", "page", "release", "release.work", "results", "scratch", "study.toml"];
     assert_eq!(names(path), expected);
     assert_eq!(names(&path.join("scratch")), ["page", "x"]);
+    // So does the work area, unless another is named.
+    assert_eq!(sastrugi_in(path, &["run", "study.toml", "-o", "results", "--quiet"]).code, 0);
+    assert_eq!(names(path), expected);
+    assert_eq!(names(&path.join("scratch")), ["page", "x", "x.work"]);
     // Nothing is there to be followed.
     std::os::unix::fs::symlink("scratch/y", path.join("later")).unwrap();
-    let call = sastrugi_in(path, &["run", "study.toml", "-o", "later", "--work", "release.work", "--quiet"]);
-    assert!(call.code == 2 && call.stderr.contains("later: is a symbolic link"), "{} {}", call.code, call.stderr);
+    for output in ["later", "later/"] {
+        let call = sastrugi_in(path, &["run", "study.toml", "-o", output, "--work", "release.work", "--quiet"]);
+        let words = format!("{output}: is a symbolic link");
+        assert!(call.code == 2 && call.stderr.contains(&words), "{} {}", call.code, call.stderr);
+    }
 }
 
 /// A folder in place of a DEM is called a folder, on the command line and in a study.

@@ -71,7 +71,7 @@ impl RunSummary {
     }
 }
 
-/// The work area that belongs to a release folder.
+/// The work area that belongs to a release folder; for a link to a folder, to that folder.
 ///
 /// ```
 /// use sastrugi_stages::studies::default_work;
@@ -80,6 +80,7 @@ impl RunSummary {
 /// assert_eq!(default_work(Path::new("out/snow")), Path::new("out/snow.work"));
 /// ```
 pub fn default_work(output: &Path) -> PathBuf {
+    let output = release::behind_link(output);
     let name = output.file_name().map_or_else(|| "release".into(), |n| n.to_string_lossy().into_owned());
     output.with_file_name(format!("{name}.work"))
 }

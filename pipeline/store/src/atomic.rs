@@ -181,6 +181,8 @@ impl Drop for AtomicFile {
 /// # Errors
 /// One of kind `InvalidInput`.
 pub fn check_replaced(path: &Path) -> io::Result<()> {
+    // Without a final `/`, behind which the system looks for what a link leads to, which may be nothing.
+    let path: PathBuf = path.components().collect();
     let Ok(found) = fs::symlink_metadata(path) else { return Ok(()) };
     if found.is_file() || found.is_dir() {
         return Ok(());
@@ -371,7 +373,12 @@ mod tests {
         symlink(path("file"), path("link")).unwrap();
         symlink(path("nothing"), path("dangling")).unwrap();
         let _listens = UnixListener::bind(path("socket")).unwrap();
-        for (name, kind) in [("link", "symbolic link"), ("dangling", "symbolic link"), ("socket", "pipe or device")] {
+        for (name, kind) in [
+            ("link", "symbolic link"),
+            ("dangling", "symbolic link"),
+            ("dangling/", "symbolic link"),
+            ("socket", "pipe or device"),
+        ] {
             let refused = check_replaced(&path(name)).unwrap_err();
             assert_eq!(
                 refused.to_string(),

@@ -10,7 +10,7 @@ mod verify;
 mod tests;
 
 pub(crate) use builder::sync_tree;
-pub use builder::{Head, Incoming, PartWriter, ReleaseBuilder, Staging, TablePart, beside, may_be_one};
+pub use builder::{Head, Incoming, PartWriter, ReleaseBuilder, Staging, TablePart, behind_link, beside, may_be_one};
 pub use listed::Listed;
 pub use manifest::for_each_artifact;
 pub use pack::{Packed, pack};

@@ -369,7 +369,7 @@ pub fn beside(dest: &Path, role: &str) -> PathBuf {
 }
 
 /// The destination itself, or the folder that it links to: the link stays, and that folder is replaced.
-fn behind_link(dest: &Path) -> PathBuf {
+pub fn behind_link(dest: &Path) -> PathBuf {
     // Without a final `/`, behind which the system sees the folder, not the link.
     let dest: PathBuf = dest.components().collect();
     if dest.is_symlink() { dest.canonicalize().unwrap_or(dest) } else { dest }

@@ -236,12 +236,12 @@ pub fn write(folder: &Path, export: &Export) -> Result<(), DemError> {
 /// A file of the export, complete on disk but not in place.
 fn finish(folder: &Path, name: &str, bytes: &[u8]) -> Result<FinishedFile, DemError> {
     let path = folder.join(name);
+    atomic::check_replaced(&path).map_err(|e| Refusal::new(e.to_string()).unfit(&path))?;
     if path.is_dir() {
         let reason =
             "is a folder, but the export has a file of that name; move the folder, or choose a new one for the export";
         return Err(failed(&path)(io::Error::new(io::ErrorKind::IsADirectory, reason)));
     }
-    atomic::check_replaced(&path).map_err(|e| Refusal::new(e.to_string()).unfit(&path))?;
     // The folder is synced once, after all files.
     let file = AtomicFile::create(&Draft(folder).file(name)).and_then(|mut file| {
         file.write_all(bytes)?;
