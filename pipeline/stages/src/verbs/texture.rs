@@ -119,6 +119,9 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
     }
     let outcome = synthesis.generate(&streams).map_err(|e| Error::Usage(e.to_string()))?;
     notes.extend(outcome.notes);
+    let (is_periodic, parameters) = (synthesis.is_periodic(), synthesis.parameters());
+    // It may hold a spectrum or a site.
+    drop(synthesis);
     let texture = scaled(outcome.grid, factor);
     let (heights, crs) = match request.onto {
         None => (texture, Crs::default()),
@@ -136,7 +139,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
                     Some(factors.map_err(|e| Error::Input(format!("{}: {e}", path.display())))?)
                 }
             };
-            let sum = lay_onto(&base.grid, &texture, synthesis.is_periodic(), factors.as_ref());
+            let sum = lay_onto(&base.grid, &texture, is_periodic, factors.as_ref());
             (sum.map_err(|e| Error::Usage(e.message))?, base.info.crs)
         }
     };
@@ -148,7 +151,7 @@ pub fn texture(request: &Request<'_>) -> Result<Value, Error> {
         "method": request.method,
         "seed": request.seed,
         "stream": streams.label(),
-        "parameters": synthesis.parameters(),
+        "parameters": parameters,
         "amplitude": factor,
         "covariance_error_max_m2": outcome.covariance_error_max_m2,
         "clip_share": outcome.clip_share,

@@ -1,7 +1,7 @@
 //! Spectrum of a stationary covariance on a torus, even if its range is not small against the torus.
 //!
 //! A covariance truncated to a torus has negative eigenvalues if it has not decayed half way around. Spectra of exponential and
-//! Matern covariances are then computed from their spectral density, which needs no truncation ([`matern::eigenvalue`]).
+//! Matern covariances are then computed from their spectral density, which needs no truncation ([`matern::eigenvalues`]).
 
 use super::filtered::torus_covariance;
 use super::models::matern;

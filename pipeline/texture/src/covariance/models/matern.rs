@@ -54,17 +54,13 @@ impl Model for Matern {
 /// Aliases summed one by one on each side of each wavenumber.
 const ALIASES: i32 = 4;
 
-/// Eigenvalue of a covariance of unit variance on cells of `cell_m`, at an angular wavenumber `[east, north]` in rad per
+/// Eigenvalues of a covariance of unit variance on cells of `cell_m`, at angular wavenumbers `[east, north]` in rad per
 /// m, for a covariance whose long axis has `[sin, cos]` of the azimuth and whose range across is `ratio` times the range
 /// along: the spectral density `nu b^2 / pi (1 + b^2 k^2)^(-nu - 1)`, with wavenumbers above half a wave per cell folded back (the
 /// far ones as an integral). Always positive, unlike the transform of a covariance truncated to a torus.
-pub fn eigenvalue(k: [f64; 2], range_m: f64, nu: f64, cell_m: [f64; 2], axis: [f64; 2], ratio: f64) -> f64 {
-    let [value] = eigenvalues(k[0], [k[1]], range_m, nu, cell_m, axis, ratio);
-    value
-}
-
-/// [`eigenvalue`] at several wavenumbers that differ in their part to the north, with the same bits. Each sum of aliases takes its terms in the
-/// same sequence, side by side with the others, so that roots and quotients of several take one instruction.
+///
+/// Each has the bits that it has alone: every sum of aliases takes its terms in the same sequence, side by side with the others, so that roots and
+/// quotients of several take one instruction.
 pub fn eigenvalues<const N: usize>(
     east: f64,
     north: [f64; N],
@@ -321,7 +317,7 @@ mod tests {
                 for (found, north) in found.into_iter().zip(north) {
                     let expected = one([2.7, north], 1.9, nu, cell_m, axis, ratio);
                     assert_eq!(found.to_bits(), expected.to_bits(), "nu {nu}, {cell_m:?}, {north}: {found} {expected}");
-                    let alone = eigenvalue([2.7, north], 1.9, nu, cell_m, axis, ratio);
+                    let [alone] = eigenvalues(2.7, [north], 1.9, nu, cell_m, axis, ratio);
                     assert_eq!(alone.to_bits(), expected.to_bits(), "nu {nu}, {cell_m:?}, {north}: {alone} {expected}");
                 }
             }
@@ -342,7 +338,7 @@ mod tests {
             for (kx, ky) in [(0usize, 0usize), (1, 0), (3, 7), (40, 20), (100, 100), (100, 3)] {
                 let wave = |k: usize| 2.0 * std::f64::consts::PI * k as f64 / (n as f64 * cell);
                 let expected = spectrum.values[kx * n + ky].re;
-                let found = eigenvalue([wave(kx), wave(ky)], 1.0, nu, [cell; 2], [0.0, 1.0], 1.0);
+                let [found] = eigenvalues(wave(kx), [wave(ky)], 1.0, nu, [cell; 2], [0.0, 1.0], 1.0);
                 assert!((found / expected - 1.0).abs() < 5e-3, "nu {nu}, ({kx}, {ky}): {found} {expected}");
             }
         }

@@ -16,7 +16,6 @@ use sastrugi_schemas::fit::CovarianceMap;
 const MULTIPLE_TOLERANCE: f64 = 1e-6;
 
 /// A target that is not just a covariance model.
-#[derive(Clone)]
 pub enum Aim {
     /// The part of the model that a background over the window lacks, on cells `times` finer (north-south and east-west) than the
     /// texture's.
