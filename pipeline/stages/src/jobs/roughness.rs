@@ -24,7 +24,7 @@ pub const CLASSES_RAW: &str = "classes.raw.tif";
 
 /// Approximate time per cell, s: gradients, pair sums, spectra, and writing the class maps. Measured on grids from 256 x 256 to
 /// 1126 x 1126 cells.
-const SECONDS_PER_CELL: f64 = 3.5e-7;
+const SECONDS_PER_CELL: f64 = 4.5e-7;
 
 /// Adds one item for every heightfield of the study, which describes and classifies it.
 ///

@@ -34,7 +34,7 @@ use serde_json::Value;
 /// Name in the registry.
 pub const KIND: &str = "multifractal";
 /// Rough time per cell, s.
-const SECONDS_PER_CELL: f64 = 2.5e-7;
+const SECONDS_PER_CELL: f64 = 3.3e-7;
 
 /// Level of height 0.
 const ZERO_LEVEL: u16 = 32768;

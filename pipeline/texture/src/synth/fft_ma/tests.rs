@@ -630,15 +630,17 @@ fn val_a_plan_has_the_torus_of_the_synthesis() {
     }
 }
 
-/// By hand: 1126 is twice a prime, so that a transform along it takes two of 2304 (2^8 3^2) points.
+/// By hand: 1126 is twice a prime, so that a transform along it takes two of 2304 (2^8 3^2) points, whose operations take 0.35 of the time of others.
 #[test]
 fn val_sides_that_transform_slowly_cost_more() {
     assert_eq!(octaves([64, 32]), 11.0);
-    let along = 2.0 * 2304.0 / 1126.0 * libm::log2(2304.0);
+    let own = libm::log2(1126.0);
+    let along = own + 0.35 * (2.0 * 2304.0 / 1126.0 * libm::log2(2304.0) - own);
     assert!((octaves([1126, 1126]) - 2.0 * along).abs() < 1e-9, "{}", octaves([1126, 1126]));
     assert!((octaves([1126, 64]) - along - 6.0).abs() < 1e-9, "{}", octaves([1126, 64]));
     let operations = |side: usize, times: Option<[usize; 2]>| cost([side; 2], side * side, times).operations;
-    assert!(operations(1126, None) > 2.5 * operations(1125, None));
+    let ratio = operations(1126, None) / operations(1125, None);
+    assert!((1.5..2.0).contains(&ratio), "{ratio}");
     // Four fine cells for each, whose covariance and model are transformed.
     assert!(operations(1125, Some([2, 2])) > 4.0 * operations(1125, None));
 }
